@@ -1,0 +1,137 @@
+"""The two sides of a power bond inside an engine's step: prediction, virtual coupling forces and work.
+
+The force side goes through its sub-steps on the predicted motion of the other side and sums impulse and work; the
+motion side applies the wrench it was given and sums the work it does. Frames (dof 6) use the convention pose
+(x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's frame.
+Scheme and rules: docs/decisions/0004-coupling.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hub.inputs import Inputs
+from hub.participant import BondPlan
+from schemas.ports import BondSide, bond_ports
+from schemas.vectors import Vector
+
+__all__ = ["ForceSide", "MotionSide"]
+
+
+class ForceSide:
+    """The force side's view of a bond: where the other side is inside the step, and what was exchanged."""
+
+    def __init__(self, bond: BondSide, plan: BondPlan) -> None:
+        """Take the declared bond and its plan."""
+        self._position, self._velocity, self.force_port = (port.name for port in bond_ports(bond))
+        self._plan = plan
+        self._size = bond.dof
+        self._linear = min(bond.dof, 3)
+        self.work_port = f"{bond.name}/work"
+        self._work = np.zeros(1)
+        self._x = np.zeros(self._linear)
+        self._v = self._v_before = np.zeros(self._size)
+        self._a = np.zeros(self._size)
+        self._duration = 0.0
+        self._started = False
+
+    def begin(self, inputs: Inputs, h: float, spring_force: Vector | None = None, stiffness: float = 0.0) -> None:
+        """Take the motion at the start of a step of `h` seconds.
+
+        `spring_force`, shape (3,) or (dof,), N: elastic force at the end of the last step, on the predicted motion. The
+        motion that has come out jumps by d from the predicted one; the jump does work spring_force d + k d^2 / 2 on the spring.
+        """
+        x, v = inputs[self._position][: self._linear], inputs[self._velocity]
+        if self._started and spring_force is not None:
+            jump = x - self.position(self._duration)
+            self._work[0] += float(spring_force[: self._linear] @ jump + 0.5 * stiffness * (jump @ jump))
+        if self._plan.prediction == "slope" and self._started:
+            self._a = (v - self._v_before) / h
+        self._x, self._v, self._v_before = x.copy(), v.copy(), v.copy()
+        self._duration = h
+        self._started = True
+        self._impulse = np.zeros(self._size)
+        self._last = np.zeros(self._size)
+        self._summed = 0.0
+
+    def position(self, tau: float) -> Vector:
+        """Return the predicted position (m), shape (3,) or (dof,), `tau` seconds into the step."""
+        if self._plan.prediction == "hold":
+            return self._x
+        return self._x + tau * (self._v[: self._linear] + 0.5 * tau * self._a[: self._linear])
+
+    def velocity(self, tau: float) -> Vector:
+        """Return the predicted twist (m/s, rad/s), shape (dof,), `tau` seconds into the step."""
+        return self._v + tau * self._a
+
+    def add(self, force: Vector, tau: float, dt: float) -> None:
+        """Count `force` (N, N m; shape (dof,)), what the other side pushes with, over a sub-step of `dt` seconds around `tau`."""
+        self._impulse += dt * force
+        self._summed += dt
+        self._last = force
+        if self._plan.prediction != "hold":
+            self._work[0] += dt * float(force @ self.velocity(tau))
+
+    def result(self) -> dict[str, Vector]:
+        """Return the outputs of the bond: the reaction on the other side (minus the mean or the last force), and the work."""
+        force = self._impulse / self._summed if self._plan.mean else self._last
+        return {self.force_port: -force, self.work_port: self._work.copy()}
+
+    @property
+    def state(self) -> Vector:
+        """All that this side remembers between steps, for hash, save and restore."""
+        return np.concatenate([self._work, self._x, self._v, self._v_before, self._a, [self._duration, float(self._started)]])
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        sizes = np.cumsum([1, self._linear, self._size, self._size, self._size, 1])
+        self._work, self._x, self._v, self._v_before, self._a, duration, started = np.split(state.copy(), sizes)
+        self._duration, self._started = float(duration[0]), bool(started[0])
+
+
+class MotionSide:
+    """The motion side's view of a bond: the force to apply in each sub-step, and the work it does."""
+
+    def __init__(self, bond: BondSide, plan: BondPlan) -> None:
+        """Take the declared bond and its plan."""
+        self.position_port, self.velocity_port, self._force_port = (port.name for port in bond_ports(bond))
+        self._correction = plan.correction
+        self._linear = min(bond.dof, 3)
+        self.work_port = f"{bond.name}/work"
+        self._work = np.zeros(1)
+
+    def begin(self, inputs: Inputs, position: Vector, velocity: Vector) -> None:
+        """Take the reaction for this step, and the motion at its start, from which the other side predicted."""
+        self._reaction = inputs[self._force_port]
+        self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
+
+    @property
+    def implicit_damping(self) -> float:
+        """Damping (N s/m) of the correction, for an engine that integrates it implicitly; it is then left out of `force`."""
+        return 0.0 if self._correction is None else self._correction.gain * self._correction.damping
+
+    def force(self, tau: float, position: Vector, velocity: Vector, *, implicit: bool = False) -> Vector:
+        """Return the force (N, N m; shape (dof,)) on this side in a sub-step around `tau`, given where it is now."""
+        if self._correction is None:
+            return self._reaction
+        c, force = self._correction, self._reaction.copy()
+        v = self._v if implicit else self._v - velocity[: self._linear]
+        force[: self._linear] += c.gain * (c.stiffness * (self._x + tau * self._v - position[: self._linear]) + c.damping * v)
+        return force
+
+    def add(self, force: Vector, displacement: Vector) -> None:
+        """Count the work done against `force` over `displacement` (m, rad; shape (dof,)) of one sub-step."""
+        self._work[0] -= float(force @ displacement)
+
+    def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:
+        """Return the outputs of the bond at the end of the step."""
+        return {self.position_port: position, self.velocity_port: velocity, self.work_port: self._work.copy()}
+
+    @property
+    def state(self) -> Vector:
+        """All that this side remembers between steps."""
+        return self._work.copy()
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        self._work = state.copy()

@@ -1,0 +1,56 @@
+"""What a stepped participant sees of its inputs in one step."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from schemas.errors import SessionError, did_you_mean
+from schemas.message import Message
+from schemas.vectors import Vector
+
+__all__ = ["Inputs"]
+
+
+class Inputs:
+    """The inputs of one participant in one step.
+
+    `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the connection
+    extrapolates. The arrays belong to whoever produced them: read, do not write.
+    """
+
+    __slots__ = ("_events", "_rates", "_stale", "_values")
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        """Take the value of every input port at time 0; the host writes the later ones."""
+        self._values = values
+        self._rates: dict[str, Vector] = {}
+        self._events: dict[str, tuple[Message, ...]] = {}
+        self._stale: set[str] = set()
+
+    def __getitem__(self, port: str) -> Vector:
+        """Return the vector at the start of the step."""
+        try:
+            return self._values[port]
+        except KeyError:
+            raise SessionError(f"no input port '{port}'.{did_you_mean(port, self._values)}") from None
+
+    def message(self, port: str) -> Message | None:
+        """Return the newest message of a signal that has no vector form; None before the first."""
+        return cast("Message | None", self._values[port])
+
+    def at(self, port: str, tau: float) -> Vector:
+        """Return the vector `tau` seconds after the start of the step: held, or extrapolated if the connection says so."""
+        rate = self._rates.get(port)
+        return self[port] if rate is None else self._values[port] + tau * rate
+
+    def rate(self, port: str) -> Vector | None:
+        """Return the slope (1/s) with which the connection extrapolates; None if it holds."""
+        return self._rates.get(port)
+
+    def events(self, port: str) -> tuple[Message, ...]:
+        """Return the messages that arrived on an event port since the last step, oldest first."""
+        return self._events.get(port, ())
+
+    def stale(self, port: str) -> bool:
+        """Say whether the device behind this port has been silent for longer than the port allows, or never spoke."""
+        return port in self._stale

@@ -1,0 +1,88 @@
+"""CDR codecs over `rosbags`: every message model to bytes and back, .msg text and RIHS01 hash of every type."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import TypeVar
+
+from pydantic import ValidationError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from schemas import ros, trocar_msgs
+from schemas.errors import MessageError, did_you_mean
+from schemas.message import Message, msg_text
+
+__all__ = ["decode", "encode", "message_type", "message_types", "rihs01", "ros2msg_definition", "typestore"]
+
+MAX_MESSAGE_BYTES = 16 * 2**20
+"""Larger payloads are refused unread: the largest honest message, an uncompressed 1080p stereo image, has 12 MB."""
+
+M = TypeVar("M", bound=Message)
+
+
+@cache
+def message_types() -> dict[str, type[Message]]:
+    """Return every message model by its ROS type name."""
+    models = (value for module in (ros, trocar_msgs) for value in vars(module).values())
+    return {m.ros_type: m for m in models if isinstance(m, type) and issubclass(m, Message) and m is not Message}
+
+
+def message_type(name: str) -> type[Message]:
+    """Return the model of ROS type `name`."""
+    try:
+        return message_types()[name]
+    except KeyError:
+        raise MessageError(f"unknown message type '{name}'.{did_you_mean(name, message_types())}") from None
+
+
+@cache
+def typestore() -> Typestore:
+    """Return the type store: ROS 2 Jazzy and our own types."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name, model in message_types().items():
+        if name not in store.types:
+            store.register(get_types_from_msg(msg_text(model), name))
+    return store
+
+
+def encode(message: Message) -> bytes:
+    """Return `message` as little-endian CDR with its encapsulation header."""
+    return bytes(typestore().serialize_cdr(message, message.ros_type))
+
+
+def decode(model: type[M], payload: bytes) -> M:
+    """Return the message of type `model` in `payload`.
+
+    Raises MessageError if the bytes are too many, too few or no such message, or if a value is out of its range.
+    """
+    if len(payload) > MAX_MESSAGE_BYTES:
+        raise MessageError(f"{model.ros_type}: {len(payload)} bytes exceed the limit of {MAX_MESSAGE_BYTES}")
+    try:
+        raw = typestore().deserialize_cdr(payload, model.ros_type)
+        return model.model_validate(raw, from_attributes=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        path = ".".join(str(part) for part in first["loc"])
+        raise MessageError(f"{model.ros_type}: {path}: {first['msg']}") from error
+    except Exception as error:  # rosbags lets struct.error, IndexError, AssertionError, UnicodeDecodeError and more through
+        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})") from error
+
+
+@cache
+def rihs01(name: str) -> str:
+    """Return the type hash (REP-2016) of ROS type `name`, `RIHS01_...`."""
+    return typestore().hash_rihs01(name)
+
+
+@cache
+def ros2msg_definition(name: str) -> str:
+    """Return the definition of `name` and of every type it holds, as MCAP's `ros2msg` schema encoding wants it."""
+    text, _ = typestore().generate_msgdef(name, ros_version=2)
+    return text
+
+
+def custom_types() -> Iterator[str]:
+    """Yield the names of our own types."""
+    return (name for name in message_types() if name.startswith("trocar_msgs/"))

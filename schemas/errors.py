@@ -1,0 +1,86 @@
+"""Every error Trocar raises on purpose.
+
+TrocarError
+├── ScenarioError          the scenario cannot be run as written (exit code 2)
+│   └── MissingExtraError  a package that an optional part needs is not installed
+├── MessageError           bytes or values that are not a valid message
+├── SessionError           the running session ended before its time (exit code 1)
+│   ├── ParticipantError   a participant raised, died or stopped answering
+│   └── StateError         a participant cannot save or restore its state
+├── RecordingError         a recording cannot be written, read or re-simulated
+└── ConnectError           no hub, or not the hub that was asked for
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = [
+    "ConnectError",
+    "MessageError",
+    "MissingExtraError",
+    "ParticipantError",
+    "RecordingError",
+    "ScenarioError",
+    "SessionError",
+    "StateError",
+    "TrocarError",
+    "did_you_mean",
+]
+
+
+class TrocarError(Exception):
+    """Root of all errors that Trocar raises on purpose."""
+
+
+class ScenarioError(TrocarError):
+    """The scenario cannot be run as written; the message says where and what was allowed."""
+
+
+class MissingExtraError(ScenarioError):
+    """A part of the scenario needs a package that is not installed here."""
+
+    def __init__(self, part: str, extra: str, package: str) -> None:
+        """Name the part that was asked for and the pip line that brings what it needs."""
+        super().__init__(f"{part} needs the package '{package}', which is not installed. Install it with: pip install 'trocar[{extra}]'")
+        self.extra = extra
+
+
+class MessageError(TrocarError):
+    """Bytes or values that are not a valid message."""
+
+
+class SessionError(TrocarError):
+    """The running session ended before its time."""
+
+
+class ParticipantError(SessionError):
+    """A participant raised, died or stopped answering; `participant` and `step` say which and when."""
+
+    def __init__(self, participant: str, step: int, cause: str) -> None:
+        """Name the participant, the step it was in and the cause."""
+        super().__init__(f"participant '{participant}' failed at step {step}: {cause}")
+        self.participant = participant
+        self.step = step
+        self.cause = cause
+
+
+class StateError(SessionError):
+    """A participant cannot save or restore its state."""
+
+
+class RecordingError(TrocarError):
+    """A recording cannot be written, read or re-simulated."""
+
+
+class ConnectError(TrocarError):
+    """No hub, or not the hub that was asked for."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return `" Did you mean 'x'?"` for a near miss, then the list of what is known."""
+    names = sorted(known)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    hint = f" Did you mean '{close[0]}'?" if close else ""
+    return f"{hint} Known: {', '.join(names) or 'none'}."

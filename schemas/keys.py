@@ -1,0 +1,50 @@
+"""The Zenoh keys of a session. Roles are in the key so that an access rule is one line."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["ROOT", "Keys", "topic", "valid_name"]
+
+ROOT = "trocar"
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def valid_name(name: str) -> bool:
+    """Say whether `name` may name a session, a participant or a part of a port: a letter, then letters, digits, underscores."""
+    return _NAME.fullmatch(name) is not None
+
+
+def topic(key: str) -> str:
+    """Return the ROS topic under which `key` is recorded: the key without root and session."""
+    return "/" + key.split("/", 2)[2]
+
+
+class Keys:
+    """The keys of one session."""
+
+    def __init__(self, session: str) -> None:
+        """Take the session's name."""
+        self.prefix = f"{ROOT}/{session}"
+        self.grant = f"{self.prefix}/hub/grant"
+        self.status = f"{self.prefix}/hub/status"
+
+    def energy(self, bond: str) -> str:
+        """Key of the energy book of `bond`."""
+        return f"{self.prefix}/hub/energy/{bond}"
+
+    def ack(self, participant: str) -> str:
+        """Key of the acks of a stepped participant; `*` for all."""
+        return f"{self.prefix}/engine/{participant}/ack"
+
+    def output(self, role: str, participant: str, port: str) -> str:
+        """Key of an output port; `role` is `engine` for all that is stepped, else `device`."""
+        return f"{self.prefix}/{role}/{participant}/out/{port}"
+
+    def control(self, verb: str) -> str:
+        """Key of a control queryable."""
+        return f"{self.prefix}/control/{verb}"
+
+    def alive(self, role: str, name: str) -> str:
+        """Key of a liveliness token."""
+        return f"{self.prefix}/alive/{role}/{name}"

@@ -1,0 +1,93 @@
+"""Ports and bonds: what a participant declares before anything is started."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["BondSide", "Port", "bond_ports"]
+
+
+class Port(BaseModel):
+    """A named, typed input or output of a participant.
+
+    A *signal* has one value at a time, a float64 vector whenever the type has a fixed layout (see `schemas.vectors`).
+    An *event* port carries a queue of messages of which none is lost.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    """Parts separated by `/`, such as `PSM1/measured_js`."""
+    causality: Literal["input", "output"]
+    type: str = "std_msgs/msg/Float64MultiArray"
+    variability: Literal["signal", "event"] = "signal"
+    size: int = Field(default=1, ge=1)
+    """Number of elements where the type leaves it open (multi-arrays)."""
+    names: tuple[str, ...] = ()
+    """Joint names of a `JointState`."""
+    fields: tuple[Literal["position", "velocity", "effort"], ...] = ("position",)
+    """The parts of a `JointState` that are stated, in this order in the vector."""
+    unit: str = ""
+    """Unit of a bare number or array; empty where the message type implies SI units."""
+    frame: str = ""
+    """`frame_id` in which the value is expressed; empty where there is none. An input without a frame takes any."""
+    period_ns: int = Field(default=0, ge=0)
+    """An output is produced at this period, a multiple of the step; 0: whenever the participant steps."""
+    start: tuple[float, ...] | None = None
+    """Value of an input while nothing is connected (FMI's word); None: the input must be connected."""
+    max_age_ns: int = Field(default=0, ge=0)
+    """A stream inlet older than this is marked stale in the grant; 0: never."""
+    clock: Literal["simulated", "wall"] = "simulated"
+    """The clock of the stamps."""
+    description: str = ""
+
+
+class BondSide(BaseModel):
+    """One end of a power bond: the motion side gives pose and twist and takes a wrench, the force side the reverse.
+
+    `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity, force).
+    The numbers feed the stable-step rule and the linearised coupling.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    side: Literal["motion", "force"]
+    dof: Literal[1, 2, 3, 6] = 6
+    frame: str = ""
+    stiffness: float | None = None
+    """Force side: stiffness k of the virtual coupling, N/m."""
+    damping: float | None = None
+    """Force side: damping b of the virtual coupling, N s/m."""
+    proxy_mass: float | None = None
+    """Force side: mass of the proxy, kg."""
+    contact_stiffness: float | None = None
+    """Force side: estimate of what the proxy presses on, N/m."""
+    effective_mass: float | None = None
+    """Motion side: smallest effective mass at the bond, kg; known once the participant is configured."""
+
+
+def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
+    """Return the three ports of a bond side: position or pose, velocity or twist, force or wrench.
+
+    They are named `<bond>/pose`, `<bond>/twist`, `<bond>/wrench` for a frame and
+    `<bond>/position`, `<bond>/velocity`, `<bond>/force` for generalised coordinates.
+    """
+    moves, takes = ("output", "input") if bond.side == "motion" else ("input", "output")
+    if bond.dof == 6:
+        rows = (
+            ("pose", "geometry_msgs/msg/PoseStamped", ""),
+            ("twist", "geometry_msgs/msg/TwistStamped", ""),
+            ("wrench", "geometry_msgs/msg/WrenchStamped", ""),
+        )
+        size = 1
+    else:
+        rows = tuple((name, "std_msgs/msg/Float64MultiArray", unit) for name, unit in (("position", "m"), ("velocity", "m/s"), ("force", "N")))
+        size = bond.dof
+    position, velocity, force = (
+        Port(name=f"{bond.name}/{name}", causality=causality, type=type_, size=size, unit=unit, frame=bond.frame)
+        for (name, type_, unit), causality in zip(rows, (moves, moves, takes), strict=True)
+    )
+    return position, velocity, force

@@ -1,0 +1,226 @@
+"""The standard ROS 2 message types that Trocar uses, field for field as ROS 2 Jazzy has them.
+
+`tests/schemas` holds each one against the type store of `rosbags`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from schemas.message import Bool, Float32Array, Float64, Float64Array, Int32, Int32Array, Message, String, StringArray, UInt32
+
+__all__ = [
+    "Accel",
+    "AccelStamped",
+    "BoolMessage",
+    "Float64Message",
+    "Float64MultiArray",
+    "Header",
+    "JointState",
+    "Joy",
+    "MultiArrayDimension",
+    "MultiArrayLayout",
+    "Point",
+    "Pose",
+    "PoseStamped",
+    "Quaternion",
+    "StringMessage",
+    "Time",
+    "Twist",
+    "TwistStamped",
+    "Vector3",
+    "Wrench",
+    "WrenchStamped",
+]
+
+
+def _empty() -> NDArray[np.float64]:
+    return np.zeros(0)
+
+
+class Time(Message):
+    """Seconds and nanoseconds since the start of the clock that the port declares."""
+
+    ros_type: ClassVar[str] = "builtin_interfaces/msg/Time"
+    sec: Int32 = 0
+    nanosec: Annotated[UInt32, Field(lt=10**9)] = 0
+
+    @classmethod
+    def from_ns(cls, time_ns: int) -> Time:
+        """Split integer nanoseconds."""
+        return cls(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
+
+    @property
+    def ns(self) -> int:
+        """The time in integer nanoseconds."""
+        return self.sec * 10**9 + self.nanosec
+
+
+class Header(Message):
+    """Stamp and frame of a message."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/Header"
+    stamp: Time = Time()
+    frame_id: String = ""
+
+
+class BoolMessage(Message):
+    """A truth value."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/Bool"
+    data: Bool = False
+
+
+class Float64Message(Message):
+    """A number."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/Float64"
+    data: Float64 = 0.0
+
+
+class StringMessage(Message):
+    """A text."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/String"
+    data: String = ""
+
+
+class MultiArrayDimension(Message):
+    """One dimension of a multi-array."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/MultiArrayDimension"
+    label: String = ""
+    size: UInt32 = 0
+    stride: UInt32 = 0
+
+
+class MultiArrayLayout(Message):
+    """The dimensions of a multi-array, outermost first."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/MultiArrayLayout"
+    dim: list[MultiArrayDimension] = []
+    data_offset: UInt32 = 0
+
+
+class Float64MultiArray(Message):
+    """Numbers with a layout."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/Float64MultiArray"
+    layout: MultiArrayLayout = MultiArrayLayout()
+    data: Float64Array = Field(default_factory=_empty)
+
+
+class Vector3(Message):
+    """A vector."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Vector3"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+
+
+class Point(Message):
+    """A position in metres."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Point"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+
+
+class Quaternion(Message):
+    """A unit quaternion (x, y, z, w)."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Quaternion"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+    w: Float64 = 1.0
+
+
+class Pose(Message):
+    """Position in metres and orientation."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Pose"
+    position: Point = Point()
+    orientation: Quaternion = Quaternion()
+
+
+class PoseStamped(Message):
+    """A pose in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/PoseStamped"
+    header: Header = Header()
+    pose: Pose = Pose()
+
+
+class Twist(Message):
+    """Velocity in m/s and angular velocity in rad/s."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Twist"
+    linear: Vector3 = Vector3()
+    angular: Vector3 = Vector3()
+
+
+class TwistStamped(Message):
+    """A twist in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/TwistStamped"
+    header: Header = Header()
+    twist: Twist = Twist()
+
+
+class Accel(Message):
+    """Acceleration in m/s^2 and angular acceleration in rad/s^2."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Accel"
+    linear: Vector3 = Vector3()
+    angular: Vector3 = Vector3()
+
+
+class AccelStamped(Message):
+    """An acceleration in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/AccelStamped"
+    header: Header = Header()
+    accel: Accel = Accel()
+
+
+class Wrench(Message):
+    """Force in N and torque in N m."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Wrench"
+    force: Vector3 = Vector3()
+    torque: Vector3 = Vector3()
+
+
+class WrenchStamped(Message):
+    """A wrench in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/WrenchStamped"
+    header: Header = Header()
+    wrench: Wrench = Wrench()
+
+
+class JointState(Message):
+    """Joint positions (rad, m), velocities (rad/s, m/s) and efforts (N m, N); an empty array is not stated."""
+
+    ros_type: ClassVar[str] = "sensor_msgs/msg/JointState"
+    header: Header = Header()
+    name: StringArray = []
+    position: Float64Array = Field(default_factory=_empty)
+    velocity: Float64Array = Field(default_factory=_empty)
+    effort: Float64Array = Field(default_factory=_empty)
+
+
+class Joy(Message):
+    """Axes and buttons of a hand-held device."""
+
+    ros_type: ClassVar[str] = "sensor_msgs/msg/Joy"
+    header: Header = Header()
+    axes: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
+    buttons: Int32Array = Field(default_factory=lambda: np.zeros(0, np.int32))

@@ -1,0 +1,131 @@
+"""The scenario: the file that describes a session. All quantities are SI after validation, times integer nanoseconds."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from schemas.keys import valid_name
+from schemas.quantity import Duration
+
+__all__ = ["Bond", "Connection", "Endpoint", "Measure", "ParticipantSpec", "Scenario"]
+
+Algorithm = Literal["impulse", "impulse-linearised", "gauss-seidel", "jacobi"]
+
+
+def _name(value: str) -> str:
+    if not valid_name(value):
+        raise ValueError(f"'{value}' is no name: a letter, then letters, digits and underscores")
+    return value
+
+
+Name = Annotated[str, AfterValidator(_name)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Endpoint(_Part):
+    """`participant.port`."""
+
+    participant: str
+    port: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _parse(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            participant, dot, port = value.strip().partition(".")
+            if not (dot and participant and port):
+                raise ValueError(f"'{value}' is no 'participant.port'")
+            return {"participant": participant, "port": port}
+        return value
+
+    def __str__(self) -> str:
+        return f"{self.participant}.{self.port}"
+
+
+class ParticipantSpec(_Part):
+    """A participant: its kind, where it runs, how often it steps, and the parameters of its kind."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    kind: str = Field(description="name of an installed engine, controller or device")
+    host: Name = Field(default="hub", description="'hub', the name of a process to start here, or 'remote'")
+    period: Duration | None = Field(default=None, description="a multiple of the step; default: the step")
+    RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period")
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """The parameters of the kind, unvalidated."""
+        return dict(self.model_extra or {})
+
+
+class Connection(_Part):
+    """An output port feeds an input port: `source -> target`."""
+
+    source: Endpoint
+    target: Endpoint
+    extrapolation: Literal["hold", "linear"] = "hold"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _parse(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            source, arrow, target = value.partition("->")
+            if not arrow:
+                raise ValueError(f"'{value}' is no 'participant.port -> participant.port'")
+            return {"source": source.strip(), "target": target.strip()}
+        return value
+
+
+class Bond(_Part):
+    """A power bond: pose and twist one way, wrench the other."""
+
+    motion: Endpoint
+    force: Endpoint
+    algorithm: Algorithm = "impulse"
+    prediction: Literal["velocity", "slope"] = Field(
+        default="velocity", description="for impulse: held velocity, or with its slope (smooth linear couplings only)"
+    )
+    order: list[str] | None = Field(default=None, description="for gauss-seidel: the two participants in the order they step")
+    check: Literal["refuse", "warn"] = Field(default="refuse", description="what to do if the stable-step rule is broken")
+
+    @property
+    def name(self) -> str:
+        """Name of the bond in books and messages: `motion participant/bond`."""
+        return f"{self.motion.participant}/{self.motion.port}"
+
+
+class Measure(_Part):
+    """A number for the summary, from the values of one output port: `participant.port` or `participant.port.field`."""
+
+    kind: Literal["peak-norm", "peak", "mean", "final"]
+    of: Endpoint
+    unit: str = ""
+    live: bool = Field(default=False, description="show the present value in the progress line")
+
+
+def _without_none(value: Any) -> Any:
+    return {} if value is None else value
+
+
+class Scenario(_Part):
+    """A whole session."""
+
+    name: Name
+    description: str = ""
+    step: Duration = Field(gt=0, description="communication step H")
+    duration: Duration | None = Field(default=None, gt=0, description="simulated time; without it the session runs until it is stopped")
+    pace: Literal["fast", "realtime"] = "fast"
+    window: int = Field(default=1, ge=1, le=1000, description="most steps that one grant may cover")
+    algorithm: Literal["gauss-seidel", "jacobi"] = Field(default="gauss-seidel", description="for connections that belong to no bond")
+    order: list[str] | None = Field(default=None, description="the order in which participants step; needed where connections form a cycle")
+    answer_limit: Duration = Field(default=10**10, gt=0, description="wall time after which a silent participant ends the session")
+    join_limit: Duration = Field(default=60 * 10**9, gt=0, description="wall time to wait for all participants to join")
+    participants: dict[Name, ParticipantSpec] = Field(min_length=1)
+    connections: Annotated[list[Connection], BeforeValidator(lambda v: [] if v is None else v)] = []
+    bonds: Annotated[list[Bond], BeforeValidator(lambda v: [] if v is None else v)] = []
+    measure: Annotated[dict[Name, Measure], BeforeValidator(_without_none)] = {}

@@ -1,0 +1,104 @@
+"""Trocar's own messages (ROS 2 package `trocar_msgs`), only where no standard type exists."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int64, Message, String, UInt32, UInt32Array, UInt64, UInt64Array
+from schemas.ros import Header
+
+__all__ = ["Ack", "CouplingEnergy", "Grant", "InletSample", "ParticipantStatus", "SessionStatus", "SoftBodyState"]
+
+
+class InletSample(Message):
+    """One device sample as it enters simulated time: the CDR bytes that arrived, or only a change of staleness."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/InletSample"
+    participant: String
+    port: String
+    stale: Bool = False
+    payload: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """CDR of the port's type; empty when only `stale` changed."""
+    age_ns: Int64 = 0
+    """Wall time between the arrival of the sample and the communication point; for information only."""
+
+
+class Grant(Message):
+    """The hub's permission to advance from step `step` at `start_ns` to `horizon_ns`, with all that enters there."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/Grant"
+    run: UInt64
+    epoch: UInt32
+    step: Int64
+    start_ns: Int64
+    horizon_ns: Int64
+    inlets: list[InletSample] = []
+
+
+class Ack(Message):
+    """A participant has done the steps of one grant. The arrays hold one entry per step it took in it."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/Ack"
+    run: UInt64
+    epoch: UInt32
+    step: Int64
+    """First step of the grant that is acknowledged; -1 says that the participant is configured and ready."""
+    state_hash: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
+    compute_ns: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
+    work_j: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Per step, per bond in declared order: work since the start (J), done by a motion side, received by a force side."""
+    error: String = ""
+
+
+class CouplingEnergy(Message):
+    """The energy book of one bond: what the motion side gave, what the force side got, and the difference, all in J since the start."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/CouplingEnergy"
+    header: Header
+    bond: String
+    motion_work_j: Float64
+    force_work_j: Float64
+    residual_j: Float64
+    """`force_work_j - motion_work_j`: energy that the coupling created (positive) or lost."""
+
+
+class SoftBodyState(Message):
+    """The nodes of a soft body: x, y, z in metres, one after the other, in `header.frame_id`."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/SoftBodyState"
+    header: Header
+    body: String
+    nodes_m: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
+    triangles: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """Surface triangles as node indices, three after the other; sent with the first state, empty afterwards."""
+
+
+class ParticipantStatus(Message):
+    """Where one participant lives and how far it is."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ParticipantStatus"
+    name: String
+    role: String
+    host: String
+    pid: UInt32
+    step: Int64
+
+
+class SessionStatus(Message):
+    """What a session is doing now."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/SessionStatus"
+    session: String
+    run: UInt64
+    state: String
+    """One of `starting`, `running`, `paused`, `done`, `failed`."""
+    step: Int64
+    sim_time_ns: Int64
+    real_time_factor: Float64
+    late_steps: UInt64
+    dropped_messages: UInt64
+    detail: String = ""
+    participants: list[ParticipantStatus] = []
