@@ -32,26 +32,27 @@ class ForceSide:
         self._x = np.zeros(self._linear)
         self._v = self._v_before = np.zeros(self._size)
         self._a = np.zeros(self._size)
+        self._spring = np.zeros(self._linear)
+        self._stiffness = bond.stiffness or 0.0
         self._duration = 0.0
         self._started = False
 
-    def begin(self, inputs: Inputs, h: float, spring_force: Vector | None = None, stiffness: float = 0.0) -> None:
+    def begin(self, inputs: Inputs, h: float) -> None:
         """Take the motion at the start of a step of `h` seconds.
 
-        `spring_force`, shape (3,) or (dof,), N: elastic force at the end of the last step, on the predicted motion. The
-        motion that has come out jumps by d from the predicted one; the jump does work spring_force d + k d^2 / 2 on the spring.
+        Where the motion that came out differs by d from the predicted one, the spring is displaced by d at once: it takes
+        the work F d + k d^2 / 2, with F its force at the end of the last step.
         """
         x, v = inputs[self._position][: self._linear], inputs[self._velocity]
-        if self._started and spring_force is not None:
+        if self._started:
             jump = x - self.position(self._duration)
-            self._work[0] += float(spring_force[: self._linear] @ jump + 0.5 * stiffness * (jump @ jump))
-        if self._plan.prediction == "slope" and self._started:
-            self._a = (v - self._v_before) / h
+            self._work[0] += float(self._spring @ jump + 0.5 * self._stiffness * (jump @ jump))
+            if self._plan.prediction == "slope":
+                self._a = (v - self._v_before) / h
         self._x, self._v, self._v_before = x.copy(), v.copy(), v.copy()
         self._duration = h
         self._started = True
         self._impulse = np.zeros(self._size)
-        self._last = np.zeros(self._size)
         self._summed = 0.0
 
     def position(self, tau: float) -> Vector:
@@ -64,28 +65,33 @@ class ForceSide:
         """Return the predicted twist (m/s, rad/s), shape (dof,), `tau` seconds into the step."""
         return self._v + tau * self._a
 
-    def add(self, force: Vector, tau: float, dt: float) -> None:
-        """Count `force` (N, N m; shape (dof,)), what the other side pushes with, over a sub-step of `dt` seconds around `tau`."""
+    def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
+        """Count the forces (N, N m; shape (dof,)) with which the other side pushes, in a sub-step of `dt` seconds around `tau`."""
+        force = spring + damper
         self._impulse += dt * force
         self._summed += dt
         self._last = force
-        if self._plan.prediction != "hold":
-            self._work[0] += dt * float(force @ self.velocity(tau))
+        moved = damper if self._plan.prediction == "hold" else force
+        self._work[0] += dt * float(moved @ self.velocity(tau))
 
-    def result(self) -> dict[str, Vector]:
-        """Return the outputs of the bond: the reaction on the other side (minus the mean or the last force), and the work."""
+    def result(self, spring: Vector) -> dict[str, Vector]:
+        """Return the outputs of the bond: the reaction on the other side (minus the mean or the last force), and the work.
+
+        `spring`: elastic force (N, N m; shape (dof,)) at the end of the step, on the predicted motion.
+        """
+        self._spring = spring[: self._linear].copy()
         force = self._impulse / self._summed if self._plan.mean else self._last
         return {self.force_port: -force, self.work_port: self._work.copy()}
 
     @property
     def state(self) -> Vector:
         """All that this side remembers between steps, for hash, save and restore."""
-        return np.concatenate([self._work, self._x, self._v, self._v_before, self._a, [self._duration, float(self._started)]])
+        return np.concatenate([self._work, self._x, self._v, self._v_before, self._a, self._spring, [self._duration, float(self._started)]])
 
     @state.setter
     def state(self, state: Vector) -> None:
-        sizes = np.cumsum([1, self._linear, self._size, self._size, self._size, 1])
-        self._work, self._x, self._v, self._v_before, self._a, duration, started = np.split(state.copy(), sizes)
+        sizes = np.cumsum([1, self._linear, self._size, self._size, self._size, self._linear, 1])
+        self._work, self._x, self._v, self._v_before, self._a, self._spring, duration, started = np.split(state.copy(), sizes)
         self._duration, self._started = float(duration[0]), bool(started[0])
 
 

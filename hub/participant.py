@@ -148,9 +148,9 @@ class Device(_Participant):
         """Take the newest value of an input port. A device without inputs is never written to."""
 
 
-def state_hash(*parts: bytes | memoryview | Vector) -> int:
+def state_hash(*parts: bytes | Vector) -> int:
     """Return a 64-bit hash of `parts`, the same on every machine that has the same bits."""
     digest = hashlib.blake2b(digest_size=8)
     for part in parts:
-        digest.update(part)
+        digest.update(memoryview(part))
     return int.from_bytes(digest.digest(), "little")
