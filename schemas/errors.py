@@ -37,6 +37,11 @@ class TrocarError(Exception):
 class ScenarioError(TrocarError):
     """The scenario cannot be run as written; the message says where and what was allowed."""
 
+    def __init__(self, message: str, *, path: tuple[str | int, ...] = ()) -> None:
+        """Take the message, and the path of the offending value inside the scenario: `("participants", "robot", "kind")`."""
+        super().__init__(message)
+        self.path = path
+
 
 class MissingExtraError(ScenarioError):
     """A part of the scenario needs a package that is not installed here."""
