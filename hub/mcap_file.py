@@ -24,7 +24,9 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
-__all__ = ["MESSAGE_HEADER_BYTES", "ChunkData", "McapFile", "chunk_data", "write_rosbag2_metadata"]
+from schemas.errors import RecordingError
+
+__all__ = ["MESSAGE_HEADER_BYTES", "ChunkData", "McapFile", "chunk_data", "create_bag", "write_rosbag2_metadata"]
 
 _MESSAGE = np.dtype([("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
@@ -165,6 +167,17 @@ def _bytes_of(*records: McapRecord) -> bytes:
     return builder.end()
 
 
+def create_bag(directory: Path) -> McapFile:
+    """Create `directory` and in it the file of a one-file bag. Raises RecordingError if it holds something or cannot be written."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        if any(directory.iterdir()):
+            raise RecordingError(f"'{directory}' is not empty, and a recording overwrites nothing: name a new directory, or remove this one")
+        return McapFile(directory / f"{directory.resolve().name}_0.mcap")
+    except OSError as error:
+        raise RecordingError(f"cannot record to '{directory}': {error.strerror}; name a directory that can be written") from error
+
+
 def write_rosbag2_metadata(file: McapFile) -> None:
     """Write `metadata.yaml` beside `file`, which makes its directory a rosbag2 bag."""
     statistics = file.statistics
@@ -174,7 +187,7 @@ def write_rosbag2_metadata(file: McapFile) -> None:
         "starting_time": {"nanoseconds_since_epoch": statistics.message_start_time},
         "message_count": statistics.message_count,
     }
-    topics = [
+    topics: list[dict[str, Any]] = [
         {
             "topic_metadata": {
                 "name": channel.topic,
@@ -187,7 +200,7 @@ def write_rosbag2_metadata(file: McapFile) -> None:
         }
         for channel in file.channels
     ]
-    information = {
+    information: dict[str, Any] = {
         "version": 9,
         "storage_identifier": "mcap",
         "relative_file_paths": [file.path.name],
@@ -199,7 +212,7 @@ def write_rosbag2_metadata(file: McapFile) -> None:
         "custom_data": None,
         "ros_distro": "jazzy",
     }
-    yaml = YAML(typ="safe")
+    yaml: Any = YAML(typ="safe")
     yaml.default_flow_style = False
     with (file.path.parent / "metadata.yaml").open("w", encoding="utf-8") as stream:
         yaml.dump({"rosbag2_bagfile_information": information}, stream)

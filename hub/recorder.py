@@ -17,11 +17,11 @@ from typing import Self
 
 from mcap.records import Channel, Schema
 
-from hub.mcap_file import MESSAGE_HEADER_BYTES, McapFile, chunk_data, write_rosbag2_metadata
+from hub.mcap_file import MESSAGE_HEADER_BYTES, chunk_data, create_bag, write_rosbag2_metadata
 from schemas.codec import rihs01, ros2msg_definition, typestore
 from schemas.errors import RecordingError, did_you_mean
 
-__all__ = ["Recorder", "RecorderSummary", "create_bag"]
+__all__ = ["Recorder", "RecorderSummary"]
 
 CHUNK_BYTES = 64 * 2**10
 """A killed process loses at most this much, and laying out this much keeps the interpreter from the step loop for 0.2 ms
@@ -55,17 +55,6 @@ class RecorderSummary:
     """Size of the file."""
     error: str | None
     """Why recording stopped, if it did."""
-
-
-def create_bag(directory: Path) -> McapFile:
-    """Create `directory` and in it the file of a one-file bag. Raises RecordingError if it holds something or cannot be written."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        if any(directory.iterdir()):
-            raise RecordingError(f"'{directory}' is not empty, and a recording overwrites nothing: name a new directory, or remove this one")
-        return McapFile(directory / f"{directory.resolve().name}_0.mcap")
-    except OSError as error:
-        raise RecordingError(f"cannot record to '{directory}': {error.strerror}; name a directory that can be written") from error
 
 
 class Recorder:

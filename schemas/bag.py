@@ -1,0 +1,150 @@
+"""Reads MCAP recordings of ROS 2 messages: our own, and those of ROS tools. Nothing in them is trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.reader import SeekingReader
+from mcap.records import Chunk, Message
+from mcap.stream_reader import breakup_chunk
+from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC
+
+from schemas import ros
+from schemas.codec import decode, message_type
+from schemas.errors import RecordingError, did_you_mean
+from schemas.ports import Port
+from schemas.vectors import has_vector
+
+__all__ = ["MAX_RECORD_BYTES", "Bag", "BagMessage", "bag_file", "output_port", "reading"]
+
+MAX_RECORD_BYTES = 64 * 2**20
+"""A longer MCAP record is refused unread: chunks have 64 KiB, or one image."""
+
+
+class BagMessage(NamedTuple):
+    """One recorded message."""
+
+    topic: str
+    type: str
+    time_ns: int
+    payload: bytes
+
+
+def bag_file(path: Path) -> Path:
+    """Return the MCAP file that `path`, itself one or a rosbag2 directory, stands for. Raises RecordingError if there is not exactly one."""
+    if path.is_dir():
+        files = sorted(path.glob("*.mcap"))
+        if len(files) != 1:
+            raise RecordingError(f"'{path}' holds {len(files)} .mcap files; name a recording's directory, which holds one, or a file")
+        return files[0]
+    if not path.is_file():
+        raise RecordingError(f"no recording at '{path}'; name a recording's directory or an .mcap file")
+    return path
+
+
+@contextmanager
+def reading(file: Path) -> Generator[None]:
+    """Turn whatever damaged bytes make the parsers raise into a RecordingError that names `file`."""
+    try:
+        yield
+    except (RecordingError, GeneratorExit):
+        raise
+    except OSError as error:
+        raise RecordingError(f"cannot read '{file}': {error.strerror}") from error
+    except Exception as error:  # mcap lets struct.error, KeyError, ValueError, zstd's and lz4's errors through
+        raise RecordingError(f"'{file}' is damaged ({type(error).__name__}: {error}); `trocar recover {file}` saves what is whole") from error
+
+
+class Bag:
+    """A finished recording: its topics, messages and attachments."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a rosbag2 directory or an MCAP file. Raises RecordingError if it is none, cut short, or not in CDR."""
+        self.file = bag_file(path)
+        with reading(self.file):
+            self._summary = self._read_summary()
+        self.topics: dict[str, str] = {}
+        """Type of each topic."""
+        for channel in self._summary.channels.values():
+            if channel.message_encoding != "cdr":
+                raise RecordingError(f"'{self.file}': topic '{channel.topic}' is encoded as '{channel.message_encoding}'; only 'cdr' (ROS 2) can be read")
+            self.topics[channel.topic] = self._summary.schemas[channel.schema_id].name
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of messages of each topic."""
+        statistics = self._summary.statistics
+        counts = {} if statistics is None else statistics.channel_message_counts
+        return {channel.topic: counts.get(channel.id, 0) for channel in self._summary.channels.values()}
+
+    @cached_property
+    def attachments(self) -> dict[str, bytes]:
+        """The attachments by name."""
+        with reading(self.file), self.file.open("rb") as stream:
+            return {a.name: a.data for a in SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).iter_attachments()}
+
+    def messages(self, *topics: str) -> Iterator[BagMessage]:
+        """Yield the messages of `topics`, or all, in the order in which they were written. Raises RecordingError for a topic that is not there."""
+        for topic in topics:
+            if topic not in self.topics:
+                raise RecordingError(f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}")
+        with reading(self.file):
+            wanted = {c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics}
+        for chunk in self._chunks(set(wanted)):
+            with reading(self.file):
+                records = breakup_chunk(chunk, validate_crc=True)
+            for record in records:
+                if isinstance(record, Message) and (topic := wanted.get(record.channel_id)) is not None:
+                    yield BagMessage(topic, self.topics[topic], record.log_time, record.data)
+
+    def _read_summary(self) -> Summary:
+        with self.file.open("rb") as stream:
+            size = stream.seek(0, 2)
+            stream.seek(0)
+            if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+                raise RecordingError(f"'{self.file}' is no MCAP file")
+            stream.seek(max(0, size - len(MCAP0_MAGIC)))
+            if size < 2 * len(MCAP0_MAGIC) or stream.read() != MCAP0_MAGIC:
+                raise RecordingError(f"'{self.file}' was cut short; `trocar recover {self.file}` saves what is whole")
+            stream.seek(0)
+            summary = SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).get_summary()
+        if summary is None or (not summary.chunk_indexes and summary.statistics is not None and summary.statistics.message_count):
+            raise RecordingError(f"'{self.file}' has no chunk index; `trocar recover {self.file}` writes one")
+        return summary
+
+    def _chunks(self, wanted: set[int]) -> Iterator[Chunk]:
+        """Yield the chunks that hold a message of the channels `wanted`, in file order."""
+        indexes = sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
+        with self.file.open("rb") as stream:
+            for index in indexes:
+                if index.message_index_offsets and wanted.isdisjoint(index.message_index_offsets):
+                    continue
+                with reading(self.file):
+                    stream.seek(index.chunk_start_offset + 9)  # behind opcode and length of the record
+                    chunk = Chunk.read(ReadDataStream(stream))
+                yield chunk
+
+
+def output_port(name: str, type_name: str, payload: bytes) -> Port:
+    """Return the output port that would write messages such as `payload`, for types of which `schemas` has a model.
+
+    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all others events.
+    """
+    if not has_vector(type_name):
+        return Port(name=name, causality="output", type=type_name, variability="event")
+    message = decode(message_type(type_name), payload)
+    known: dict[str, Any] = {}
+    if isinstance(message, ros.JointState):
+        sizes = {field: getattr(message, field).size for field in ("position", "velocity", "effort")}
+        known = {"names": tuple(message.name), "fields": tuple(field for field in sizes if sizes[field]) or ("position",), "size": max(1, *sizes.values())}
+    elif isinstance(message, ros.Float64MultiArray):
+        known = {"size": max(1, message.data.size)}
+    header = getattr(message, "header", None)
+    frame = header.frame_id if isinstance(header, ros.Header) else ""
+    return Port(name=name, causality="output", type=type_name, frame=frame, **known)
