@@ -32,6 +32,8 @@ def _message(detail: ErrorDetails, model: type[BaseModel]) -> str:
             return f"'{detail['input']}' is not allowed.{did_you_mean(str(detail['input']), (word.strip(chr(39)) for word in expected.split(', ')))}"
         case "missing":
             return "is required but not given"
+        case "model_type" | "dict_type":
+            return f"expected a mapping, got {detail['input']!r}"
         case _:
             message, shown = detail["msg"].removeprefix("Value error, "), repr(detail["input"])
             return message if shown in message or len(shown) > 60 else f"{message} (got {shown})"

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from hub.participant import Device, Stepped
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 
-__all__ = ["GROUPS", "Kind", "Participant", "broken", "kinds", "load", "missing_packages", "require_extra"]
+__all__ = ["GROUPS", "Kind", "Participant", "broken", "installed_packages", "kinds", "load", "missing_packages", "require_extra"]
 
 Participant = type[Stepped] | type[Device]
 
@@ -82,7 +82,7 @@ def require_extra(name: str) -> None:
     """Raise MissingExtraError if kind `name` belongs to an extra of which a package is not installed."""
     kind = kinds()[name]
     for package in missing_packages(kind.entry.dist, name):
-        raise MissingExtraError(f"{kind.role} '{name}'", name, package)
+        raise MissingExtraError(f"{kind.role} '{name}'", name, package, kind.distribution)
 
 
 def missing_packages(dist: Distribution | None, extra: str) -> list[str]:
@@ -90,11 +90,21 @@ def missing_packages(dist: Distribution | None, extra: str) -> list[str]:
     return [f"{r.name}{r.specifier}" for r in _requirements(dist, extra) if not _installed(r)]
 
 
+def installed_packages(dist: Distribution, extra: str) -> list[str]:
+    """Return the packages of `extra` of a distribution that are installed here, with their versions."""
+    return [f"{r.name} {distribution(r.name).version}" for r in _requirements(dist, extra) if _installed(r)]
+
+
 def _requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement]:
     for text in (dist and dist.requires) or ():
         requirement = Requirement(text)
         marker = requirement.marker
-        if marker and marker.evaluate({"extra": extra}) and not marker.evaluate({"extra": ""}):
+        if not marker or marker.evaluate({"extra": ""}) or not marker.evaluate({"extra": extra}):
+            continue
+        if dist and requirement.name == dist.name:  # an extra that is the sum of others
+            for part in sorted(requirement.extras):
+                yield from _requirements(dist, part)
+        else:
             yield requirement
 
 

@@ -95,13 +95,18 @@ def _yaml() -> Any:
 
 def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tuple[_Mark, _Mark]]]:
     """Yield where each value below a YAML node stands."""
-    yield path, ((key.start_mark.line + 1, key.start_mark.column + 1), (value.start_mark.line + 1, value.start_mark.column + 1))
+    empty = value.start_mark.index == value.end_mark.index  # `key:` without a value: the parser is already on the next line
+    yield path, (_mark(key), _mark(key if empty else value))
     if value.id == "mapping":
         for name, child in value.value:
             yield from _marks(name, child, (*path, name.value))
     elif value.id == "sequence":
         for index, child in enumerate(value.value):
             yield from _marks(child, child, (*path, index))
+
+
+def _mark(node: Any) -> _Mark:
+    return node.start_mark.line + 1, node.start_mark.column + 1
 
 
 def _no_such_part(parent: Any, part: str | int) -> str:

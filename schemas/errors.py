@@ -46,9 +46,9 @@ class ScenarioError(TrocarError):
 class MissingExtraError(ScenarioError):
     """A part of the scenario needs a package that is not installed here."""
 
-    def __init__(self, part: str, extra: str, package: str) -> None:
+    def __init__(self, part: str, extra: str, package: str, distribution: str = "trocar") -> None:
         """Name the part that was asked for and the pip line that brings what it needs."""
-        super().__init__(f"{part} needs the package '{package}', which is not installed. Install it with: pip install 'trocar[{extra}]'")
+        super().__init__(f"{part} needs the package '{package}', which is not installed. Install it with: pip install '{distribution}[{extra}]'")
         self.extra = extra
 
 

@@ -1,0 +1,41 @@
+# The whole set-up lives in .venv; it is renewed when pyproject.toml changes.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+RECORDING := recordings/palpation-$(shell date +%Y%m%d-%H%M%S)
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+
+.PHONY: demo test check format clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
+	trocar run palpation --record $(RECORDING)
+	trocar report $(RECORDING) -o $(RECORDING).html
+
+test: check ## everything that must hold before a change is merged
+	pytest
+
+check: $(VENV)/.dev
+	ruff check .
+	ruff format --check .
+	pyright
+	lint-imports
+
+format: $(VENV)/.dev
+	ruff check --fix .
+	ruff format .
+
+clean:
+	rm -rf $(VENV) build dist
+
+# Debian splits ensurepip into python3-venv; where that is missing, pip (which is there) fills the environment.
+$(VENV)/bin/pip:
+	$(PYTHON) -m venv --clear $(VENV) 2>/dev/null || \
+	{ $(PYTHON) -m venv --clear --without-pip $(VENV) && $(PYTHON) -m pip --python $(VENV)/bin/python install --quiet pip; }
+
+$(VENV)/.all: pyproject.toml | $(VENV)/bin/pip
+	$(VENV)/bin/python -m pip install --quiet --editable '.[all]'
+	touch $@
+
+$(VENV)/.dev: pyproject.toml | $(VENV)/bin/pip
+	$(VENV)/bin/python -m pip install --quiet --editable '.[dev]'
+	touch $@

@@ -1,0 +1,100 @@
+"""What works on this machine, and for what does not, the line that mends it."""
+
+from __future__ import annotations
+
+import ctypes.util
+import json
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import distribution
+from importlib.util import find_spec
+
+from hub import registry
+from hub.endpoint import free_endpoint
+from hub.wire import open_session
+from schemas.errors import TrocarError
+
+__all__ = ["Finding", "as_json", "examine"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at. `remedy` is the line that mends it, where it does not work."""
+
+    area: str
+    name: str
+    works: bool
+    detail: str
+    remedy: str = ""
+    needed: bool = False
+    """Nothing runs without it."""
+
+
+_LIBRARIES = (
+    ("OpenGL", "EGL", ("EGL",), "rendering without a screen on a GPU or Mesa", "apt-get install libegl1"),
+    ("OpenGL", "OSMesa", ("OSMesa",), "rendering without a screen on the CPU", "apt-get install libosmesa6"),
+    ("device", "OpenHaptics", ("HD",), "haptic styluses of 3D Systems", "install the OpenHaptics SDK and driver of 3D Systems"),
+    ("device", "LibOVR", ("LibOVRRT64_1", "OVRRT64_1"), "Oculus headsets", "install the Oculus runtime (Windows)"),
+    ("device", "OpenXR", ("openxr_loader",), "head-mounted displays", "apt-get install libopenxr-loader1"),
+)
+
+_ROS = (
+    ("ROS 2", "rclpy", "source the setup.bash of a ROS 2 installation before starting trocar"),
+    ("ROS 1", "rospy", "apt-get install python3-rospy, and let this environment see /usr/lib/python3/dist-packages"),
+)
+
+
+def examine() -> list[Finding]:
+    """Look at Python, Zenoh, the extras, the kinds of participants, OpenGL, device libraries and ROS. Starts no device."""
+    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _extras, _kinds, _libraries, _ros)
+    return [finding for section in sections for finding in section()]
+
+
+def _python() -> Iterator[Finding]:
+    version = platform.python_version()
+    yield Finding("base", "Python", sys.version_info >= (3, 11), f"{version} on {platform.platform()}", "install Python 3.11 or newer", needed=True)
+
+
+def _zenoh() -> Iterator[Finding]:
+    """Open a router on loopback and join it, as a session does."""
+    try:
+        endpoint = free_endpoint([0])
+        with open_session("router", listen=[endpoint]), open_session("client", connect=[endpoint]):
+            pass
+    except TrocarError as error:
+        yield Finding("base", "Zenoh", False, f"no session over loopback: {error}", "allow TCP connections to 127.0.0.1", needed=True)
+    else:
+        yield Finding("base", "Zenoh", True, f"eclipse-zenoh {distribution('eclipse-zenoh').version}, session over loopback", needed=True)
+
+
+def _extras() -> Iterator[Finding]:
+    trocar = distribution("trocar")
+    for extra in sorted(trocar.metadata.get_all("Provides-Extra") or []):
+        missing = registry.missing_packages(trocar, extra)
+        detail = f"not installed: {', '.join(missing)}" if missing else ", ".join(registry.installed_packages(trocar, extra))
+        yield Finding("extra", extra, not missing, detail, f"pip install 'trocar[{extra}]'")
+
+
+def _kinds() -> Iterator[Finding]:
+    broken = registry.broken()
+    for name, kind in sorted(registry.kinds().items()):
+        yield Finding(kind.role, name, name not in broken, broken.get(name, f"from {kind.distribution}"), f"pip install --force-reinstall {kind.distribution}")
+
+
+def _libraries() -> Iterator[Finding]:
+    for area, name, stems, use, remedy in _LIBRARIES:
+        found = next((path for stem in stems if (path := ctypes.util.find_library(stem))), None)
+        yield Finding(area, name, found is not None, f"{found or 'not found'}: {use}", remedy)
+
+
+def _ros() -> Iterator[Finding]:
+    for name, module, remedy in _ROS:
+        found = find_spec(module)
+        yield Finding("ROS", name, found is not None, f"{module} {'can be imported' if found else 'cannot be imported'}", remedy)
+
+
+def as_json(findings: list[Finding]) -> str:
+    """Return the findings as JSON: an object with `works` (all that is needed does) and the list `findings`."""
+    return json.dumps({"works": all(f.works for f in findings if f.needed), "findings": [vars(f) for f in findings]}, indent=2)

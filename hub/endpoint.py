@@ -1,0 +1,42 @@
+"""Where a hub listens on this machine, and where to look for hubs."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterable
+
+from schemas.errors import ConnectError
+
+__all__ = ["PORTS", "free_endpoint", "listening_endpoints"]
+
+PORTS = range(7447, 7467)
+"""Zenoh's own port, and the next ones for further hubs on the same machine."""
+
+
+def free_endpoint(ports: Iterable[int] = PORTS) -> str:
+    """Return the endpoint of the first loopback port that is free. Port 0 is any free one. Raises ConnectError if none is."""
+    for port in ports:
+        with socket.socket() as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return _endpoint(probe.getsockname()[1])
+    raise ConnectError(
+        f"no free port among {PORTS.start} to {PORTS.stop - 1} on 127.0.0.1: end a session that is not needed, or give --listen tcp/127.0.0.1:PORT"
+    )
+
+
+def listening_endpoints() -> list[str]:
+    """Return the endpoints of the ports on loopback where somebody listens."""
+    found: list[str] = []
+    for port in PORTS:
+        with socket.socket() as probe:
+            probe.settimeout(0.2)
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                found.append(_endpoint(port))
+    return found
+
+
+def _endpoint(port: int) -> str:
+    return f"tcp/127.0.0.1:{port}"

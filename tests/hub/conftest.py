@@ -1,0 +1,96 @@
+import importlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from hub import registry
+
+PENDULUM = """
+from typing import Literal
+
+from pydantic import Field
+
+from hub.participant import Params, Stepped
+from schemas.ports import Port
+from schemas.quantity import Length
+
+
+class Spring(Params):
+    stiffness: float = Field(gt=0)
+
+
+class PendulumParams(Params):
+    length: Length = Field(gt=0)
+    solver: Literal["euler", "verlet"] = "euler"
+    springs: dict[str, Spring] = {}
+
+
+class Pendulum(Stepped):
+    params_model = PendulumParams
+
+    @property
+    def ports(self):
+        return (
+            Port(name="torque", causality="input", unit="N*m", start=(0.0,)),
+            Port(name="angle", causality="output", unit="rad"),
+        )
+
+    def configure(self, setup):
+        return {}
+
+    def step(self, t, h, inputs):
+        return {}
+
+    def state_hash(self):
+        return 0
+
+    def close(self):
+        pass
+"""
+
+InstallPlugin = Callable[..., None]
+
+
+@pytest.fixture
+def install_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[InstallPlugin]:
+    """Return a function that installs a distribution with the given entry points and module text, for one test."""
+    modules: list[str] = []
+
+    def install(name: str, entries: dict[str, dict[str, str]], *, text: str = PENDULUM, requires: tuple[str, ...] = (), extras: tuple[str, ...] = ()) -> None:
+        site = tmp_path / f"site_{name}"
+        info = site / f"{name}-1.0.dist-info"
+        info.mkdir(parents=True)
+        (site / f"{name}.py").write_text(text)
+        lines = [
+            "Metadata-Version: 2.1",
+            f"Name: {name}",
+            "Version: 1.0",
+            *(f"Provides-Extra: {e}" for e in extras),
+            *(f"Requires-Dist: {r}" for r in requires),
+        ]
+        (info / "METADATA").write_text("\n".join(lines) + "\n")
+        sections = [f"[{group}]\n" + "".join(f"{kind} = {value}\n" for kind, value in kinds.items()) for group, kinds in entries.items()]
+        (info / "entry_points.txt").write_text("\n".join(sections))
+        monkeypatch.syspath_prepend(site)
+        modules.append(name)
+        _forget()
+
+    _forget()
+    yield install
+    for module in modules:
+        sys.modules.pop(module, None)
+    _forget()
+
+
+@pytest.fixture
+def pendulum(install_plugin: InstallPlugin) -> None:
+    """Install an engine of kind `pendulum`."""
+    install_plugin("swing", {"trocar.engines": {"pendulum": "swing:Pendulum"}})
+
+
+def _forget() -> None:
+    importlib.invalidate_caches()
+    registry.kinds.cache_clear()
+    registry.load.cache_clear()
