@@ -132,13 +132,14 @@ class Bag:
 
 
 def output_port(name: str, type_name: str, payload: bytes) -> Port:
-    """Return the output port that would write messages such as `payload`, for types of which `schemas` has a model.
+    """Return the output port that would write messages such as `payload`.
 
-    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all others events.
+    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all others events. Raises MessageError.
     """
+    model = message_type(type_name)
     if not has_vector(type_name):
         return Port(name=name, causality="output", type=type_name, variability="event")
-    message = decode(message_type(type_name), payload)
+    message = decode(model, payload)
     known: dict[str, Any] = {}
     if isinstance(message, ros.JointState):
         sizes = {field: getattr(message, field).size for field in ("position", "velocity", "effort")}

@@ -1,0 +1,127 @@
+"""Plays a recording of device samples as if somebody held the device.
+
+Time 0 is the first message of the recording, and log times give the pace (as in `ros2 bag play`). The stamps in the
+headers become the times at which the samples are played, in the port's clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from hub.participant import Device, Params, Sample
+from schemas.bag import Bag, BagMessage, output_port
+from schemas.codec import decode, message_type
+from schemas.errors import MessageError, RecordingError
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.quantity import Duration
+from schemas.ros import Header, Time
+
+__all__ = ["ScriptedDevice", "ScriptedParams"]
+
+
+class ScriptedParams(Params):
+    """What is played, and how."""
+
+    samples: Annotated[Path, Field(description="recording of device samples: an .mcap file or a rosbag2 directory, relative to the scenario")]
+    time: Annotated[Literal["simulated", "wall"], Field(description="the clock by which the samples are played")] = "simulated"
+    rate: Annotated[float, Field(gt=0, allow_inf_nan=False, description="speed of playing; 2 is twice as fast as recorded")] = 1.0
+    loop: Annotated[bool, Field(description="start again at the end")] = False
+    max_age: Annotated[Duration | None, Field(gt=0, description="a signal that is older is marked stale; default: never")] = None
+
+    @field_validator("samples")
+    @classmethod
+    def _find(cls, samples: Path, info: ValidationInfo) -> Path:
+        context: dict[str, Any] = info.context or {}
+        path = Path(context.get("directory", Path.cwd())) / samples
+        try:
+            _ports(Bag(path), "simulated", 0)
+        except (RecordingError, MessageError) as error:
+            raise ValueError(str(error)) from error
+        return path.resolve()
+
+
+class ScriptedDevice(Device):
+    """A device that plays a recording: topic `/pose` comes out of port `pose`."""
+
+    params_model = ScriptedParams
+    params: ScriptedParams
+
+    def __init__(self, name: str, params: ScriptedParams) -> None:
+        """Take the participant's name and what is to be played."""
+        super().__init__(name, params)
+        self._samples: Iterator[tuple[int, Sample]] = iter(())
+        self._next: tuple[int, Sample] | None = None
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """One output per topic: a signal where the type has a vector form, else an event port."""
+        return self._ports
+
+    @cached_property
+    def _ports(self) -> tuple[Port, ...]:
+        return _ports(Bag(self.params.samples), self.params.time, self.params.max_age or 0)
+
+    def open(self, directory: Path) -> None:  # noqa: ARG002 - the samples were found when the parameters were validated
+        """Read and check all samples. Raises RecordingError if one of them is no valid message."""
+        bag = Bag(self.params.samples)
+        played = sorted(bag.messages(), key=lambda message: message.time_ns)
+        try:
+            messages = [decode(message_type(m.type), m.payload) for m in played]
+        except MessageError as error:
+            raise RecordingError(f"'{bag.file}': {error}") from error
+        self._samples = self._play(played, messages)
+        self._next = next(self._samples, None)
+
+    def read(self, t: int) -> list[Sample]:
+        """Return the samples up to time `t` that were not returned before, oldest first."""
+        due: list[Sample] = []
+        while self._next is not None and self._next[0] <= t:
+            due.append(self._next[1])
+            self._next = next(self._samples, None)
+        return due
+
+    def close(self) -> None:
+        """Forget the samples."""
+        self._samples, self._next = iter(()), None
+
+    def _play(self, played: list[BagMessage], messages: list[Message]) -> Iterator[tuple[int, Sample]]:
+        """Yield (time in ns, sample) in order, for ever if `loop` is set."""
+        start, end = played[0].time_ns, played[-1].time_ns
+        lap = end - start + max(1, (end - start) // max(1, len(played) - 1))  # one mean interval between last and first
+        offset = 0
+        while True:
+            for source, message in zip(played, messages, strict=True):
+                time_ns = round((source.time_ns - start + offset) / self.params.rate)
+                yield time_ns, Sample(_port_name(source.topic), _stamped(message, time_ns))
+            if not self.params.loop:
+                return
+            offset += lap
+
+
+def _ports(bag: Bag, clock: Literal["simulated", "wall"], max_age_ns: int) -> tuple[Port, ...]:
+    if not sum(bag.counts.values()):
+        raise RecordingError(f"'{bag.file}' holds no messages, so there is nothing to play")
+    first: dict[str, BagMessage] = {}
+    for topic, count in bag.counts.items():
+        if count:
+            first[topic] = next(bag.messages(topic))
+    ports = (output_port(_port_name(topic), message.type, message.payload) for topic, message in sorted(first.items()))
+    return tuple(port.model_copy(update={"clock": clock, "max_age_ns": max_age_ns if port.variability == "signal" else 0}) for port in ports)
+
+
+def _port_name(topic: str) -> str:
+    return topic.lstrip("/")
+
+
+def _stamped(message: Message, time_ns: int) -> Message:
+    """Return `message` with the stamp `time_ns`, if its type has one."""
+    header = getattr(message, "header", None)
+    if not isinstance(header, Header):
+        return message
+    return message.model_copy(update={"header": header.model_copy(update={"stamp": Time.from_ns(time_ns)})})
