@@ -25,8 +25,8 @@ SCALE = 0.2
 """Probe motion over hand motion: dVRK's default for teleoperation."""
 RESOLUTION_M = 2.0**-20
 """About 1 um: finer than a hand can tell, and short mantissas compress well."""
-CONTACT_MM = -7.5
-"""The probe starts with its centre 10 mm above the tissue and touches it when the centre, of a 5 mm sphere, is at 2.5 mm."""
+CONTACT_MM = -5.0
+"""In configs/palpation.yaml the probe, a sphere of 5 mm radius, starts with its centre 10 mm above the tissue."""
 HOVER_MM = CONTACT_MM + 1.5
 
 
