@@ -112,7 +112,7 @@ def test_installed_scenarios_are_found_by_name_only():
     assert "palpation" in installed_scenarios()
     with pytest.raises(ScenarioError, match=r"there is no scenario 'palpatoin'. Did you mean 'palpation'\?"):
         load("palpatoin")
-    with pytest.raises(ScenarioError, match="there is no scenario file 'nowhere/palpation.yaml'"):
+    with pytest.raises(ScenarioError, match=r"there is no scenario file 'nowhere/palpation\.yaml'"):
         load("nowhere/palpation.yaml")
 
 

@@ -1,0 +1,5 @@
+"""The `trocar` command."""
+
+from hub.command_line.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,43 @@
+"""Commands on recordings: `replay`, `recover`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hub.command_line.display import console, show
+from hub.command_line.scenarios import Json, Listen
+from hub.recording import Recording
+
+__all__ = ["recover", "replay"]
+
+RecordingPath = Annotated[Path, typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it.")]
+Output = Annotated[Path | None, typer.Option("--output", "-o", help="Where to write; by default beside the recording.")]
+
+
+def replay(
+    recording: RecordingPath,
+    *,
+    rate: Annotated[float, typer.Option(min=0.0, help="Simulated seconds per second; 0: as fast as it goes.")] = 1.0,
+    listen: Listen = None,
+    as_json: Json = False,
+) -> None:
+    """Publish a recording again, so that consoles see it as they would see it live."""
+    from hub.endpoint import free_endpoint
+    from hub.replay import replay as publish
+    from hub.wire import open_session
+
+    endpoint = listen or free_endpoint()
+    console.print(f"publishing on {endpoint}")
+    with open_session("router", listen=[endpoint]) as session:
+        show(asdict(publish(Recording(recording), session, rate)), as_json=as_json)
+
+
+def recover(recording: RecordingPath, *, output: Output = None, as_json: Json = False) -> None:
+    """Save what is whole of a recording that was cut short."""
+    from hub.recover import recover as save
+
+    show(asdict(save(recording, output)), as_json=as_json)
