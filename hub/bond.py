@@ -100,7 +100,7 @@ class MotionSide:
 
     def __init__(self, bond: BondSide, plan: BondPlan) -> None:
         """Take the declared bond and its plan."""
-        self.position_port, self.velocity_port, self._force_port = (port.name for port in bond_ports(bond))
+        self.position_port, self.velocity_port, self.force_port = (port.name for port in bond_ports(bond))
         self._correction = plan.correction
         self._linear = min(bond.dof, 3)
         self.work_port = f"{bond.name}/work"
@@ -108,8 +108,9 @@ class MotionSide:
 
     def begin(self, inputs: Inputs, position: Vector, velocity: Vector) -> None:
         """Take the reaction for this step, and the motion at its start, from which the other side predicted."""
-        self._reaction = inputs[self._force_port]
-        self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
+        self._reaction = inputs[self.force_port]
+        if self._correction is not None:
+            self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
     @property
     def implicit_damping(self) -> float:
@@ -127,11 +128,11 @@ class MotionSide:
 
     def add(self, force: Vector, displacement: Vector) -> None:
         """Count the work done against `force` over `displacement` (m, rad; shape (dof,)) of one sub-step."""
-        self._work[0] -= float(force @ displacement)
+        self._work[0] -= force.dot(displacement)
 
     def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond at the end of the step."""
-        return {self.position_port: position, self.velocity_port: velocity, self.work_port: self._work.copy()}
+        """Return the outputs of the bond at the end of the step; the work's array is the same one at every step."""
+        return {self.position_port: position, self.velocity_port: velocity, self.work_port: self._work}
 
     @property
     def state(self) -> Vector:
@@ -140,4 +141,4 @@ class MotionSide:
 
     @state.setter
     def state(self, state: Vector) -> None:
-        self._work = state.copy()
+        self._work[:] = state

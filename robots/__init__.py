@@ -1,0 +1,1 @@
+"""The robots: numbers, kinematics and instruments, without an engine."""

@@ -1,0 +1,1 @@
+"""The da Vinci Research Kit."""

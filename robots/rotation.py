@@ -1,0 +1,90 @@
+"""Rotations as unit quaternions (x, y, z, w), rotation vectors (rad) and 3x3 matrices.
+
+Written in scalars: at four numbers a call, numpy's overhead is ten times the arithmetic.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin, sqrt
+
+import numpy as np
+
+from schemas.vectors import Vector
+
+__all__ = ["conjugate", "exp", "from_matrix", "log", "matrix", "product", "right_matrix"]
+
+_SMALL_ANGLE = 1e-6
+"""Below this (rad) the next term of the sine's series is under the rounding error of a double."""
+
+
+def product(a: Vector, b: Vector) -> Vector:
+    """Return the quaternion a * b, shape (4,): first the rotation b, then a."""
+    ax, ay, az, aw = a.tolist()
+    bx, by, bz, bw = b.tolist()
+    return np.array(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ]
+    )
+
+
+def right_matrix(b: Vector) -> Vector:
+    """Return M, shape (4, 4), with product(a, b) = M a."""
+    x, y, z, w = b.tolist()
+    return np.array([[w, z, -y, x], [-z, w, x, y], [y, -x, w, z], [-x, -y, -z, w]])
+
+
+def conjugate(q: Vector) -> Vector:
+    """Return the inverse rotation, shape (4,)."""
+    x, y, z, w = q.tolist()
+    return np.array([-x, -y, -z, w])
+
+
+def exp(v: Vector) -> Vector:
+    """Return the quaternion, shape (4,), of the rotation vector `v` (rad), shape (3,)."""
+    x, y, z = v.tolist()
+    angle = sqrt(x * x + y * y + z * z)
+    scale = 0.5 if angle < _SMALL_ANGLE else sin(angle / 2) / angle
+    return np.array([scale * x, scale * y, scale * z, cos(angle / 2)])
+
+
+def log(q: Vector) -> Vector:
+    """Return the rotation vector (rad), shape (3,), of at most half a turn, of the quaternion `q`."""
+    x, y, z, w = q.tolist() if q[3] >= 0.0 else (-q).tolist()
+    length = sqrt(x * x + y * y + z * z)
+    scale = 2.0 / w if length < _SMALL_ANGLE else 2.0 * atan2(length, w) / length
+    return np.array([scale * x, scale * y, scale * z])
+
+
+def matrix(q: Vector) -> Vector:
+    """Return the rotation matrix, shape (3, 3), of the unit quaternion `q`."""
+    x, y, z, w = q.tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def from_matrix(r: Vector) -> Vector:
+    """Return the unit quaternion, shape (4,), of the rotation matrix `r`, shape (3, 3) or the corner of a (4, 4).
+
+    Each row below is 4 q_i q, so the one with the largest q_i is well scaled for every rotation (Bar-Itzhack's
+    observation that q is the dominant eigenvector of this matrix, without the eigenvalues).
+    """
+    (a, b, c), (d, e, f), (g, h, i) = r[:3, :3].tolist()
+    rows = np.array(
+        [
+            [1 + a - e - i, b + d, c + g, h - f],
+            [b + d, 1 - a + e - i, f + h, c - g],
+            [c + g, f + h, 1 - a - e + i, d - b],
+            [h - f, c - g, d - b, 1 + a + e + i],
+        ]
+    )
+    row = rows[int(np.argmax(np.diag(rows)))]
+    return row / np.linalg.norm(row)
