@@ -1,0 +1,163 @@
+"""FMUs as engines: FMI 2.0 and 3.0 for co-simulation, through FMPy.
+
+Inputs and outputs of the FMU are ports, named as `engines.fmu.variables.port_name` says, in the unit that the FMU declares: nothing
+is converted, so that a length in mm fits an input in mm alone. Scalars are `std_msgs/msg/Float64`, FMI 3 arrays
+`std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and booleans (0, 1) flow as doubles, and an input that is no such
+number ends the session. Strings, binaries and clocks are no ports, which is logged.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+
+from engines.fmu.description import Description, describe
+from engines.fmu.fmi2 import Fmi2Instance
+from engines.fmu.fmi3 import Fmi3Instance
+from engines.fmu.instance import Instance
+from hub.inputs import Inputs
+from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from schemas.errors import ScenarioError, SessionError, StateError
+from schemas.ports import Port
+from schemas.quantity import Duration
+from schemas.vectors import Vector
+
+__all__ = ["FmuEngine", "FmuParams"]
+
+
+class FmuParams(Params):
+    """Parameters of an FMU."""
+
+    path: Path = Field(description="the .fmu file; a relative path starts at the scenario")
+    start: dict[str, Any] = Field(
+        default_factory=dict[str, Any],
+        description="start values by FMU variable name: numbers in the variable's unit, texts with a unit, lists for arrays, true or false, or texts",
+        examples=[{"mass": "50 g", "stages": 3}],
+    )
+    tolerance: float | None = Field(default=None, gt=0, allow_inf_nan=False, description="relative tolerance of the FMU's own solver")
+    step: Duration | None = Field(default=None, gt=0, description="communication step of the FMU, a divisor of the period; default: the period")
+
+    @field_validator("path")
+    @classmethod
+    def _from_scenario(cls, path: Path, info: ValidationInfo) -> Path:
+        directory: Path = info.context["directory"] if info.context else Path.cwd()
+        return (directory / path).resolve()
+
+
+class FmuEngine(Stepped):
+    """One FMU.
+
+    Between communication points an FMU holds its inputs. Where a connection extrapolates linearly, an FMI 2 FMU that can interpolate gets
+    value and slope; any other FMU gets the mean of the input over each communication step, which `step` makes as short as wanted.
+
+    `state_hash` covers the serialised state of the FMU, if it can serialise it; otherwise its inputs, outputs and the time.
+    """
+
+    params_model: ClassVar[type[Params]] = FmuParams
+    params: FmuParams
+
+    def __init__(self, name: str, params: FmuParams) -> None:
+        """Take the participant's name and its parameters."""
+        super().__init__(name, params)
+        self._directory: tempfile.TemporaryDirectory[str] | None = None
+        self._instance: Instance | None = None
+        self._outputs: dict[str, Vector] = {}
+        self._time = np.zeros(1)
+
+    @cached_property
+    def _description(self) -> Description:
+        try:
+            return describe(self.params.path, self.params.start)
+        except ScenarioError as error:
+            error.path = ("participants", self.name, *(error.path or ("path",)))
+            raise
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """The FMU's inputs and outputs. Raises ScenarioError if the file is no FMU that runs here."""
+        return self._description.ports
+
+    def configure(self, setup: Setup) -> Outputs:
+        """Load the FMU, set its start values and bring it to time 0."""
+        from fmpy import extract
+
+        step = self.params.step
+        if step and setup.period_ns % step:
+            problem = f"the FMU's step of {step / 1e6:g} ms does not divide its period of {setup.period_ns / 1e6:g} ms"
+            raise ScenarioError(problem, path=("participants", self.name, "step"))
+        self.close()
+        description = self._description
+        self._directory = tempfile.TemporaryDirectory(prefix="trocar-fmu-")
+        extract(description.path, self._directory.name)
+        kind = Fmi2Instance if description.major == 2 else Fmi3Instance
+        self._instance = kind(description, Path(self._directory.name), self.name)
+        self._outputs = {port: block.values[part] for block in self._instance.outputs for port, part in block.parts.items()}
+        self._instance.initialise(description.starts, self.params.tolerance)
+        return self._read(0)
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Advance the FMU from `t` to `t + h` (ns)."""
+        instance = self._running()
+        sub = self.params.step or h
+        for begin in range(0, h, sub):
+            instance.set_inputs(inputs, begin / 1e9, sub / 1e9)
+            instance.advance(t + begin, sub)
+        return self._read(t + h)
+
+    def state_hash(self) -> int:
+        """Return the hash of the FMU's state, or of all that is seen of it."""
+        instance = self._running()
+        if instance.can_save:
+            return state_hash(instance.memory, instance.serialise())
+        return state_hash(self._time, *(block.values for block in (*instance.inputs, *instance.outputs)))
+
+    def save(self) -> bytes:
+        """Return the FMU's state. Raises StateError if it cannot get and serialise it."""
+        instance = self._running()
+        self._check_can_save()
+        return instance.memory.tobytes() + instance.serialise()
+
+    def restore(self, state: bytes) -> None:
+        """Return the FMU to a saved state. Raises StateError if it cannot deserialise and set it."""
+        instance = self._running()
+        self._check_can_save()
+        size = instance.memory.nbytes
+        if len(state) < size:
+            raise StateError(f"participant '{self.name}': {len(state)} bytes are no state of '{self.params.path.name}'")
+        instance.deserialise(state[size:])
+        instance.memory[:] = np.frombuffer(state, np.float64, instance.memory.size)
+
+    def close(self) -> None:
+        """Terminate and unload the FMU and remove what was extracted of it."""
+        instance, self._instance = self._instance, None
+        directory, self._directory = self._directory, None
+        try:
+            if instance:
+                instance.close()
+        finally:
+            if directory:
+                directory.cleanup()
+
+    def _running(self) -> Instance:
+        if self._instance is None:
+            raise SessionError(f"participant '{self.name}' is not configured")
+        return self._instance
+
+    def _check_can_save(self) -> None:
+        capabilities = self._description.co_simulation
+        for flag in ("canGetAndSetFMUstate", "canSerializeFMUstate"):
+            if not getattr(capabilities, flag):
+                raise StateError(f"participant '{self.name}': '{self.params.path.name}' cannot save its state, its modelDescription.xml says {flag}=false")
+
+    def _read(self, t: int) -> Outputs:
+        self._time[0] = t
+        try:
+            self._running().read_outputs()
+        except SessionError as error:
+            raise SessionError(f"{error}, at {t / 1e9:.9g} s") from error
+        return self._outputs

@@ -1,0 +1,86 @@
+"""FMI 2.0 co-simulation."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from engines.fmu.blocks import WARNING
+from engines.fmu.description import Description
+from engines.fmu.instance import DISCARD, Instance, load
+from engines.fmu.log import fmi2_callbacks, wants_all
+from engines.fmu.start import Start
+from hub.inputs import Inputs
+from schemas.errors import SessionError
+
+__all__ = ["Fmi2Instance"]
+
+_LAST_SUCCESSFUL_TIME = 2
+"""fmi2StatusKind (fmi2FunctionTypes.h)."""
+
+
+class Fmi2Instance(Instance):
+    """An FMI 2.0 FMU."""
+
+    prefix = "fmi2"
+    counted = False
+    state_word = "FMUstate"
+    deserialise_word = "DeSerialize"
+    byte = ctypes.c_char
+
+    def __init__(self, description: Description, directory: Path, name: str) -> None:
+        """Load and instantiate the FMU that was extracted to `directory`."""
+        from fmpy.fmi2 import FMU2Slave
+
+        fmu = load(FMU2Slave, description, directory, name, callbacks=fmi2_callbacks(), loggingOn=wants_all())
+        super().__init__(fmu, description, name)
+        self._do_step: Callable[..., int] = self._function("DoStep")
+        interpolates = description.co_simulation.canInterpolateInputs
+        continuous = [variable for variable in description.inputs if variable.type.name == "Real" and not variable.discrete and interpolates]
+        self._slope_ports = [variable.port for variable in continuous]
+        self._slopes = np.zeros(len(continuous))
+        self._set_slopes = self._slope_call([variable.reference for variable in continuous])
+
+    def _slope_call(self, references: Sequence[int]) -> Callable[[], int]:
+        count = len(references)
+        orders = (ctypes.c_int * count)(*[1] * count)
+        slopes = self._slopes.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+        return partial(self._function("SetRealInputDerivatives"), self._component, (ctypes.c_uint * count)(*references), count, orders, slopes)
+
+    def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
+        self.call("SetupExperiment", tolerance is not None, tolerance or 0.0, 0.0, False, 0.0)
+        for start in starts:
+            self._set_start(start)
+        self.call("EnterInitializationMode")
+        self.call("ExitInitializationMode")
+
+    def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
+        """Give the FMU its inputs: value and slope if it interpolates, else the mean over the `dt` seconds."""
+        interpolates = bool(self._slope_ports)
+        for block in self.inputs:
+            block.take(inputs, tau if interpolates else tau + dt / 2)
+            self.transfer(block)
+        if interpolates:
+            for index, port in enumerate(self._slope_ports):
+                rate = inputs.rate(port)
+                self._slopes[index] = 0.0 if rate is None else rate[0]
+            status = self._set_slopes()
+            if status > WARNING:
+                raise self.failure("SetRealInputDerivatives", status)
+
+    def advance(self, t: int, h: int) -> None:
+        """Bring the FMU from `t` to `t + h` (ns)."""
+        status = self._do_step(self._component, t / 1e9, h / 1e9, not self.can_save)
+        if status > WARNING:
+            raise self._step_failure(status, t, h)
+
+    def _step_failure(self, status: int, t: int, h: int) -> SessionError:
+        reached = ctypes.c_double()
+        about = f" for the step from {t / 1e9:.9g} s to {(t + h) / 1e9:.9g} s"
+        if status == DISCARD and self._function("GetRealStatus")(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) <= WARNING:
+            about += f", of which it got to {reached.value:.9g} s"
+        return self.failure("DoStep", status, about)

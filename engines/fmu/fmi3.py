@@ -1,0 +1,131 @@
+"""FMI 3.0 co-simulation, with its events."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from engines.fmu.blocks import WARNING, Block
+from engines.fmu.description import Description
+from engines.fmu.instance import Instance, load
+from engines.fmu.log import log_message, wants_all
+from engines.fmu.start import Start
+from hub.inputs import Inputs
+from schemas.errors import SessionError
+
+__all__ = ["Fmi3Instance"]
+
+_SAME_INSTANT_S = 0.5e-9
+"""Simulated time has whole nanoseconds: what is nearer than half of one is the same instant."""
+_MOST_EVENTS = 10_000
+"""In one step. An FMU that asks for more stands still (a Zeno point), and a session must not hang on it."""
+
+
+class Fmi3Instance(Instance):
+    """An FMI 3.0 FMU. Where it has an event mode, events are handled at the time they happen, inside the step."""
+
+    prefix = "fmi3"
+    counted = True
+    state_word = "FMUState"
+    deserialise_word = "Deserialize"
+    byte = ctypes.c_uint8
+
+    def __init__(self, description: Description, directory: Path, name: str) -> None:
+        """Load and instantiate the FMU that was extracted to `directory`."""
+        from fmpy.fmi3 import FMU3Slave
+
+        capabilities = description.co_simulation
+        self._has_events = capabilities.hasEventMode
+        self._splits = capabilities.hasEventMode and capabilities.canHandleVariableCommunicationStepSize
+
+        def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:  # noqa: ARG001
+            log_message(name, status, category, message)
+
+        options = {"eventModeUsed": self._has_events, "earlyReturnAllowed": True, "logMessage": log, "loggingOn": wants_all()}
+        super().__init__(load(FMU3Slave, description, directory, name, **options), description, name)
+        self._event_blocks = [block for block in self.inputs if block.discrete and self._has_events]
+        self._step_blocks = [block for block in self.inputs if block not in self._event_blocks]
+        self.memory = np.full(1 + sum(block.values.size for block in self._event_blocks), math.inf)  # time of the next event, discrete inputs
+        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._again, self._nominals, self._states, self._scheduled = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._reached, self._next = ctypes.c_double(), ctypes.c_double()
+        self._do_step = partial(self._function("DoStep"), self._component)
+        self._step_results = [ctypes.byref(x) for x in (self._event, self._terminate, self._early, self._reached)]
+        self._update_results = [ctypes.byref(x) for x in (self._again, self._terminate, self._nominals, self._states, self._scheduled, self._next)]
+
+    def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
+        structural = [start for start in starts if start.structural]
+        if structural:
+            self.call("EnterConfigurationMode")
+            for start in structural:
+                self._set_start(start)
+            self.call("ExitConfigurationMode")
+        for start in starts:
+            if not start.structural:
+                self._set_start(start)
+        self.call("EnterInitializationMode", tolerance is not None, tolerance or 0.0, 0.0, False, 0.0)
+        self.call("ExitInitializationMode")
+        if self._has_events:
+            self._update_discrete_states()
+            self.call("EnterStepMode")
+
+    def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
+        """Give the FMU its inputs: continuous ones as their mean over the `dt` seconds, discrete ones, if they have changed, in event mode."""
+        for block in self._step_blocks:
+            block.take(inputs, tau + dt / 2)
+            self.transfer(block)
+        if not self._event_blocks:
+            return
+        for block in self._event_blocks:
+            block.take(inputs, tau)
+        values = np.concatenate([block.values for block in self._event_blocks])
+        if not np.array_equal(values, self.memory[1:]):
+            self.memory[1:] = values
+            self._handle_event(self._event_blocks)
+
+    def advance(self, t: int, h: int) -> None:
+        """Bring the FMU from `t` to `t + h` (ns), from event to event."""
+        now, end = t / 1e9, (t + h) / 1e9
+        for _ in range(_MOST_EVENTS):
+            target = min(end, float(self.memory[0])) if self._splits else end
+            needs_event = target - now < _SAME_INSTANT_S  # an event scheduled for this instant
+            if not needs_event:
+                now = self._step_to(now, target)
+                needs_event = self._has_events and (self._event.value or now > self.memory[0] - _SAME_INSTANT_S)
+            if needs_event:
+                self._handle_event()
+            if end - now < _SAME_INSTANT_S:
+                return
+        raise SessionError(f"the FMU got no further than {now:.9g} s in {_MOST_EVENTS} events of the step to {end:.9g} s")
+
+    def _step_to(self, now: float, target: float) -> float:
+        """Step towards `target` and return the time that was reached."""
+        status = self._do_step(now, target - now, not self.can_save, *self._step_results)
+        if status > WARNING:
+            raise self.failure("DoStep", status, f" for the step from {now:.9g} s to {target:.9g} s")
+        if self._terminate.value:
+            raise SessionError(f"the FMU asks to end the simulation at {self._reached.value:.9g} s")
+        return self._reached.value if self._early.value else target
+
+    def _handle_event(self, inputs: Sequence[Block] = ()) -> None:
+        self.call("EnterEventMode")
+        for block in inputs:
+            self.transfer(block)
+        self._update_discrete_states()
+        self.call("EnterStepMode")
+
+    def _update_discrete_states(self) -> None:
+        """Iterate the event until the discrete states stay, and note when the next one is due."""
+        for _ in range(_MOST_EVENTS):
+            self.call("UpdateDiscreteStates", *self._update_results)
+            if self._terminate.value:
+                raise SessionError("the FMU asks to end the simulation at an event")
+            if not self._again.value:
+                self.memory[0] = self._next.value if self._scheduled.value else math.inf
+                return
+        raise SessionError(f"the discrete states of the FMU do not settle in {_MOST_EVENTS} iterations of one event")

@@ -1,0 +1,85 @@
+"""Start values: those that an FMU declares for its inputs, and those that a scenario gives for parameters, inputs and states."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.fmu.variables import number_type
+from schemas.quantity import to_si
+
+if TYPE_CHECKING:
+    from fmpy.model_description import ModelVariable
+
+__all__ = ["Start", "declared_start", "given_start", "settable", "size_of", "unit_of"]
+
+
+@dataclass(frozen=True)
+class Start:
+    """A start value as the FMU takes it."""
+
+    name: str
+    reference: int
+    access: str
+    """The set function without its prefix: `Real`, `Float64`, `String`, ..."""
+    structural: bool
+    """It is a structural parameter (FMI 3), which is set in configuration mode."""
+    value: NDArray[Any] | bytes
+    """Numbers in the C type of the set function, shape (size,), or UTF-8 text."""
+
+
+def settable(row: ModelVariable) -> bool:
+    """Say whether a start value can be given (FMI 2.0.5 section 4.2.4, FMI 3.0.2 section 2.3.2: state Instantiated)."""
+    return row.variability != "constant" and (row.causality in {"input", "parameter", "structuralParameter"} or row.initial in {"exact", "approx"})
+
+
+def unit_of(row: ModelVariable) -> str:
+    """Return the unit of a variable as the FMU spells it, of its own or of its declared type."""
+    return row.unit or (row.declaredType.unit if row.declaredType else None) or ""
+
+
+def size_of(row: ModelVariable, start: Mapping[str, Any]) -> int:
+    """Return the number of elements of a variable; structural parameters among the start values change that of FMI 3 arrays."""
+    return math.prod(int(start.get(d.variable.name, d.variable.start) if d.variable else d.start) for d in row.dimensions)
+
+
+def declared_start(row: ModelVariable, size: int) -> tuple[float, ...] | None:
+    """Return the start value that the FMU declares, `size` numbers; None if it declares none of that size."""
+    numbers = [float({"true": "1", "false": "0"}.get(word, word)) for word in (row.start or "").split()]
+    if len(numbers) == 1:
+        numbers *= size
+    return tuple(numbers) if len(numbers) == size and all(map(math.isfinite, numbers)) else None
+
+
+def given_start(row: ModelVariable, given: Any, major: int, size: int) -> Start:
+    """Return the start value `given`: a number, a text with a unit, a list of them, a truth value, or a text for a String.
+
+    Numbers are in the variable's unit. Raises ValueError if it does not fit the variable.
+    """
+    structural = row.causality == "structuralParameter"
+    if row.type == "String":
+        if not isinstance(given, str):
+            raise ValueError(f"'{row.name}' takes a text, not {given!r}")
+        return Start(row.name, row.valueReference, "String", structural, given.encode())
+    number = number_type(major, row.type)
+    if number is None:
+        raise ValueError(f"'{row.name}' is a {row.type}, which takes no start value here")
+    numbers = [_number(row, item) for item in (given if isinstance(given, list | tuple) else [given])]  # pyright: ignore[reportUnknownVariableType]
+    if len(numbers) not in {1, size}:
+        raise ValueError(f"'{row.name}' takes {size} numbers, not {len(numbers)}")
+    values = np.array(numbers * size if len(numbers) == 1 else numbers)
+    return Start(row.name, row.valueReference, number.access, structural, number.from_float64(values, row.name))
+
+
+def _number(row: ModelVariable, item: Any) -> float:
+    if isinstance(item, bool) != (row.type == "Boolean") and item not in (0, 1):
+        raise ValueError(f"'{row.name}' takes {'true or false' if row.type == 'Boolean' else 'numbers'}, not {item!r}")
+    number = to_si(item, unit_of(row)) if isinstance(item, str) else float(item)
+    if isinstance(item, int) and item != number:
+        raise ValueError(f"'{row.name}' cannot take {item}: it is no exact double")
+    return number

@@ -1,0 +1,3 @@
+from typing import Any
+
+def addLoggerProxy(callbacks: Any) -> None: ...

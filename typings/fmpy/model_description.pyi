@@ -1,0 +1,38 @@
+class SimpleType:
+    unit: str | None
+
+class CoSimulation:
+    modelIdentifier: str
+    canHandleVariableCommunicationStepSize: bool
+    canInterpolateInputs: bool
+    canGetAndSetFMUstate: bool
+    canSerializeFMUstate: bool
+    hasEventMode: bool
+
+class Dimension:
+    start: int
+    variable: ModelVariable | None
+
+class ModelVariable:
+    name: str
+    valueReference: int
+    type: str
+    description: str | None
+    causality: str
+    variability: str
+    initial: str | None
+    intervalVariability: str | None
+    declaredType: SimpleType | None
+    dimensions: list[Dimension]
+    unit: str | None
+    start: str | None
+    alias: ModelVariable | None
+
+class ModelDescription:
+    fmiVersion: str
+    guid: str
+    coSimulation: CoSimulation | None
+    modelVariables: list[ModelVariable]
+
+class ValidationError(Exception):
+    problems: list[str]
