@@ -1,0 +1,181 @@
+"""Soft tissue in PyBullet, pressed by probes through power bonds."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from engines.bullet.client import connect, disconnect
+from engines.bullet.material import longest_step
+from engines.bullet.organ import Organ, OrganParams
+from engines.bullet.proxy import ProbeParams, Proxy
+from hub.inputs import Inputs
+from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
+from schemas.errors import ScenarioError, StateError
+from schemas.ports import BondSide, Port
+from schemas.quantity import Acceleration, Duration
+from schemas.ros import Header, Time
+from schemas.scenario import Name
+from schemas.trocar_msgs import SoftBodyState
+
+__all__ = ["BulletEngine", "BulletParams"]
+
+_SETTLING_NS = 300_000_000
+"""Simulated before time 0, so that the organs have come to rest under their own weight."""
+
+_NO_CLIENT = -1
+
+
+class BulletParams(Params):
+    """Organs, the probes that may touch them, and the numerics."""
+
+    organs: dict[Name, OrganParams] = Field(min_length=1)
+    probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
+    timestep: Duration = Field(default=1_000_000, gt=0, description="sub-step; the period is a multiple of it")
+    node_period: Duration = Field(default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period")
+    gravity: Acceleration = Field(default=9.80665, ge=0, description="along -z of `world`; default: standard gravity")
+
+
+class BulletEngine(Stepped):
+    """Soft organs in PyBullet; every probe is the force side of a bond.
+
+    The state hash covers the probes and their bonds at every step, and the nodes whenever they are output: reading them takes
+    longer than many a step, and no node can differ for long without moving a probe that presses on it.
+    """
+
+    params_model: ClassVar[type[Params]] = BulletParams
+    params: BulletParams
+
+    def __init__(self, name: str, params: BulletParams) -> None:
+        """Take the name and the parameters."""
+        super().__init__(name, params)
+        self._client = _NO_CLIENT
+        self._organs: list[Organ] = []
+        self._proxies: list[Proxy] = []
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """The nodes of every organ."""
+        return tuple(
+            Port(
+                name=f"{organ}/nodes",
+                causality="output",
+                type=SoftBodyState.ros_type,
+                frame="world",
+                period_ns=self.params.node_period,
+                description="positions of the nodes; the surface triangles come with the first",
+            )
+            for organ in self.params.organs
+        )
+
+    @property
+    def bonds(self) -> tuple[BondSide, ...]:
+        """Every probe, with its virtual coupling and the contact stiffness of the stiffest organ."""
+        return tuple(
+            BondSide(
+                name=name,
+                side="force",
+                dof=6,
+                frame="world",
+                stiffness=probe.stiffness,
+                damping=probe.damping,
+                proxy_mass=probe.mass,
+                contact_stiffness=max(organ.contact_stiffness(probe.radius) for organ in self.params.organs.values()),
+            )
+            for name, probe in self.params.probes.items()
+        )
+
+    def configure(self, setup: Setup) -> Outputs:
+        """Load the organs, let them settle, and add a proxy for every bond. Raises ScenarioError where a step is too long."""
+        self._check_steps(setup.period_ns)
+        dt = self.params.timestep * 1e-9
+        self._dt = dt
+        self._client = client = connect(f"participant '{self.name}' (kind bullet)", dt, self.params.gravity)
+        import pybullet as bullet
+
+        self._simulate = bullet.stepSimulation
+        for name, organ in self.params.organs.items():
+            self._organs.append(Organ(name, organ, client))
+        self._check_tissue()
+        for _ in range(_SETTLING_NS // self.params.timestep):
+            self._simulate(physicsClientId=client)
+        for bond in self.bonds:
+            if bond.name in setup.bonds:
+                self._proxies.append(Proxy(self.params.probes[bond.name], bond, setup.bonds[bond.name], self.params.gravity, client))
+        outputs = self._nodes(0)
+        for proxy in self._proxies:
+            outputs.update(proxy.idle)
+        return outputs
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Press the probes along their predicted motion; return their reactions, and the nodes where they are due."""
+        seconds, dt, proxies = h * 1e-9, self._dt, self._proxies
+        for proxy in proxies:
+            proxy.begin(inputs, seconds)
+        for i in range(h // self.params.timestep):
+            for proxy in proxies:
+                proxy.push((i + 0.5) * dt, dt)
+            self._simulate(physicsClientId=self._client)
+            for proxy in proxies:
+                proxy.read()
+        outputs = self._nodes(t + h) if (t + h) % self.params.node_period == 0 else {}
+        for proxy in proxies:
+            outputs.update(proxy.result(t + h, seconds))
+        return outputs
+
+    def state_hash(self) -> int:
+        """Return 64 bits of the probes' positions, velocities and bonds, and of the nodes as last output."""
+        return state_hash(*(part for proxy in self._proxies for part in proxy.state), *(organ.nodes for organ in self._organs))
+
+    def save(self) -> bytes:
+        """Raise StateError: Bullet cannot."""
+        raise StateError(self._no_state)
+
+    def restore(self, state: bytes) -> None:  # noqa: ARG002
+        """Raise StateError: Bullet cannot."""
+        raise StateError(self._no_state)
+
+    def close(self) -> None:
+        """Give the world back."""
+        if self._client != _NO_CLIENT:
+            disconnect(self._client)
+        self._client = _NO_CLIENT
+        self._organs.clear()
+        self._proxies.clear()
+
+    @property
+    def _no_state(self) -> str:
+        return f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies. Re-simulate from the recorded grants instead"
+
+    def _nodes(self, t: int) -> dict[str, Value]:
+        header = Header(stamp=Time.from_ns(t), frame_id="world")
+        outputs: dict[str, Value] = {}
+        for organ in self._organs:
+            nodes = organ.sample(t).astype(np.float32).ravel()
+            triangles = organ.mesh.triangles.astype(np.uint32).ravel() if t == 0 else np.zeros(0, np.uint32)
+            outputs[f"{organ.name}/nodes"] = SoftBodyState(header=header, body=organ.name, nodes_m=nodes, triangles=triangles)
+        return outputs
+
+    def _check_steps(self, period_ns: int) -> None:
+        params, where = self.params, f"participant '{self.name}'"
+        if period_ns % params.timestep:
+            raise ScenarioError(f"{where}: timestep {params.timestep} ns does not divide the period {period_ns} ns")
+        if params.node_period % period_ns:
+            raise ScenarioError(f"{where}: node_period {params.node_period} ns is no multiple of the period {period_ns} ns")
+        for name, probe in params.probes.items():
+            if params.timestep * 1e-9 > probe.longest_step:
+                raise ScenarioError(
+                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass / stiffness) = {probe.longest_step * 1e9:.0f} ns, "
+                    f"up to which the virtual coupling is stable. Shorten it, or take a heavier or softer probe"
+                )
+
+    def _check_tissue(self) -> None:
+        for organ in self._organs:
+            limit = longest_step(organ.frequency, self.params.organs[organ.name].damping * 1e-9)
+            if self._dt > limit:
+                raise ScenarioError(
+                    f"participant '{self.name}', organ '{organ.name}': timestep {self.params.timestep} ns is above {limit * 1e9:.0f} ns, up to which tissue "
+                    f"with a highest natural frequency of {organ.frequency:.0f} rad/s is stable. Shorten it, raise the damping, or take fewer nodes"
+                )
