@@ -26,12 +26,11 @@ from ruamel.yaml import YAML
 
 from schemas.errors import RecordingError
 
-__all__ = ["MESSAGE_HEADER_BYTES", "ChunkData", "McapFile", "chunk_data", "create_bag", "write_rosbag2_metadata"]
+__all__ = ["ChunkData", "McapFile", "chunk_data", "create_bag", "write_rosbag2_metadata"]
 
 _MESSAGE = np.dtype([("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _RECORD_HEADER_BYTES = 9
-MESSAGE_HEADER_BYTES = _MESSAGE.itemsize
 
 
 @dataclass(frozen=True)

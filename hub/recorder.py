@@ -17,7 +17,8 @@ from typing import Self
 
 from mcap.records import Channel, Schema
 
-from hub.mcap_file import MESSAGE_HEADER_BYTES, chunk_data, create_bag, write_rosbag2_metadata
+from hub.mcap_file import chunk_data, create_bag, write_rosbag2_metadata
+from schemas.bag import MESSAGE_HEADER_BYTES
 from schemas.codec import rihs01, ros2msg_definition, typestore
 from schemas.errors import RecordingError, did_you_mean
 

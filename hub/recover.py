@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 from mcap.exceptions import McapError
-from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
 from hub.mcap_file import ChunkData, McapFile, create_bag, write_rosbag2_metadata
-from schemas.bag import MAX_RECORD_BYTES, bag_file, reading
+from schemas.bag import MAX_RECORD_BYTES, bag_file, chunk_records, located_messages, reading
 from schemas.errors import RecordingError
 
 __all__ = ["RecoverSummary", "recover"]
@@ -109,28 +108,13 @@ class _Copy:
 
     def _add_chunk(self, chunk: Chunk) -> None:
         try:
-            records = breakup_chunk(chunk, validate_crc=True)
-            stream, length = get_chunk_data_stream(chunk)
-            data = _located(stream.read(length))
+            records = chunk_records(chunk)
+            table = np.array([m[:3] for m in located_messages(records)], np.int64).reshape(-1, 3)
+            others = [record for record in breakup_chunk(chunk) if not isinstance(record, Message)]
         except Exception:  # noqa: BLE001 - wrong bytes make zstd, lz4, struct and mcap raise what they please; counted, and reported
             self.damaged += 1
             return
-        for record in records:
-            if not isinstance(record, Message):
-                self.add(record)
-        if len(data.channels):
-            self.target.add_chunk(data)
-
-
-def _located(records: bytes) -> ChunkData:
-    """Find the messages in the uncompressed records of a chunk."""
-    rows: list[tuple[int, int, int]] = []
-    at = 0
-    while at < len(records):
-        opcode, length = struct.unpack_from("<BQ", records, at)
-        if opcode == Opcode.MESSAGE:
-            channel, _, time_ns = struct.unpack_from("<HIQ", records, at + 9)
-            rows.append((channel, time_ns, at))
-        at += 9 + length
-    table = np.array(rows, np.int64).reshape(-1, 3)
-    return ChunkData(records, table[:, 0], table[:, 1], table[:, 2])
+        for record in others:
+            self.add(record)
+        if len(table):
+            self.target.add_chunk(ChunkData(records, table[:, 0], table[:, 1], table[:, 2]))

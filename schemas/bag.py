@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -9,9 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Chunk, Message
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Chunk
+from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
@@ -21,10 +23,18 @@ from schemas.errors import RecordingError, did_you_mean
 from schemas.ports import Port
 from schemas.vectors import has_vector
 
-__all__ = ["MAX_RECORD_BYTES", "Bag", "BagMessage", "bag_file", "output_port", "reading"]
+__all__ = ["MAX_RECORD_BYTES", "MESSAGE_HEADER_BYTES", "Bag", "BagMessage", "bag_file", "chunk_records", "located_messages", "output_port", "reading"]
 
 MAX_RECORD_BYTES = 64 * 2**20
 """A longer MCAP record is refused unread: chunks have 64 KiB, or one image."""
+
+_RECORD = struct.Struct("<BQ")
+"""Opcode and length of a record."""
+
+_MESSAGE = struct.Struct("<BQHIQQ")
+"""Opcode, length, channel, sequence, log time, publish time; the payload follows (https://mcap.dev/spec#message-op0x05)."""
+
+MESSAGE_HEADER_BYTES = _MESSAGE.size
 
 
 class BagMessage(NamedTuple):
@@ -83,6 +93,12 @@ class Bag:
         counts = {} if statistics is None else statistics.channel_message_counts
         return {channel.topic: counts.get(channel.id, 0) for channel in self._summary.channels.values()}
 
+    @property
+    def duration_ns(self) -> int:
+        """Time from the first to the last message."""
+        statistics = self._summary.statistics
+        return 0 if statistics is None else statistics.message_end_time - statistics.message_start_time
+
     @cached_property
     def attachments(self) -> dict[str, bytes]:
         """The attachments by name."""
@@ -98,10 +114,11 @@ class Bag:
             wanted = {c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics}
         for chunk in self._chunks(set(wanted)):
             with reading(self.file):
-                records = breakup_chunk(chunk, validate_crc=True)
-            for record in records:
-                if isinstance(record, Message) and (topic := wanted.get(record.channel_id)) is not None:
-                    yield BagMessage(topic, self.topics[topic], record.log_time, record.data)
+                records = chunk_records(chunk)
+                found = [m for m in located_messages(records) if m.channel in wanted]
+            for m in found:
+                topic = wanted[m.channel]
+                yield BagMessage(topic, self.topics[topic], m.time_ns, records[m.offset + MESSAGE_HEADER_BYTES : m.end])
 
     def _read_summary(self) -> Summary:
         with self.file.open("rb") as stream:
@@ -126,9 +143,39 @@ class Bag:
                 if index.message_index_offsets and wanted.isdisjoint(index.message_index_offsets):
                     continue
                 with reading(self.file):
-                    stream.seek(index.chunk_start_offset + 9)  # behind opcode and length of the record
+                    stream.seek(index.chunk_start_offset + _RECORD.size)
                     chunk = Chunk.read(ReadDataStream(stream))
                 yield chunk
+
+
+class LocatedMessage(NamedTuple):
+    """Where one message stands in the records of a chunk."""
+
+    channel: int
+    time_ns: int
+    offset: int
+    """Start of the record."""
+    end: int
+
+
+def chunk_records(chunk: Chunk) -> bytes:
+    """Return the uncompressed records of `chunk`, checked against its checksum. Raises whatever the decompressors raise."""
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    return stream.read(length)
+
+
+def located_messages(records: bytes) -> Iterator[LocatedMessage]:
+    """Find the messages in the records of a chunk. Raises ValueError or struct.error if records do not end where they say."""
+    at = 0
+    while at < len(records):
+        opcode, length = _RECORD.unpack_from(records, at)
+        end = at + _RECORD.size + length
+        if end > len(records):
+            raise ValueError(f"a record of {length} bytes at {at} passes the end of its chunk")
+        if opcode == Opcode.MESSAGE:
+            _, _, channel, _, time_ns, _ = _MESSAGE.unpack_from(records, at)
+            yield LocatedMessage(channel, time_ns, at, end)
+        at = end
 
 
 def output_port(name: str, type_name: str, payload: bytes) -> Port:
