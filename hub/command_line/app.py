@@ -28,7 +28,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (looking.check, recordings.replay, recordings.recover, looking.ls, looking.doctor, looking.schema):
+for command in (looking.check, recordings.replay, recordings.recover, recordings.report, looking.ls, looking.doctor, looking.schema):
     app.command()(command)
 
 

@@ -1,4 +1,4 @@
-"""Commands on recordings: `replay`, `recover`."""
+"""Commands on recordings: `replay`, `recover`, `report`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hub.command_line.display import console, show
 from hub.command_line.scenarios import Json, Listen
 from hub.recording import Recording
 
-__all__ = ["recover", "replay"]
+__all__ = ["recover", "replay", "report"]
 
 RecordingPath = Annotated[Path, typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it.")]
 Output = Annotated[Path | None, typer.Option("--output", "-o", help="Where to write; by default beside the recording.")]
@@ -41,3 +41,12 @@ def recover(recording: RecordingPath, *, output: Output = None, as_json: Json = 
     from hub.recover import recover as save
 
     show(asdict(save(recording, output)), as_json=as_json)
+
+
+def report(recording: RecordingPath, *, output: Output = None) -> None:
+    """Write one self-contained HTML page of plots about a recording."""
+    from hub.report import report as write
+
+    page = output or recording.with_name(f"{recording.stem if recording.is_file() else recording.name}.html")
+    write(Recording(recording), page)
+    console.print(f"wrote {page}")

@@ -33,7 +33,7 @@ class Pendulum(Stepped):
     @property
     def ports(self):
         return (
-            Port(name="torque", causality="input", unit="N*m", start=(0.0,)),
+            Port(name="goal", causality="input", unit="rad", start=(0.0,)),
             Port(name="angle", causality="output", unit="rad"),
         )
 

@@ -18,7 +18,7 @@ participants:
     host: other
     length: 0.5
 connections:
-  - one.angle -> two.torque
+  - one.angle -> two.goal
 """
 
 pytestmark = pytest.mark.usefixtures("pendulum")
@@ -55,7 +55,7 @@ def test_every_problem_is_one_line_with_its_place(problems):
     text = GOOD.replace("step: 1 ms", "stepp: 1 ms").replace("length: 0.5", "length: 5 kg\n    sover: euler").replace("->", "=>")
     assert problems(text) == [
         "2:1: step: is required but not given",
-        "12:5: connections.0: 'one.angle => two.torque' is no 'participant.port -> participant.port'",
+        "12:5: connections.0: 'one.angle => two.goal' is no 'participant.port -> participant.port'",
         "3:1: stepp: there is no 'stepp' here. Did you mean 'step'? Known: algorithm, answer_limit, bonds, connections, description, duration, "
         "join_limit, measure, name, order, pace, participants, step, window.",
         "9:13: participants.two.length: '5 kg' is no quantity in m (Cannot convert from 'kilogram' ([mass]) to 'meter' ([length]))",
@@ -85,7 +85,7 @@ def test_what_was_wrong_where_and_what_was_allowed(problems, old, new, expected)
 
 
 def test_overrides(good):
-    loaded = load(good, ["step=2 ms", "participants.one.length=3", "participants.two.springs.a.stiffness=4", "connections.0=two.angle -> one.torque"])
+    loaded = load(good, ["step=2 ms", "participants.one.length=3", "participants.two.springs.a.stiffness=4", "connections.0=two.angle -> one.goal"])
     assert loaded.scenario.step == 2_000_000
     assert loaded.params["one"].length == 3.0
     assert loaded.params["two"].springs["a"].stiffness == 4.0
