@@ -16,12 +16,11 @@ PORTS = range(7447, 7467)
 def free_endpoint(ports: Iterable[int] = PORTS) -> str:
     """Return the endpoint of the first loopback port that is free. Port 0 is any free one. Raises ConnectError if none is."""
     for port in ports:
-        with socket.socket() as probe:
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError:
-                continue
-            return _endpoint(probe.getsockname()[1])
+        try:
+            with socket.create_server(("127.0.0.1", port)) as probe:
+                return _endpoint(probe.getsockname()[1])
+        except OSError:
+            continue
     raise ConnectError(
         f"no free port among {PORTS.start} to {PORTS.stop - 1} on 127.0.0.1: end a session that is not needed, or give --listen tcp/127.0.0.1:PORT"
     )
