@@ -145,7 +145,7 @@ class Recorder:
                 for part in _chunks(queue):
                     self._file.add_chunk(chunk_data(part))
                     written += len(part)
-            except OSError as error:
+            except Exception as error:  # noqa: BLE001 - whatever it is, the session goes on and the recording is marked
                 self._fail(error)
                 self._dropped += len(queue) - written
 
@@ -163,10 +163,10 @@ class Recorder:
             why = "it is closed" if self._closing else f"{len(self._queue)} messages wait for the disk"
             _log.error("recorder of '%s' drops messages, because %s: the recording is incomplete", self.directory, why)
 
-    def _fail(self, error: OSError) -> None:
+    def _fail(self, error: Exception) -> None:
         self._refusing = True
         if self._error is None:
-            self._error = error.strerror or str(error)
+            self._error = error.strerror if isinstance(error, OSError) and error.strerror else f"{type(error).__name__}: {error}"
             _log.error("recording to '%s' has stopped: %s. The session goes on; its recording is incomplete", self.directory, self._error)
 
 

@@ -22,6 +22,7 @@ class ReplaySummary:
     """What was republished."""
 
     session: str
+    messages: int
     by_topic: dict[str, int]
     """Messages published of each topic."""
     sim_time_s: float
@@ -29,11 +30,6 @@ class ReplaySummary:
     wall_time_s: float
     interrupted: bool
     """Stopped before the end."""
-
-    @property
-    def messages(self) -> int:
-        """Messages published in all."""
-        return sum(self.by_topic.values())
 
 
 def is_replayed(topic: str) -> bool:
@@ -65,7 +61,7 @@ def replay(recording: Recording, session: zenoh.Session, rate: float = 1.0, *, n
             interrupted = not player.play(publishers)
         except KeyboardInterrupt:
             interrupted = True
-    return ReplaySummary(name, player.by_topic, player.sim_time_ns * 1e-9, time.monotonic() - begin, interrupted)
+    return ReplaySummary(name, sum(player.by_topic.values()), player.by_topic, player.sim_time_ns * 1e-9, time.monotonic() - begin, interrupted)
 
 
 class _Player:
