@@ -1,0 +1,75 @@
+"""A prescribed probe motion against a Bullet engine, and (run as a program) the state hashes of one press."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from engines.bullet.engine import BulletEngine, BulletParams
+from hub.inputs import Inputs
+from hub.participant import BondPlan, Setup
+
+MS = 1_000_000
+BLOCK = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa"}
+SMALL_BLOCK = {**BLOCK, "nodes": 75}
+RADIUS = 5e-3
+
+
+def params(block=BLOCK, probe=None, **rest):
+    return BulletParams.model_validate({"organs": {"block": block}, "probes": {"probe": probe or {}}, **rest})
+
+
+class Rig:
+    """Moves the probe from `start` (m) on straight lines at constant speed, and keeps what came out."""
+
+    def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=BondPlan(prediction="velocity", mean=True)):
+        self.engine = BulletEngine("tissue", model or params())
+        self.period, self.t = period, 0
+        self.outputs = dict(self.engine.configure(Setup(period, Path(), {"probe": plan})))
+        self.pose = np.array([*start, 0.0, 0.0, 0.0, 1.0])
+        self.twist = np.zeros(6)
+        self.inputs = Inputs({"probe/pose": self.pose, "probe/twist": self.twist})
+        self.wrenches, self.hashes, self.power = [], [], []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.engine.close()
+
+    def move(self, target, seconds):
+        """Return the wrenches of this stretch, shape (steps, 6)."""
+        steps = round(seconds * 1e9 / self.period)
+        start = self.pose[:3].copy()
+        self.twist[:3] = (np.asarray(target) - start) / seconds
+        for i in range(steps):
+            self.pose[:3] = start + (np.asarray(target) - start) * i / steps
+            self.outputs |= self.engine.step(self.t, self.period, self.inputs)
+            self.t += self.period
+            self.wrenches.append(self.outputs["probe/wrench"].copy())
+            self.power.append(-self.wrenches[-1] @ self.twist)
+            self.hashes.append(self.engine.state_hash())
+        self.pose[:3], self.twist[:3] = target, 0.0
+        return np.array(self.wrenches[-steps:])
+
+    def hold(self, seconds):
+        return self.move(self.pose[:3].copy(), seconds)
+
+    @property
+    def force(self):
+        return self.wrenches[-1][:3]
+
+    @property
+    def nodes(self):
+        return self.outputs["block/nodes"].nodes_m.astype(float).reshape(-1, 3)
+
+
+def press_hashes():
+    with Rig(params(SMALL_BLOCK)) as rig:
+        rig.move((0.001, 0.0, RADIUS - 3e-3), 0.1)
+        rig.hold(0.1)
+        return rig.hashes
+
+
+if __name__ == "__main__":
+    sys.stdout.write(" ".join(f"{value:016x}" for value in press_hashes()))
