@@ -1,0 +1,1 @@
+"""Stepped participants without physics."""

@@ -65,7 +65,12 @@ class MujocoEngine(Stepped):
 
     def configure(self, setup: Setup) -> Outputs:
         """Build and compile the model, and put the arms where they start."""
-        self._check_periods(setup.period_ns)
+        timestep, period = self.params.timestep, setup.period_ns
+        if period % timestep:
+            problem = (
+                f"timestep {timestep / 1e6:g} ms does not divide the participant's period {period / 1e6:g} ms; set it to {period / 1e6:g} ms or a part of it"
+            )
+            raise ScenarioError(problem, path=("participants", self.name, "timestep"))
         if find_spec("mujoco") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind mujoco)", "mujoco", "mujoco")
         import mujoco
@@ -93,13 +98,6 @@ class MujocoEngine(Stepped):
         self._size = mujoco.mj_stateSize(self._model, mujoco.mjtState.mjSTATE_INTEGRATION)
         self._state = np.empty(self._size + sum(motion.state.size for motion in self._motions))
         return self._outputs
-
-    def _check_periods(self, period: int) -> None:
-        timestep, publish = self.params.timestep, self.params.publish_period
-        if period % timestep:
-            raise ScenarioError(f"participant '{self.name}': timestep {timestep} ns does not divide the period {period} ns; set timestep to a divisor of it")
-        if publish % period:
-            raise ScenarioError(f"participant '{self.name}': publish_period {publish} ns is no multiple of the period {period} ns; set it to one")
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""

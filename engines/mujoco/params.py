@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Literal, Self
+from typing import Literal
 
-import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field
 
 from hub.participant import Params
 from robots.dvrk import psm
 from robots.dvrk.instruments import INSTRUMENTS, Instrument
+from robots.dvrk.parameters import ArmName, PsmPositions, UnitQuaternion
 from robots.serial_chain import SerialChain
-from schemas.quantity import Angle, Duration, Length
+from schemas.quantity import Duration, Length
 
 __all__ = ["ArmParams", "MujocoParams"]
-
-JointPositions = tuple[Angle, Angle, Length, Angle, Angle, Angle]
-
-
-def _unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
-    if abs(float(np.linalg.norm(value)) - 1.0) > 1e-6:
-        raise ValueError(f"{value} is no unit quaternion (x, y, z, w): its norm is {float(np.linalg.norm(value)):.6g}")
-    return value
 
 
 class ArmParams(Params):
@@ -31,10 +23,8 @@ class ArmParams(Params):
     instrument: Literal["palpation-probe"] = "palpation-probe"
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the probe's sphere")
     position: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="of the remote centre of motion in the world")
-    orientation: Annotated[tuple[float, float, float, float], AfterValidator(_unit_quaternion)] = Field(
-        default=(0.0, 0.0, 0.0, 1.0), description="of the arm's base frame in the world: quaternion x, y, z, w"
-    )
-    start: JointPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
+    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the arm's base frame in the world: quaternion x, y, z, w")
+    start: PsmPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
 
     @property
     def tool(self) -> Instrument:
@@ -46,18 +36,11 @@ class ArmParams(Params):
         """The arm's kinematics."""
         return psm.chain(self.tool)
 
-    @model_validator(mode="after")
-    def _start_in_range(self) -> Self:
-        for joint, q in zip(self.chain.joints, self.start, strict=True):
-            if not joint.lower <= q <= joint.upper:
-                raise ValueError(f"start: {joint.name} {q:g} is out of its range {joint.lower:g} .. {joint.upper:g}")
-        return self
-
 
 class MujocoParams(Params):
     """A world with dVRK arms."""
 
     model: Literal["dvrk"] = "dvrk"
-    arms: dict[Literal["PSM1", "PSM2", "PSM3"], ArmParams] = Field(min_length=1)
+    arms: dict[ArmName, ArmParams] = Field(min_length=1)
     timestep: Duration = Field(default=500_000, gt=0, description="sub-step of the physics; divides the participant's period")
     publish_period: Duration = Field(default=5_000_000, gt=0, description="at which measured_cp and setpoint_js are published; a multiple of the period")
