@@ -82,7 +82,7 @@ class Recording(Bag):
         for message in self.messages(topic_name):
             try:
                 codec = codec or VectorCodec(output_port(topic_name, message.type, message.payload))
-                values.append(codec.decode(message.payload))
+                values.append(_vector(codec, message.payload))
             except MessageError as error:
                 raise RecordingError(f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}") from error
             times.append(message.time_ns)
@@ -97,3 +97,10 @@ class Recording(Bag):
                 yield message.time_ns, decode(model, message.payload)
             except MessageError as error:
                 raise RecordingError(f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}") from error
+
+
+def _vector(codec: VectorCodec, payload: bytes) -> Vector:
+    try:
+        return codec.decode(payload)
+    except MessageError:  # a device may write joints in another order, or leave the frame out
+        return codec.from_message(decode(codec.model, payload))

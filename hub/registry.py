@@ -6,17 +6,20 @@ A package brings its own kinds by an entry point in one of the groups `trocar.en
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, distribution, entry_points
+from pathlib import Path
+from typing import Any
 
 from packaging.requirements import Requirement
+from pydantic import ValidationError
 
 from hub.participant import Device, Stepped
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 
-__all__ = ["GROUPS", "Kind", "Participant", "broken", "installed_packages", "kinds", "load", "missing_packages", "require_extra"]
+__all__ = ["GROUPS", "Kind", "Participant", "broken", "find", "installed_packages", "kinds", "load", "make", "missing_packages", "require_extra"]
 
 Participant = type[Stepped] | type[Device]
 
@@ -49,13 +52,22 @@ def kinds() -> dict[str, Kind]:
     return found
 
 
+def find(name: str) -> Kind:
+    """Return the kind called `name`: an installed one, or `module:Class` for a class of one's own on PYTHONPATH.
+
+    Raises ScenarioError if there is none.
+    """
+    if name in kinds():
+        return kinds()[name]
+    if ":" in name:
+        return Kind(name, "engine", "PYTHONPATH", EntryPoint(name, name, "trocar.engines"))
+    raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}")
+
+
 @cache
 def load(name: str) -> Participant:
     """Return the class of kind `name`. Raises ScenarioError if there is no such kind or its package cannot be imported."""
-    try:
-        kind = kinds()[name]
-    except KeyError:
-        raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}") from None
+    kind = find(name)
     try:
         loaded = kind.entry.load()
     except Exception as error:  # whatever a plugin's module does on import
@@ -65,6 +77,19 @@ def load(name: str) -> Participant:
     if not (isinstance(loaded, type) and issubclass(loaded, Device if kind.role == "device" else Stepped)):
         raise ScenarioError(f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no {'Device' if kind.role == 'device' else 'Stepped'}")
     return loaded
+
+
+def make(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Stepped | Device:
+    """Return a participant of kind `name`; relative paths in its parameters start at `directory`.
+
+    Raises ScenarioError if the kind cannot be loaded or the parameters are none of it.
+    """
+    kind = load(name)
+    try:
+        checked = kind.params_model.model_validate(params, context={"directory": directory})
+    except ValidationError as error:
+        raise ScenarioError(f"participant '{participant}' of kind '{name}': {error}") from error
+    return kind(participant, checked)
 
 
 def broken() -> dict[str, str]:
@@ -80,7 +105,7 @@ def broken() -> dict[str, str]:
 
 def require_extra(name: str) -> None:
     """Raise MissingExtraError if kind `name` belongs to an extra of which a package is not installed."""
-    kind = kinds()[name]
+    kind = find(name)
     for package in missing_packages(kind.entry.dist, name):
         raise MissingExtraError(f"{kind.role} '{name}'", name, package, kind.distribution)
 

@@ -10,9 +10,10 @@ from rich.console import Console
 from rich.markup import escape
 
 from hub import doctor as doctor_module
-from hub import registry
+from hub.launch import plan_of
 from hub.command_line.display import console, table
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
+from hub.plan import Plan
 from hub.scenario_file import load
 from hub.scenario_schema import scenario_schema
 
@@ -21,19 +22,29 @@ __all__ = ["check", "doctor", "ls", "schema"]
 
 def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json = False) -> None:
     """Check a scenario without starting anything, and show its ports and wiring."""
-    from hub.plan import make_plan
-
     loaded = load(scenario, overrides or ())
-    specs = loaded.scenario.participants
     with locating(loaded.source):
-        participants = {name: registry.load(spec.kind)(name, loaded.params[name]) for name, spec in specs.items()}
-        plan = make_plan(loaded.scenario, participants, {name: registry.kinds()[spec.kind].role for name, spec in specs.items()})
+        plan = plan_of(loaded.scenario, loaded.params)[0]
     if as_json:
         typer.echo(plan.model_dump_json(indent=2))
         return
-    rows = [(m.name, m.kind, m.role, m.host, port.name, port.causality, port.type, port.unit, port.frame) for m in plan.members.values() for port in m.ports]
-    console.print(table(rows, "participant", "kind", "role", "host", "port", "causality", "type", "unit", "frame"))
+    _print_plan(plan)
     console.print(f"[green]{loaded.source.file} is a valid scenario.")
+
+
+def _print_plan(plan: Plan) -> None:
+    """Print every participant with its ports, and who feeds its inputs."""
+    feeds = {(link.target, link.target_port): f"{link.source}.{link.source_port}" for link in plan.links}
+    feeds |= {(inlet.target, inlet.target_port): f"{inlet.device}.{inlet.device_port}" for inlet in plan.inlets}
+    for member in plan.members.values():
+        console.print(f"[bold]{member.name}[/] ({member.role} of kind {member.kind}) on host {member.host}")
+        for port in member.ports:
+            detail = " ".join(part for part in (port.type, port.unit, port.frame and f"in {port.frame}") if part)
+            source = feeds.get((member.name, port.name))
+            console.print(
+                f"    {'->' if port.causality == 'output' else '<-'} {port.name}  [dim]{detail}[/]{f'  from {source}' if source else ''}", soft_wrap=True
+            )
+    console.print(f"they step in the order {', '.join(plan.order)}")
 
 
 def ls(

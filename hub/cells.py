@@ -1,0 +1,90 @@
+"""Where the values of one output port wait for whoever needs them: the same rules inside a process and between processes.
+
+A value carries the step in which its source computed it (the *tag*; -1 for the value at time 0). Readers ask for a
+tag, never for "the newest", so that the result does not depend on timing or on who runs where.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from schemas.errors import SessionError
+
+__all__ = ["INITIAL", "Cell", "RemoteCell"]
+
+INITIAL = -1
+
+
+class Receiver(Protocol):
+    """Where a remote cell's values come from."""
+
+    def receive(self) -> tuple[int, Any]:
+        """Wait for the next valid value; return its tag and the value."""
+        ...
+
+    def poll(self) -> tuple[int, Any] | None:
+        """Return the next valid value if one is here."""
+        ...
+
+
+class Cell:
+    """The last values of one output port of a participant in this process."""
+
+    def __init__(self, stride: int, depth: int) -> None:
+        """Take the steps between two values, and how many values readers may look back."""
+        self.stride = stride
+        self._depth = depth
+        self._values: dict[int, Any] = {}
+
+    def put(self, tag: int, value: Any) -> None:
+        """Store the value computed in step `tag`; an array is copied if readers look back, as its owner may reuse it."""
+        if self._depth == 1:
+            self._values = {tag: value}
+            return
+        self._values[tag] = value.copy() if isinstance(value, np.ndarray) else value
+        if len(self._values) > self._depth:
+            del self._values[next(iter(self._values))]
+
+    def get(self, tag: int) -> Any:
+        """Return the value computed in step `tag`."""
+        return self._values[tag]
+
+    def tag(self, step: int, *, fresh: bool) -> int:
+        """Return the tag that a reader in `step` sees: the newest started (fresh) or the newest completed by then."""
+        periods = step // self.stride
+        return periods * self.stride if fresh else (periods - 1) * self.stride if periods else INITIAL
+
+    def before(self, tag: int) -> int:
+        """Return the tag of the value before `tag`."""
+        return max(tag - self.stride, INITIAL) if tag > INITIAL else INITIAL
+
+
+class RemoteCell(Cell):
+    """The values of an output port of a participant in another process; `get` waits for them to arrive."""
+
+    def __init__(self, stride: int, depth: int, receiver: Receiver) -> None:
+        """Take where the values come from."""
+        super().__init__(stride, depth)
+        self._receiver = receiver
+        self._newest = INITIAL - 1
+
+    def primed(self) -> bool:
+        """Say whether the value at time 0 is here; later values must not have been asked for yet."""
+        while INITIAL not in self._values and (arrived := self._receiver.poll()) is not None:
+            self._keep(*arrived)
+        return INITIAL in self._values
+
+    def _keep(self, tag: int, value: Any) -> None:
+        if tag > self._newest:  # the value at time 0 is sent until every host has it; whatever else is old is a repetition
+            self._newest = tag
+            self.put(tag, value)
+
+    def get(self, tag: int) -> Any:
+        """Return the value computed in step `tag`, as soon as it is here."""
+        while tag not in self._values:
+            if self._newest > tag:
+                raise SessionError(f"the value of step {tag} was lost on its way: step {self._newest} arrived instead")
+            self._keep(*self._receiver.receive())
+        return self._values[tag]

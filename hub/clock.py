@@ -1,0 +1,62 @@
+"""The clock: how far each grant goes, and when it may be given."""
+
+from __future__ import annotations
+
+from time import monotonic_ns, sleep
+
+from hub.plan import Plan
+
+__all__ = ["Clock"]
+
+
+class Clock:
+    """Hands out horizons in steps. Pace `fast` never waits; `realtime` follows the wall clock and counts what comes late."""
+
+    def __init__(self, plan: Plan, *, window: int, realtime: bool, steps: int | None) -> None:
+        """Take the most steps of a grant, the pace, and the number of steps of the whole run (None: until stopped)."""
+        self.step_ns = plan.step_ns
+        self.step = 0
+        self.late_steps = 0
+        self._window = window
+        self._realtime = realtime
+        self._steps = steps
+        self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets})
+        self._wall_zero_ns = monotonic_ns()
+
+    @property
+    def time_ns(self) -> int:
+        """Simulated time of the present communication point."""
+        return self.step * self.step_ns
+
+    @property
+    def done(self) -> bool:
+        """Say whether the run has all its steps."""
+        return self._steps is not None and self.step >= self._steps
+
+    def horizon(self, most: int | None = None) -> int:
+        """Return how many steps the next grant covers.
+
+        No participant that listens to a device may start a step inside a grant, or it would miss the newest samples.
+        """
+        count = self._window if most is None else min(self._window, most)
+        if self._steps is not None:
+            count = min(count, self._steps - self.step)
+        for period in self._periods:
+            count = min(count, period - self.step % period)
+        return count
+
+    def start(self) -> None:
+        """Let wall time run from here, at the beginning and after a pause."""
+        self._wall_zero_ns = monotonic_ns() - self.time_ns
+
+    def advance(self, count: int) -> None:
+        """Go on by `count` steps; in real time wait for the wall clock, or slip by as much as the steps came late."""
+        self.step += count
+        if not self._realtime:
+            return
+        ahead_ns = self._wall_zero_ns + self.time_ns - monotonic_ns()
+        if ahead_ns >= 0:
+            sleep(ahead_ns / 1e9)
+        else:
+            self.late_steps += count
+            self._wall_zero_ns -= ahead_ns

@@ -1,0 +1,188 @@
+"""The control queryables of a session: join, pause, resume, step, set, shutdown; and the questions to ask them with.
+
+Requests and replies are `std_msgs/String` messages that hold JSON.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import zenoh
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from zenoh.handlers import Callback
+
+from hub.plan import Plan
+from schemas.codec import decode, encode
+from schemas.errors import ConnectError, MessageError, TrocarError
+from schemas.keys import Keys
+from schemas.ports import BondSide
+from schemas.ros import StringMessage
+
+__all__ = ["ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask"]
+
+log = logging.getLogger(__name__)
+
+
+class _Json(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Empty(_Json):
+    """Nothing to say."""
+
+
+class Refusal(_Json):
+    """The reply to a request that is refused."""
+
+    refused: str
+
+
+class StepRequest(_Json):
+    """Take this many steps, then pause."""
+
+    steps: int = Field(default=1, ge=1)
+
+
+class SetRequest(_Json):
+    """Write `value` to an input that nothing feeds: numbers for a vector, else the message as JSON."""
+
+    participant: str
+    port: str
+    value: Any
+
+
+class JoinRequest(_Json):
+    """A host process presents itself (first request), and says that its participants are configured (second)."""
+
+    host: str
+    pid: int
+    ready: bool = False
+    bonds: dict[str, tuple[BondSide, ...]] = {}
+    failed: str = ""
+    """Why the host cannot go on: `participant: cause`."""
+
+
+class JoinReply(_Json):
+    """All that a host needs to make its participants."""
+
+    run: int
+    plan: Plan
+    params: dict[str, dict[str, Any]]
+    directory: str
+
+
+class RunState:
+    """Whether the session runs, is paused or is to end; shared by the clock loop and the control threads."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._budget: int | None = None
+        self._ending = False
+
+    def pause(self) -> None:
+        """Take no further step."""
+        self._set(0)
+
+    def resume(self) -> None:
+        """Go on without limit."""
+        self._set(None)
+
+    def step(self, steps: int) -> None:
+        """Take `steps` more steps, then pause."""
+        with self._changed:
+            self._budget = steps + (self._budget or 0)
+            self._changed.notify_all()
+
+    def shutdown(self) -> None:
+        """End the session in good order at the next communication point."""
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+
+    def _set(self, budget: int | None) -> None:
+        with self._changed:
+            self._budget = budget
+            self._changed.notify_all()
+
+    @property
+    def paused(self) -> bool:
+        """Say whether no step may be taken now."""
+        return self._budget == 0
+
+    @property
+    def ending(self) -> bool:
+        """Say whether the session is to end."""
+        return self._ending
+
+    @property
+    def budget(self) -> int | None:
+        """Steps that may be taken before the next pause; None: no limit."""
+        return self._budget
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait while paused, at most `timeout_s`; say whether the session may go on."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._budget != 0 or self._ending, timeout_s)
+            return self._budget != 0 or self._ending
+
+    def spend(self, steps: int) -> None:
+        """Count steps that were taken."""
+        with self._changed:
+            if self._budget is not None:
+                self._budget = max(self._budget - steps, 0)
+
+
+Handler = Callable[[Any], BaseModel]
+
+
+class ControlServer:
+    """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
+
+    def __init__(self, session: zenoh.Session, keys: Keys, handlers: Mapping[str, tuple[type[BaseModel], Handler]]) -> None:
+        """Take a request model and a handler per verb."""
+        self._queryables = [self._declare(session, keys.control(verb), model, handler) for verb, (model, handler) in handlers.items()]
+
+    def _declare(self, session: zenoh.Session, key: str, model: type[BaseModel], handler: Handler) -> zenoh.Queryable[None]:
+        def answer(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    payload = b"" if query.payload is None else query.payload.to_bytes()
+                    text = decode(StringMessage, payload).data if payload else "{}"
+                    reply = handler(model.model_validate_json(text))
+                except (TrocarError, ValidationError) as error:
+                    log.warning("refused a request on %s: %s", key, error)
+                    reply = Refusal(refused=str(error))
+                query.reply(key, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
+
+        return session.declare_queryable(key, Callback(answer, indirect=True))
+
+    def close(self) -> None:
+        """Answer no more."""
+        for queryable in self._queryables:
+            queryable.undeclare()
+
+
+R = TypeVar("R", bound=BaseModel)
+
+
+def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R], *, timeout_s: float = 5.0) -> R:
+    """Send a control request and return the reply.
+
+    Raises ConnectError if nobody answers in time, MessageError if the request is refused.
+    """
+    replies = session.get(key, payload=encode(StringMessage(data=request.model_dump_json())), timeout=timeout_s)
+    for reply in replies:
+        if reply.ok is None:
+            continue
+        text = decode(StringMessage, reply.ok.payload.to_bytes()).data
+        try:
+            return reply_model.model_validate_json(text)
+        except ValidationError:
+            try:
+                raise MessageError(Refusal.model_validate_json(text).refused) from None
+            except ValidationError as error:
+                raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
+    raise ConnectError(f"nobody answers on {key}: is the hub running, and is the session's name right?")

@@ -1,0 +1,327 @@
+"""One process' share of a session: steps its participants in order, hands their values on, and books what they did.
+
+The host does not know whether a value comes from a neighbour in this process or from another one: both are cells.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+
+from hub.cells import INITIAL, Cell
+from hub.inputs import Inputs
+from hub.participant import Outputs, Setup, Stepped
+from hub.plan import Member, Plan
+from hub.wire import PortCodec, PortPublisher, Wire
+from schemas.errors import MessageError, ParticipantError, TrocarError
+from schemas.ports import BondSide, Port
+from schemas.trocar_msgs import Ack, Grant
+
+__all__ = ["Done", "Host", "Tap"]
+
+log = logging.getLogger(__name__)
+
+Tap = Callable[[Member, Port, int, int, Any], None]
+"""Is shown every output value: participant, port, step, time (ns) at which it is valid, value."""
+
+Done = Callable[[str, Ack], None]
+"""Gets the ack of a participant that has done its part of a grant."""
+
+
+@dataclass(slots=True)
+class _Reader:
+    """An input port, the cell that feeds it, and how it is read."""
+
+    port: str
+    cell: Cell
+    fresh: bool
+    linear: bool
+    event: bool
+    stride_s: float
+    seen: int = INITIAL
+
+
+@dataclass(slots=True)
+class _Sink:
+    """An output port and everywhere its value goes."""
+
+    port: Port
+    stride: int
+    vector: bool
+    cell: Cell | None
+    publisher: PortPublisher | None
+
+
+@dataclass(slots=True)
+class _Slot:
+    """A participant and all that its steps need, laid out for the step loop."""
+
+    participant: Stepped
+    member: Member
+    h_ns: int
+    inputs: Inputs
+    values: dict[str, Any]
+    rates: dict[str, Any]
+    events: dict[str, tuple[Any, ...]]
+    stale: set[str]
+    readers: list[_Reader] = field(default_factory=list[_Reader])
+    sinks: list[_Sink] = field(default_factory=list[_Sink])
+    work_ports: tuple[str, ...] = ()
+    hashes: list[int] = field(default_factory=list[int])
+    compute_ns: list[int] = field(default_factory=list[int])
+    work_j: list[float] = field(default_factory=list[float])
+
+
+class Host:
+    """The stepped participants of one process."""
+
+    def __init__(self, name: str, plan: Plan, participants: Mapping[str, Stepped], *, wire: Wire | None = None, tap: Tap | None = None) -> None:
+        """Lay out the participants of host `name`; `wire` carries values to and from other processes, `tap` sees every output."""
+        self.name = name
+        self.plan = plan
+        self._wire = wire
+        self._tap = tap
+        self._slots = [self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name]
+        self._by_name = {slot.member.name: slot for slot in self._slots}
+        self._remote: dict[tuple[str, str], Cell] = {}
+        self._inlets: dict[tuple[str, str], list[tuple[_Slot, str, PortCodec]]] = {}
+        self._initial: list[tuple[PortPublisher, Any]] = []
+        for slot in self._slots:
+            self._lay_sinks(slot)
+        for slot in self._slots:
+            self._lay_readers(slot)
+        self._lay_inlets()
+
+    # --- laying out ------------------------------------------------------------------------------------------------
+
+    def _slot(self, member: Member, participant: Stepped) -> _Slot:
+        values = {port.name: _start_value(port) for port in member.ports if port.causality == "input" and port.variability == "signal"}
+        inputs = Inputs(values)
+        rates, events, stale = inputs._rates, inputs._events, inputs._stale  # noqa: SLF001  # pyright: ignore[reportPrivateUsage]  # the host fills them
+        slot = _Slot(participant, member, member.period * self.plan.step_ns, inputs, values, rates, events, stale)
+        slot.work_ports = tuple(f"{bond.name}/work" for bond in member.bonds)
+        return slot
+
+    def _depth(self, source: str, port: str, *, here: bool | None = None) -> int:
+        """Return how many values of an output readers look back: none in this process, one for the newest only, more for the last ones."""
+        depth = 0
+        for link in self.plan.links:
+            target = self.plan.members[link.target]
+            if (link.source, link.source_port) != (source, port) or (here and target.host != self.name):
+                continue
+            back = max(target.period // self.plan.stride(source, port), 1)
+            depth = max(depth, (1 if link.fresh else 2) + link.linear + (back if target.port(link.target_port).variability == "event" else 0))
+        return depth
+
+    def _lay_sinks(self, slot: _Slot) -> None:
+        member = slot.member
+        for port in member.ports:
+            if port.causality == "input":
+                continue
+            stride = self.plan.stride(member.name, port.name)
+            depth = self._depth(member.name, port.name, here=True)
+            elsewhere = any(
+                (k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links
+            )
+            publisher = self._wire.publisher(member, port, always=elsewhere) if self._wire else None
+            slot.sinks.append(_Sink(port, stride, PortCodec(port).vector is not None, Cell(stride, depth) if depth else None, publisher))
+
+    def _lay_readers(self, slot: _Slot) -> None:
+        for link in self.plan.links:
+            if link.target != slot.member.name:
+                continue
+            stride = self.plan.stride(link.source, link.source_port)
+            event = slot.member.port(link.target_port).variability == "event"
+            slot.readers.append(
+                _Reader(link.target_port, self._cell(link.source, link.source_port), link.fresh, link.linear, event, stride * self.plan.step_ns / 1e9)
+            )
+
+    def _cell(self, source: str, port: str) -> Cell:
+        if source in self._by_name:
+            return next(sink.cell for sink in self._by_name[source].sinks if sink.port.name == port and sink.cell is not None)
+        if (source, port) not in self._remote:
+            if self._wire is None:
+                raise ValueError(f"'{source}' is in another process, and this host has no wire")
+            member = self.plan.members[source]
+            self._remote[source, port] = self._wire.cell(member, member.port(port), self.plan.stride(source, port), self._depth(source, port))
+        return self._remote[source, port]
+
+    def _lay_inlets(self) -> None:
+        for inlet in self.plan.inlets:
+            if inlet.target in self._by_name:
+                slot, port = self._by_name[inlet.target], self.plan.members[inlet.target].port(inlet.target_port)
+                self._inlets.setdefault((inlet.device, inlet.device_port), []).append((slot, port.name, PortCodec(port)))
+                if port.variability == "signal":
+                    slot.stale.add(port.name)
+        fed = {(link.target, link.target_port) for link in self.plan.links} | {(i.target, i.target_port) for i in self.plan.inlets}
+        for slot in self._slots:
+            for port in slot.member.ports:
+                if port.causality == "input" and (slot.member.name, port.name) not in fed:
+                    self._inlets[slot.member.name, port.name] = [(slot, port.name, PortCodec(port))]
+
+    # --- running ---------------------------------------------------------------------------------------------------
+
+    @property
+    def members(self) -> Sequence[Member]:
+        """The participants of this host, in step order."""
+        return [slot.member for slot in self._slots]
+
+    def configure(self, directory: Path) -> dict[str, tuple[BondSide, ...]]:
+        """Configure every participant and publish its outputs at time 0; returns the bonds with the numbers now known.
+
+        Raises ParticipantError naming the one that failed.
+        """
+        bonds: dict[str, tuple[BondSide, ...]] = {}
+        for slot in self._slots:
+            setup = Setup(period_ns=slot.h_ns, directory=directory, bonds=slot.member.bond_plans)
+            try:
+                outputs = slot.participant.configure(setup)
+            except TrocarError as error:
+                raise ParticipantError(slot.member.name, INITIAL, str(error)) from error
+            except Exception as error:
+                log.exception("participant '%s' raised while it was configured", slot.member.name)
+                raise ParticipantError(slot.member.name, INITIAL, f"{type(error).__name__}: {error}") from error
+            self._hand_on(slot, INITIAL, 0, outputs)
+            bonds[slot.member.name] = slot.participant.bonds
+        return bonds
+
+    def publish_initial(self) -> None:
+        """Publish the outputs at time 0 once more, for hosts that were not yet listening."""
+        for publisher, value in self._initial:
+            publisher.put(INITIAL, 0, value)
+
+    def linked(self) -> bool:
+        """Say whether the values at time 0 of all other hosts that this one needs are here."""
+        return self._wire is None or self._wire.linked()
+
+    def due(self, step: int, count: int) -> list[str]:
+        """Return who steps at least once in `count` steps from `step`, in step order."""
+        return [s.member.name for s in self._slots if -step % s.member.period < count]
+
+    def run(self, grant: Grant, done: Done) -> None:
+        """Take what enters with `grant` and step to its horizon; `done` gets the ack of each participant as soon as it is through.
+
+        Raises ParticipantError.
+        """
+        for sample in grant.inlets:
+            for slot, port, codec in self._inlets.get((sample.participant, sample.port), ()):
+                self._enter(slot, port, codec, sample.payload.tobytes(), stale=sample.stale)
+        step_ns = self.plan.step_ns
+        end = grant.horizon_ns // step_ns
+        for slot in self._slots:
+            slot.hashes, slot.compute_ns, slot.work_j = [], [], []
+        for step in range(grant.step, end):
+            for slot in self._slots:
+                period = slot.member.period
+                if not step % period:
+                    self._step(slot, step, step * step_ns)
+                    if step + period >= end:
+                        done(slot.member.name, _ack(grant, slot))
+
+    def _step(self, slot: _Slot, step: int, t: int) -> None:
+        for reader in slot.readers:
+            self._read(slot, reader, step)
+        begun = perf_counter_ns()
+        try:
+            outputs = slot.participant.step(t, slot.h_ns, slot.inputs)
+            slot.hashes.append(slot.participant.state_hash())
+            slot.compute_ns.append(perf_counter_ns() - begun)
+            self._hand_on(slot, step, t + slot.h_ns, outputs)
+            for port in slot.work_ports:
+                slot.work_j.append(float(outputs[port][0]))  # pyright: ignore[reportArgumentType, reportIndexIssue]
+        except ParticipantError:
+            raise
+        except TrocarError as error:
+            raise ParticipantError(slot.member.name, step, str(error)) from error
+        except Exception as error:
+            log.exception("participant '%s' raised in step %d", slot.member.name, step)
+            raise ParticipantError(slot.member.name, step, f"{type(error).__name__}: {error}") from error
+        if slot.events:
+            slot.events.clear()
+
+    def _read(self, slot: _Slot, reader: _Reader, step: int) -> None:
+        cell = reader.cell
+        tag = cell.tag(step, fresh=reader.fresh)
+        if reader.event:
+            arrived: list[Any] = []
+            while reader.seen < tag:
+                reader.seen = reader.seen + cell.stride if reader.seen > INITIAL else 0
+                arrived.extend(cell.get(reader.seen))
+            if arrived:
+                slot.events[reader.port] = tuple(arrived)
+            return
+        value = slot.values[reader.port] = cell.get(tag)
+        if reader.linear:
+            slot.rates[reader.port] = (value - cell.get(cell.before(tag))) / reader.stride_s
+
+    def _hand_on(self, slot: _Slot, step: int, time_ns: int, outputs: Outputs) -> None:
+        for sink in slot.sinks:
+            if step > INITIAL and step % sink.stride:
+                continue
+            name = sink.port.name
+            if name not in outputs:
+                raise ParticipantError(slot.member.name, step, f"output '{name}' is missing from what step() returned")
+            value: Any = outputs[name]
+            if sink.vector and not isfinite(value @ value):
+                raise ParticipantError(slot.member.name, step, f"output '{name}' is not finite: {value}")
+            if sink.cell is not None:
+                sink.cell.put(step, value)
+            if sink.publisher is not None:
+                sink.publisher.put(step, time_ns, value)
+                if step == INITIAL:
+                    self._initial.append((sink.publisher, value.copy() if sink.vector else value))
+            if self._tap is not None:
+                self._tap(slot.member, sink.port, step, time_ns, value)
+
+    def _enter(self, slot: _Slot, port: str, codec: PortCodec, payload: bytes, *, stale: bool) -> None:
+        if stale:
+            slot.stale.add(port)
+        else:
+            slot.stale.discard(port)
+        if not payload:
+            return
+        try:
+            value = codec.accept(payload)
+        except MessageError as error:
+            log.warning("inlet sample for '%s.%s' refused: %s", slot.member.name, port, error)
+            return
+        if codec.is_event:
+            slot.events[port] = (*slot.events.get(port, ()), value)
+        else:
+            slot.values[port] = value
+
+    def close(self) -> None:
+        """Close every participant, the last first; an error in one does not keep the others open."""
+        for slot in reversed(self._slots):
+            try:
+                slot.participant.close()
+            except Exception:
+                log.exception("participant '%s' raised while it was closed", slot.member.name)
+        if self._wire is not None:
+            self._wire.close()
+
+
+def _ack(grant: Grant, slot: _Slot) -> Ack:
+    return Ack.model_construct(
+        run=grant.run,
+        epoch=grant.epoch,
+        step=grant.step,
+        state_hash=np.array(slot.hashes, np.uint64),
+        compute_ns=np.array(slot.compute_ns, np.uint64),
+        work_j=np.array(slot.work_j, np.float64),
+        error="",
+    )
+
+
+def _start_value(port: Port) -> Any:
+    codec = PortCodec(port)
+    if codec.vector is None:
+        return None
+    return codec.vector.neutral.copy() if port.start is None else np.array(port.start, np.float64)

@@ -1,0 +1,194 @@
+"""A process that runs one host of a session: `python -P -m hub.host_process --connect ENDPOINT --session NAME --host NAME`.
+
+It joins a hub, makes and configures its participants, steps them as grants come, and ends when the hub is gone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import logging
+import os
+import sys
+import threading
+from _thread import interrupt_main
+from collections.abc import Generator
+from importlib.metadata import version
+from pathlib import Path
+from time import sleep
+
+import zenoh
+from zenoh.handlers import Callback, FifoChannel
+
+from hub.control import Empty, JoinReply, JoinRequest, ask
+from hub.devices import DeviceLoop
+from hub.host import Host
+from hub.participant import Device, Stepped
+from hub.registry import make
+from hub.wire import Drops, Wire, open_session
+from schemas.codec import decode, encode
+from schemas.errors import MessageError, ParticipantError, TrocarError
+from schemas.keys import Keys
+from schemas.trocar_msgs import Ack, Grant
+
+__all__ = ["main", "run_host"]
+
+log = logging.getLogger(__name__)
+
+_PRIME_S = 0.01
+_PATIENCE_S = 2.0
+"""How long a participant may go on computing after the hub is gone, before the process is ended under it."""
+
+
+def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | None = None) -> None:
+    """Join session `session_name` over `endpoint` and run host `host` until the hub ends.
+
+    A participant with `host: remote` is a host of its own, called `remote/<participant>`. Relative paths of the scenario
+    start at `directory`, by default where the hub has them.
+
+    Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
+    """
+    keys = Keys(session_name)
+    with open_session("peer", listen=["tcp/127.0.0.1:0"], connect=[endpoint]) as session:
+        request = JoinRequest(host=host, pid=os.getpid())
+        reply = ask(session, keys.control("join"), request, JoinReply, timeout_s=10.0)
+        with _ending_with_hub(session, keys):
+            joined = _JoinedHost(session, keys, host, reply, directory or Path(reply.directory))
+            try:
+                joined.serve(request)
+            finally:
+                joined.close()
+
+
+class _JoinedHost:
+    """The participants of this process and their connection to the hub."""
+
+    def __init__(self, session: zenoh.Session, keys: Keys, host: str, reply: JoinReply, directory: Path) -> None:
+        self._session, self._keys, self._run, self._directory = session, keys, reply.run, directory
+        plan = reply.plan
+        mine = {name: member for name, member in plan.members.items() if member.host == host}
+        made = {name: make(member.kind, name, reply.params[name], directory) for name, member in mine.items()}
+        self._drops = Drops()
+        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
+        self._wire = Wire(session, keys, reply.run)
+        self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
+        self._acks = {
+            member.name: session.declare_publisher(
+                keys.ack(member.name),
+                encoding=zenoh.Encoding.APPLICATION_CDR,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.REAL_TIME,
+                express=True,
+            )
+            for member in self._host.members
+        }
+        self._loops = [
+            DeviceLoop(plan.members[name], plan, device, session, keys, failed=self._device_failed) for name, device in made.items() if isinstance(device, Device)
+        ]
+        self._tokens = [session.liveliness().declare_token(keys.alive(member.key_role, name)) for name, member in mine.items()]
+
+    def serve(self, request: JoinRequest) -> None:
+        """Configure, report ready, prime the links, and step until the hub says that the run is over."""
+        try:
+            bonds = self._host.configure(self._directory)
+            for loop in self._loops:
+                loop.start(self._directory)
+        except ParticipantError as error:
+            ask(self._session, self._keys.control("join"), request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
+            raise
+        ask(self._session, self._keys.control("join"), request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        grant = self._first_grant()
+        while grant.horizon_ns > grant.start_ns:
+            try:
+                self._host.run(grant, self._done)
+            except ParticipantError as error:
+                self._done(error.participant, Ack(run=self._run, epoch=0, step=error.step, error=error.cause))
+                raise
+            grant = self._next_grant()
+
+    def _first_grant(self) -> Grant:
+        """Repeat the values at time 0 until all links have carried theirs and the first grant is here."""
+        told = False
+        while True:
+            self._host.publish_initial()
+            if not told and self._host.linked():
+                told = True
+                for member in self._host.members:
+                    self._done(member.name, Ack(run=self._run, epoch=0, step=-1))
+            if told and (sample := self._grants.try_recv()) is not None:
+                grant = self._accept(sample)
+                if grant is not None:
+                    return grant
+            sleep(_PRIME_S)
+
+    def _next_grant(self) -> Grant:
+        while True:
+            grant = self._accept(self._grants.recv())
+            if grant is not None:
+                return grant
+
+    def _accept(self, sample: zenoh.Sample) -> Grant | None:
+        try:
+            grant = decode(Grant, sample.payload.to_bytes())
+            if grant.run != self._run:
+                raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
+        except MessageError as error:
+            self._drops.count(sample, error)
+            return None
+        return grant
+
+    def _done(self, participant: str, ack: Ack) -> None:
+        self._acks[participant].put(encode(ack))
+
+    def _device_failed(self, name: str, cause: str) -> None:
+        log.error("device '%s' has failed: %s", name, cause)
+
+    def close(self) -> None:
+        """Close devices, participants and publishers."""
+        for loop in self._loops:
+            loop.close()
+        self._host.close()
+        for token in self._tokens:
+            token.undeclare()
+
+
+@contextlib.contextmanager
+def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
+    """Interrupt the main thread when the hub's liveliness token is gone, and end the process if that does not help."""
+    over = threading.Event()
+
+    def gone(sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE and not over.is_set():
+            log.info("the hub is gone")
+            interrupt_main()
+            threading.Thread(target=force, daemon=True).start()
+
+    def force() -> None:
+        if not over.wait(_PATIENCE_S):
+            os._exit(1)
+
+    watch = session.liveliness().declare_subscriber(keys.alive("hub", "hub"), Callback(gone, indirect=True), history=True)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            yield
+    finally:
+        over.set()
+        watch.undeclare()
+
+
+def main() -> None:
+    """Run a host; exit code 1 if one of its participants failed."""
+    parser = argparse.ArgumentParser(prog="python -P -m hub.host_process", description=f"Host process of Trocar {version('trocar')}.")
+    for option in ("--connect", "--session", "--host"):
+        parser.add_argument(option, required=True)
+    arguments = parser.parse_args()
+    logging.basicConfig(level=logging.INFO, format=f"%(levelname)s [{arguments.host}] %(message)s", stream=sys.stderr)
+    try:
+        run_host(arguments.connect, arguments.session, arguments.host)
+    except TrocarError as error:
+        log.error("%s", error)  # noqa: TRY400  # the cause is in the message; the traceback was logged where it happened
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Inlets: where device samples, and values set by hand, enter simulated time.
+
+Samples arrive whenever they like and are checked at once; at a communication point the newest of each stream and all of
+each event queue are written into the grant. Nothing else enters a simulation.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hub.plan import Plan
+from hub.wire import PortCodec
+from schemas.errors import MessageError, did_you_mean
+from schemas.ports import Port
+from schemas.trocar_msgs import InletSample
+
+__all__ = ["Inlets"]
+
+_MOST_QUEUED = 10_000
+"""An event queue longer than this is a flood: further samples are refused until the next communication point."""
+
+
+@dataclass
+class _Inlet:
+    source: str
+    port: str
+    codec: PortCodec
+    max_age_ns: int = 0
+    queue: deque[tuple[bytes, int]] = field(default_factory=deque[tuple[bytes, int]])
+    arrived_ns: int | None = None
+    stale: bool = True
+
+
+class Inlets:
+    """All inlets of a session. `offer` may be called from any thread, `sample` by the clock alone."""
+
+    def __init__(self, plan: Plan) -> None:
+        """Make an inlet of every connected device output, and of every input that nothing feeds."""
+        self._lock = threading.Lock()
+        self._inlets: dict[tuple[str, str], _Inlet] = {}
+        for inlet in plan.inlets:
+            port = plan.members[inlet.target].port(inlet.target_port)
+            known = self._inlets.setdefault((inlet.device, inlet.device_port), _Inlet(inlet.device, inlet.device_port, PortCodec(port)))
+            known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
+        fed = {(link.target, link.target_port) for link in plan.links} | {(i.target, i.target_port) for i in plan.inlets}
+        self._settable = {
+            (member.name, port.name): port
+            for member in plan.members.values()
+            for port in member.ports
+            if member.role != "device" and port.causality == "input" and (member.name, port.name) not in fed
+        }
+        for (name, port_name), port in self._settable.items():
+            self._inlets[name, port_name] = _Inlet(name, port_name, PortCodec(port), stale=False)
+
+    def settable(self, participant: str, port: str) -> Port:
+        """Return the input that `set` may write; raises MessageError if it is fed by a connection or does not exist."""
+        found = self._settable.get((participant, port))
+        if found is None:
+            raise MessageError(f"'{participant}.{port}' cannot be set.{did_you_mean(f'{participant}.{port}', ('.'.join(k) for k in self._settable))}")
+        return found
+
+    def offer(self, participant: str, port: str, payload: bytes, now_ns: int) -> None:
+        """Take a sample that arrived at `now_ns`; raises MessageError if it is none of this port."""
+        inlet = self._inlets.get((participant, port))
+        if inlet is None:
+            raise MessageError(f"no connection takes '{participant}.{port}'")
+        inlet.codec.accept(payload)
+        with self._lock:
+            if not inlet.codec.is_event:
+                inlet.queue.clear()
+            elif len(inlet.queue) >= _MOST_QUEUED:
+                raise MessageError(f"'{participant}.{port}' has {_MOST_QUEUED} samples waiting; this one is refused")
+            inlet.queue.append((payload, now_ns))
+            inlet.arrived_ns = now_ns
+
+    def sample(self, now_ns: int) -> list[InletSample]:
+        """Return what enters at a communication point at `now_ns`: samples that are new, and changes of staleness."""
+        entering: list[InletSample] = []
+        with self._lock:
+            for inlet in self._inlets.values():
+                stale = inlet.stale
+                if inlet.arrived_ns is not None:
+                    stale = bool(inlet.max_age_ns) and now_ns - inlet.arrived_ns > inlet.max_age_ns
+                for payload, arrived_ns in inlet.queue:
+                    entering.append(_sample(inlet, payload, stale=stale, age_ns=now_ns - arrived_ns))
+                if stale != inlet.stale and not inlet.queue:
+                    entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
+                inlet.queue.clear()
+                inlet.stale = stale
+        return entering
+
+
+def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> InletSample:
+    data = np.frombuffer(payload, np.uint8)
+    return InletSample.model_construct(participant=inlet.source, port=inlet.port, stale=stale, payload=data, age_ns=age_ns)

@@ -1,0 +1,53 @@
+"""From a scenario to a session that is ready to run."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import distributions
+from pathlib import Path
+
+from hub import registry
+from hub.participant import Device, Params, Stepped
+from hub.plan import Plan, make_plan
+from hub.scenario_file import ScenarioFile
+from hub.session import Session
+from schemas.scenario import Scenario
+
+__all__ = ["in_one_host", "launch", "plan_of"]
+
+
+def plan_of(scenario: Scenario, params: Mapping[str, Params]) -> tuple[Plan, dict[str, Stepped | Device]]:
+    """Return the wiring of `scenario`, and its participants as they declare themselves; raises ScenarioError."""
+    kinds = {name: spec.kind for name, spec in scenario.participants.items()}
+    participants = {name: registry.load(kind)(name, params[name]) for name, kind in kinds.items()}
+    return make_plan(scenario, participants, {name: registry.find(kind).role for name, kind in kinds.items()}), participants
+
+
+def in_one_host(scenario: Scenario) -> Scenario:
+    """Return `scenario` with every participant in the hub's own process."""
+    participants = {name: spec.model_copy(update={"host": "hub"}) for name, spec in scenario.participants.items()}
+    return scenario.model_copy(update={"participants": participants})
+
+
+def launch(loaded: ScenarioFile, *, endpoint: str | None = None, record: Path | None = None, one_host: bool = False) -> Session:
+    """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process."""
+    scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
+    plan, participants = plan_of(scenario, loaded.params)
+    here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
+    directory = loaded.source.directory
+    attachments = {} if record is None else _attachments(scenario, plan, directory, loaded.source.file)
+    return Session(scenario, plan, here, directory, endpoint=endpoint, record=record, attachments=attachments)
+
+
+def _attachments(scenario: Scenario, plan: Plan, directory: Path, file: Path) -> dict[str, bytes]:
+    """Return what a recording needs to be understood and re-simulated elsewhere."""
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}
+    return {
+        "scenario.yaml": file.read_bytes(),
+        "scenario.json": scenario.model_dump_json(indent=2).encode(),
+        "plan.json": plan.model_dump_json(indent=2).encode(),
+        "versions.json": json.dumps({"directory": str(directory), "packages": versions}, indent=2).encode(),
+    }

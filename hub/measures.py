@@ -1,0 +1,72 @@
+"""Measures: the numbers a scenario wants in its summary, taken from the values of output ports as they come."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hub.plan import Plan, measured_port
+from schemas.scenario import Measure, Scenario
+from schemas.vectors import Vector
+
+__all__ = ["Measures"]
+
+
+class _Meter:
+    def __init__(self, measure: Measure, part: slice) -> None:
+        self.live = measure.live
+        self.unit = measure.unit
+        self.now = 0.0
+        self._kind = measure.kind
+        self._part = part
+        self._peak: float | None = None
+        self._sum = 0.0
+        self._count = 0
+
+    def take(self, value: Vector) -> None:
+        part = value[self._part]
+        self.now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
+        self._peak = self.now if self._peak is None else max(self._peak, self.now)
+        self._sum += self.now
+        self._count += 1
+
+    @property
+    def result(self) -> float | None:
+        if not self._count:
+            return None
+        return {"peak-norm": self._peak, "peak": self._peak, "mean": self._sum / self._count, "final": self.now}[self._kind]
+
+
+class Measures:
+    """All measures of a session. Values of one port come from one thread, in order."""
+
+    def __init__(self, scenario: Scenario, plan: Plan) -> None:
+        self._meters: dict[str, _Meter] = {}
+        self.by_port: dict[tuple[str, str], list[_Meter]] = {}
+        self._lock = threading.Lock()
+        for name, measure in scenario.measure.items():
+            port, part = measured_port(plan.members[measure.of.participant], measure.of.port)
+            meter = self._meters[name] = _Meter(measure, part)
+            self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
+
+    @property
+    def ports(self) -> list[tuple[str, str]]:
+        """The (participant, port) pairs that are measured."""
+        return list(self.by_port)
+
+    def take(self, participant: str, port: str, value: Any) -> None:
+        """Take a value of an output port."""
+        for meter in self.by_port.get((participant, port), ()):
+            with self._lock:
+                meter.take(value)
+
+    def live(self) -> Mapping[str, tuple[float, str]]:
+        """Return the present value and unit of each measure that the progress line shows."""
+        return {name: (meter.now, meter.unit) for name, meter in self._meters.items() if meter.live}
+
+    def results(self) -> dict[str, float | None]:
+        """Return every measure's result; None if its port never spoke."""
+        return {name: meter.result for name, meter in self._meters.items()}

@@ -1,0 +1,134 @@
+"""Everything that watches a session without taking part in it: recorder, measures and energy books."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from hub.cells import INITIAL
+from hub.energy import EnergyBooks
+from hub.measures import Measures
+from hub.plan import Member, Plan
+from hub.recorder import Recorder
+from hub.wire import Drops, PortCodec, Tag
+from schemas.codec import encode
+from schemas.errors import MessageError
+from schemas.keys import Keys, topic
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.trocar_msgs import Ack, Grant, InletSample, SessionStatus
+
+__all__ = ["Observers"]
+
+_ENERGY_PERIOD_NS = 10_000_000
+"""The books change at every step; 100 Hz shows all that a plot can."""
+
+
+@dataclass
+class _Watched:
+    member: Member
+    port: Port
+    codec: PortCodec
+    channel: int
+    newest: int = INITIAL - 1
+
+
+class Observers:
+    """Sees every grant, ack and output value of one run, from this process or from others."""
+
+    def __init__(self, plan: Plan, keys: Keys, run: int, measures: Measures, recorder: Recorder | None) -> None:
+        self.measures = measures
+        self.energy = EnergyBooks(plan)
+        self.drops = Drops()
+        self._run = run
+        self._keys = keys
+        self._recorder = recorder
+        self._watched: dict[str, _Watched] = {}
+        self._channels: dict[str, int] = {}
+        self._next_energy_ns = 0
+        for member in plan.members.values():
+            for port in member.ports:
+                if port.causality == "output":
+                    key = keys.output(member.key_role, member.name, port.name)
+                    self._watched[key] = _Watched(member, port, PortCodec(port), self._channel(key, port.type))
+
+    def _channel(self, key: str, type_name: str) -> int:
+        if self._recorder is None:
+            return 0
+        if key not in self._channels:
+            self._channels[key] = self._recorder.channel(topic(key), type_name)
+        return self._channels[key]
+
+    def subscriptions(self, plan: Plan) -> list[str]:
+        """Return the keys on which values of other processes are to be watched."""
+        away = [w for w in self._watched.values() if w.member.host != "hub" and w.member.role != "device"]
+        measured = set(self.measures.ports)
+        wanted = [w for w in away if self._recorder is not None or (w.member.name, w.port.name) in measured]
+        return [self._keys.output(w.member.key_role, w.member.name, w.port.name) for w in wanted]
+
+    def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
+        """Take an output value of a participant in this process."""
+        if (member.name, port.name) in self.measures.by_port and step > INITIAL:
+            self.measures.take(member.name, port.name, value)
+        if self._recorder is not None:
+            watched = self._watched[self._keys.output(member.key_role, member.name, port.name)]
+            for item in value if watched.codec.is_event else (value,):
+                self._recorder.write(watched.channel, time_ns, watched.codec.encode(item, time_ns))
+
+    def sample(self, sample: zenoh.Sample) -> None:
+        """Take an output value of a participant in another process, as it comes from the wire."""
+        watched = self._watched.get(str(sample.key_expr))
+        try:
+            tag = Tag.of(sample)
+            if watched is None or tag.run != self._run:
+                raise MessageError("belongs to no port of this run")
+            if not tag.count or tag.step < watched.newest or (tag.step == watched.newest and tag.index == 0):
+                return
+            payload = sample.payload.to_bytes()
+            value = watched.codec.decode(payload)
+        except MessageError as error:
+            self.drops.count(sample, error)
+            return
+        watched.newest = tag.step
+        if tag.step > INITIAL and not watched.codec.is_event:
+            self.measures.take(watched.member.name, watched.port.name, value)
+        if self._recorder is not None:
+            self._recorder.write(watched.channel, tag.time_ns, payload)
+
+    def grant(self, grant: Grant, payload: bytes) -> None:
+        """Take a grant and the device samples in it."""
+        if self._recorder is None:
+            return
+        self._recorder.write(self._channel(self._keys.grant, Grant.ros_type), grant.start_ns, payload)
+        for sample in grant.inlets:
+            self._inlet(sample, grant.start_ns)
+
+    def _inlet(self, sample: InletSample, time_ns: int) -> None:
+        watched = self._watched.get(self._keys.output("device", sample.participant, sample.port))
+        if watched is not None and sample.payload.size and self._recorder is not None:
+            self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())
+
+    def ack(self, member: Member, ack: Ack, time_ns: int, payload: bytes | None) -> None:
+        """Take an ack; `payload` are its bytes if it came from the wire."""
+        self.energy.take(member.name, ack)
+        if self._recorder is not None:
+            channel = self._channel(self._keys.ack(member.name), Ack.ros_type)
+            self._recorder.write(channel, time_ns, encode(ack) if payload is None else payload)
+
+    def books(self, time_ns: int) -> list[Message]:
+        """Return (and record) the energy books when they are due."""
+        if time_ns < self._next_energy_ns:
+            return []
+        self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
+        messages = self.energy.messages(time_ns)
+        if self._recorder is not None:
+            for message in messages:
+                self._recorder.write(self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message))
+        return list(messages)
+
+    def status(self, status: SessionStatus) -> None:
+        """Record a status of the session."""
+        if self._recorder is not None:
+            self._recorder.write(self._channel(self._keys.status, status.ros_type), status.sim_time_ns, encode(status))

@@ -1,0 +1,249 @@
+"""Values on Zenoh: session configuration, the attachment that tags every value, publishers and receivers of ports."""
+
+from __future__ import annotations
+
+import json
+import logging
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import zenoh
+from zenoh.handlers import Callback, FifoChannel
+
+from hub.cells import RemoteCell
+from hub.participant import Value
+from hub.plan import Member
+from schemas.codec import decode, encode, message_type
+from schemas.errors import ConnectError, MessageError
+from schemas.keys import Keys
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.vectors import VectorCodec, has_vector
+
+__all__ = ["Drops", "PortCodec", "PortPublisher", "PortReceiver", "Tag", "Wire", "open_session"]
+
+log = logging.getLogger(__name__)
+
+LEASE_MS = 1000
+"""A peer that is silent for this long is gone; Zenoh's own default of 10 s would keep hosts of a dead hub alive."""
+
+_TAG = struct.Struct("<QIqqHH")
+
+
+def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> zenoh.Session:
+    """Open a Zenoh session that scouts for nobody: it listens and connects where it is told to.
+
+    Raises ConnectError if an endpoint cannot be opened or reached.
+    """
+    config = zenoh.Config()
+    settings: dict[str, Any] = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "listen/endpoints": list(listen),
+        "connect/endpoints": list(connect),
+        "connect/timeout_ms": 5000,
+        "connect/exit_on_failure": True,
+        "transport/link/tx/lease": LEASE_MS,
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        where = f"listen on {', '.join(listen)}" if listen else f"reach {', '.join(connect)}"
+        raise ConnectError(f"cannot {where}: {error}") from error
+
+
+class Tag:
+    """The attachment of every value: run, epoch, step in which it was computed, time it is valid at, index and count of an event batch."""
+
+    __slots__ = ("count", "epoch", "index", "run", "step", "time_ns")
+
+    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int) -> None:
+        self.run, self.epoch, self.step, self.time_ns, self.index, self.count = run, epoch, step, time_ns, index, count
+
+    @staticmethod
+    def pack(run: int, epoch: int, step: int, time_ns: int, index: int = 0, count: int = 1) -> bytes:
+        """Return the bytes of a tag."""
+        return _TAG.pack(run, epoch, step, time_ns, index, count)
+
+    @classmethod
+    def of(cls, sample: zenoh.Sample) -> Tag:
+        """Return the tag of `sample`; raises MessageError if it has none."""
+        raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(raw) != _TAG.size:
+            raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {_TAG.size}")
+        return cls(*_TAG.unpack(raw))
+
+
+class Drops:
+    """Counts what was refused, per key, and logs each key's first refusals with their source."""
+
+    _LOGGED_PER_KEY = 3
+
+    def __init__(self) -> None:
+        self.by_key: dict[str, int] = {}
+
+    @property
+    def total(self) -> int:
+        """How many messages were refused."""
+        return sum(self.by_key.values())
+
+    def count(self, sample: zenoh.Sample, reason: object) -> None:
+        """Count a refused sample and say where it came from."""
+        key = str(sample.key_expr)
+        n = self.by_key[key] = self.by_key.get(key, 0) + 1
+        if n <= self._LOGGED_PER_KEY:
+            source = sample.source_info
+            sender = f" from {source.source_id.zid}" if source is not None else ""
+            more = "; further ones on this key are only counted" if n == self._LOGGED_PER_KEY else ""
+            log.warning("dropped a message on %s%s: %s%s", key, sender, reason, more)
+
+
+class PortCodec:
+    """Values of one port to CDR and back, whatever its type."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self.is_event = port.variability == "event"
+        self.vector = VectorCodec(port) if has_vector(port.type) and not self.is_event else None
+        self._model = message_type(port.type)
+
+    def encode(self, value: Any, time_ns: int) -> bytes:
+        """Return one vector or message as CDR."""
+        return self.vector.encode(value, time_ns) if self.vector is not None else encode(value)
+
+    def decode(self, payload: bytes) -> Any:
+        """Return the vector or message in `payload` written by a `PortCodec` of the same port; raises MessageError."""
+        return self.vector.decode(payload) if self.vector is not None else decode(self._model, payload)
+
+    def accept(self, payload: bytes) -> Any:
+        """Return the vector or message in `payload` written by anybody (joints in any order, frame left out); raises MessageError."""
+        message = decode(self._model, payload)
+        return self.vector.from_message(message) if self.vector is not None else message
+
+    def batch(self, value: Value) -> tuple[Message, ...]:
+        """Return the messages of an event port's value."""
+        return value if isinstance(value, tuple) else ()
+
+
+class PortReceiver:
+    """Receives the values of one output port of another process, in order; invalid and foreign messages are dropped and counted."""
+
+    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, drops: Drops) -> None:
+        self._codec = PortCodec(port)
+        self._run = run
+        self._drops = drops
+        self._batch: list[Any] = []
+        self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
+
+    def receive(self) -> tuple[int, Any]:
+        """Wait for the next valid value and return it with its tag's step."""
+        while True:
+            arrived = self._accept(self._subscriber.recv())
+            if arrived is not None:
+                return arrived
+
+    def poll(self) -> tuple[int, Any] | None:
+        """Return the next valid value if one is here."""
+        while (sample := self._subscriber.try_recv()) is not None:
+            arrived = self._accept(sample)
+            if arrived is not None:
+                return arrived
+        return None
+
+    def _accept(self, sample: zenoh.Sample) -> tuple[int, Any] | None:
+        try:
+            tag = Tag.of(sample)
+            if tag.run != self._run:
+                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
+            if not self._codec.is_event:
+                return tag.step, self._codec.decode(sample.payload.to_bytes())
+            if tag.index == 0:
+                self._batch = []
+            if tag.count:
+                self._batch.append(self._codec.decode(sample.payload.to_bytes()))
+        except MessageError as error:
+            self._drops.count(sample, error)
+            return None
+        return (tag.step, tuple(self._batch)) if tag.index + 1 >= tag.count else None
+
+    def close(self) -> None:
+        """Stop receiving."""
+        self._subscriber.undeclare()
+
+
+class PortPublisher:
+    """Publishes the values of one output port; without a reader it costs one flag test."""
+
+    def __init__(self, session: zenoh.Session, keys: Keys, key_role: str, participant: str, port: Port, run: int, *, always: bool) -> None:
+        self.codec = PortCodec(port)
+        self._run = run
+        self._publisher = session.declare_publisher(
+            keys.output(key_role, participant, port.name),
+            encoding=zenoh.Encoding.APPLICATION_CDR,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.REAL_TIME,
+            express=True,
+        )
+        self._wanted = always
+        if not always:
+            self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
+            self._match(self._publisher.matching_status)
+
+    def _match(self, status: Any) -> None:
+        self._wanted = bool(status.matching)
+
+    def put(self, step: int, time_ns: int, value: Any) -> None:
+        """Publish the value computed in `step`, valid at `time_ns`."""
+        if not self._wanted:
+            return
+        if not self.codec.is_event:
+            self._publisher.put(self.codec.encode(value, time_ns), attachment=Tag.pack(self._run, 0, step, time_ns))
+            return
+        if not value:
+            self._publisher.put(b"", attachment=Tag.pack(self._run, 0, step, time_ns, 0, 0))
+        for index, message in enumerate(value):
+            self._publisher.put(encode(message), attachment=Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+
+    def close(self) -> None:
+        """Stop publishing."""
+        self._publisher.undeclare()
+
+
+class Wire:
+    """A host's publishers and receivers on one Zenoh session."""
+
+    def __init__(self, session: zenoh.Session, keys: Keys, run: int) -> None:
+        self.session = session
+        self.keys = keys
+        self.run = run
+        self.drops = Drops()
+        self._publishers: list[PortPublisher] = []
+        self._receivers: list[PortReceiver] = []
+        self._cells: list[RemoteCell] = []
+
+    def publisher(self, member: Member, port: Port, *, always: bool) -> PortPublisher:
+        """Return a publisher of an output of a participant here; `always` if another host needs every value."""
+        publisher = PortPublisher(self.session, self.keys, member.key_role, member.name, port, self.run, always=always)
+        self._publishers.append(publisher)
+        return publisher
+
+    def cell(self, member: Member, port: Port, stride: int, depth: int) -> RemoteCell:
+        """Return the cell of an output of a participant elsewhere."""
+        receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
+        self._receivers.append(receiver)
+        cell = RemoteCell(stride, depth, receiver)
+        self._cells.append(cell)
+        return cell
+
+    def linked(self) -> bool:
+        """Say whether the initial value of every remote cell has arrived, that is, whether every link works."""
+        return all([cell.primed() for cell in self._cells])
+
+    def close(self) -> None:
+        """Stop publishing and receiving; the session stays open."""
+        for entity in (*self._publishers, *self._receivers):
+            entity.close()
+        self._publishers, self._receivers = [], []
