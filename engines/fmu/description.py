@@ -83,11 +83,12 @@ def _read(path: Path) -> ModelDescription:
     if not path.is_file():
         raise ScenarioError(f"there is no FMU '{path}'")
     try:
-        try:
-            return read_model_description(path)
-        except ValidationError as error:  # tools write many FMUs that run well and break a rule of the schema
-            _log.warning("%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems))
-            return read_model_description(path, validate=False)
+        with path.open("rb") as file:  # given a path, FMPy leaves the file open if there is an error in it
+            try:
+                return read_model_description(file)
+            except ValidationError as error:  # tools write many FMUs that run well and break a rule of the schema
+                _log.warning("%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems))
+                return read_model_description(file, validate=False)
     except Exception as error:  # FMPy lets everything through: BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
         raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {error}") from error
 

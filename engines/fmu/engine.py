@@ -8,7 +8,7 @@ number ends the session. Strings, binaries and clocks are no ports, which is log
 
 from __future__ import annotations
 
-import tempfile
+from contextlib import closing
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -55,7 +55,9 @@ class FmuEngine(Stepped):
     Between communication points an FMU holds its inputs. Where a connection extrapolates linearly, an FMI 2 FMU that can interpolate gets
     value and slope; any other FMU gets the mean of the input over each communication step, which `step` makes as short as wanted.
 
-    `state_hash` covers the serialised state of the FMU, if it can serialise it; otherwise its inputs, outputs and the time.
+    `state_hash` covers the serialised state of the FMU where equal states have equal bytes. Many FMUs serialise addresses of their memory as
+    well (those of modelica/Reference-FMUs do, `getFMUState` in src/cosimulation.c), so that is tried out on a twin; where it is not so, and
+    where the FMU cannot serialise, the hash covers inputs, outputs and the time.
     """
 
     params_model: ClassVar[type[Params]] = FmuParams
@@ -64,8 +66,8 @@ class FmuEngine(Stepped):
     def __init__(self, name: str, params: FmuParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._directory: tempfile.TemporaryDirectory[str] | None = None
         self._instance: Instance | None = None
+        self._hashes_state = False
         self._outputs: dict[str, Vector] = {}
         self._time = np.zeros(1)
 
@@ -84,20 +86,20 @@ class FmuEngine(Stepped):
 
     def configure(self, setup: Setup) -> Outputs:
         """Load the FMU, set its start values and bring it to time 0."""
-        from fmpy import extract
-
         step = self.params.step
         if step and setup.period_ns % step:
             problem = f"the FMU's step of {step / 1e6:g} ms does not divide its period of {setup.period_ns / 1e6:g} ms"
             raise ScenarioError(problem, path=("participants", self.name, "step"))
         self.close()
         description = self._description
-        self._directory = tempfile.TemporaryDirectory(prefix="trocar-fmu-")
-        extract(description.path, self._directory.name)
         kind = Fmi2Instance if description.major == 2 else Fmi3Instance
-        self._instance = kind(description, Path(self._directory.name), self.name)
-        self._outputs = {port: block.values[part] for block in self._instance.outputs for port, part in block.parts.items()}
-        self._instance.initialise(description.starts, self.params.tolerance)
+        self._instance = instance = kind(description, self.name)
+        self._outputs = {port: block.values[part] for block in instance.outputs for port, part in block.parts.items()}
+        instance.initialise(description.starts, self.params.tolerance)
+        if instance.can_save and not description.co_simulation.canBeInstantiatedOnlyOncePerProcess:
+            with closing(kind(description, self.name)) as twin:
+                twin.initialise(description.starts, self.params.tolerance)
+                self._hashes_state = twin.serialise() == instance.serialise()
         return self._read(0)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
@@ -112,7 +114,7 @@ class FmuEngine(Stepped):
     def state_hash(self) -> int:
         """Return the hash of the FMU's state, or of all that is seen of it."""
         instance = self._running()
-        if instance.can_save:
+        if self._hashes_state:
             return state_hash(instance.memory, instance.serialise())
         return state_hash(self._time, *(block.values for block in (*instance.inputs, *instance.outputs)))
 
@@ -135,13 +137,8 @@ class FmuEngine(Stepped):
     def close(self) -> None:
         """Terminate and unload the FMU and remove what was extracted of it."""
         instance, self._instance = self._instance, None
-        directory, self._directory = self._directory, None
-        try:
-            if instance:
-                instance.close()
-        finally:
-            if directory:
-                directory.cleanup()
+        if instance:
+            instance.close()
 
     def _running(self) -> Instance:
         if self._instance is None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from engines.fmu.blocks import WARNING
 from engines.fmu.description import Description
-from engines.fmu.instance import DISCARD, Instance, load
+from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.log import fmi2_callbacks, wants_all
 from engines.fmu.start import Start
 from hub.inputs import Inputs
@@ -32,12 +31,11 @@ class Fmi2Instance(Instance):
     deserialise_word = "DeSerialize"
     byte = ctypes.c_char
 
-    def __init__(self, description: Description, directory: Path, name: str) -> None:
-        """Load and instantiate the FMU that was extracted to `directory`."""
+    def __init__(self, description: Description, name: str) -> None:
+        """Load and instantiate the FMU."""
         from fmpy.fmi2 import FMU2Slave
 
-        fmu = load(FMU2Slave, description, directory, name, callbacks=fmi2_callbacks(), loggingOn=wants_all())
-        super().__init__(fmu, description, name)
+        super().__init__(FMU2Slave, description, name, {"callbacks": fmi2_callbacks(), "loggingOn": wants_all()})
         self._do_step: Callable[..., int] = self._function("DoStep")
         interpolates = description.co_simulation.canInterpolateInputs
         continuous = [variable for variable in description.inputs if variable.type.name == "Real" and not variable.discrete and interpolates]

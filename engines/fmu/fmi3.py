@@ -6,13 +6,12 @@ import ctypes
 import math
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from engines.fmu.blocks import WARNING, Block
 from engines.fmu.description import Description
-from engines.fmu.instance import Instance, load
+from engines.fmu.instance import Instance
 from engines.fmu.log import log_message, wants_all
 from engines.fmu.start import Start
 from hub.inputs import Inputs
@@ -35,8 +34,8 @@ class Fmi3Instance(Instance):
     deserialise_word = "Deserialize"
     byte = ctypes.c_uint8
 
-    def __init__(self, description: Description, directory: Path, name: str) -> None:
-        """Load and instantiate the FMU that was extracted to `directory`."""
+    def __init__(self, description: Description, name: str) -> None:
+        """Load and instantiate the FMU."""
         from fmpy.fmi3 import FMU3Slave
 
         capabilities = description.co_simulation
@@ -47,7 +46,7 @@ class Fmi3Instance(Instance):
             log_message(name, status, category, message)
 
         options = {"eventModeUsed": self._has_events, "earlyReturnAllowed": True, "logMessage": log, "loggingOn": wants_all()}
-        super().__init__(load(FMU3Slave, description, directory, name, **options), description, name)
+        super().__init__(FMU3Slave, description, name, options)
         self._event_blocks = [block for block in self.inputs if block.discrete and self._has_events]
         self._step_blocks = [block for block in self.inputs if block not in self._event_blocks]
         self.memory = np.full(1 + sum(block.values.size for block in self._event_blocks), math.inf)  # time of the next event, discrete inputs

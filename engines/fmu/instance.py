@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import logging
+import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,7 +21,7 @@ from engines.fmu.start import Start
 from hub.inputs import Inputs
 from schemas.errors import ScenarioError, SessionError
 
-__all__ = ["DISCARD", "Instance", "load"]
+__all__ = ["DISCARD", "Instance"]
 
 _log = logging.getLogger(__name__)
 _STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -28,24 +29,14 @@ DISCARD, _ERROR, _FATAL = 2, 3, 4
 """FMI statuses (fmi2Status, fmi3Status)."""
 
 
-def load(slave: type[Any], description: Description, directory: Path, name: str, **options: Any) -> Any:
-    """Load the FMU that was extracted to `directory` and instantiate it through FMPy's class `slave`.
-
-    Raises ScenarioError if its library cannot be loaded, SessionError if it refuses to be instantiated.
-    """
+def _load(slave: type[Any], description: Description, directory: Path, name: str) -> Any:
+    """Load the FMU that was extracted to `directory` through FMPy's class `slave`. Raises ScenarioError if its library cannot be loaded."""
     identifier = description.co_simulation.modelIdentifier
     try:
         with contextlib.chdir(Path.cwd()):  # FMPy changes the directory to load, and leaves it changed when that fails
-            fmu = slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(directory), instanceName=name)
+            return slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(directory), instanceName=name)
     except Exception as error:  # FMPy raises a bare Exception or, for a function that is missing, AttributeError
         raise ScenarioError(f"the library of '{description.path}' cannot be loaded: {error}") from error
-    try:
-        fmu.instantiate(**options)
-    except Exception as error:  # FMPy raises a bare Exception
-        fmu.freeLibrary()
-        said = last_complaint(name)
-        raise SessionError(f"'{description.path}' cannot be instantiated" + (f"; the FMU says: {said}" if said else "")) from error
-    return fmu
 
 
 class Instance(ABC):
@@ -60,12 +51,26 @@ class Instance(ABC):
     byte: ClassVar[Any]
     """C type of a serialised state's elements."""
 
-    def __init__(self, fmu: Any, description: Description, name: str) -> None:
-        """Take FMPy's FMU, instantiated under `name`."""
-        self._fmu = fmu
+    def __init__(self, slave: type[Any], description: Description, name: str, options: Mapping[str, Any]) -> None:
+        """Extract and load the FMU through FMPy's class `slave` and instantiate it with `options`.
+
+        Raises ScenarioError if the library cannot be loaded, SessionError if the FMU refuses to be instantiated.
+        """
+        from fmpy import extract
+
         self._name = name
+        with contextlib.ExitStack() as stack:
+            directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="trocar-fmu-"))
+            extract(description.path, directory)
+            self._fmu = _load(slave, description, Path(directory), name)
+            stack.callback(self._fmu.freeLibrary)
+            try:
+                self._fmu.instantiate(**options)
+            except Exception as error:  # FMPy raises a bare Exception
+                raise SessionError(f"'{description.path}' cannot be instantiated{self._complaint()}") from error
+            self._loaded = stack.pop_all()
         self.can_save = description.co_simulation.canGetAndSetFMUstate and description.co_simulation.canSerializeFMUstate
-        self._component: int = fmu.component
+        self._component: int = self._fmu.component
         self._initialised = False
         self._worst = 0
         self._state = ctypes.c_void_p()
@@ -117,14 +122,15 @@ class Instance(ABC):
             self.call(f"Free{self.state_word}", ctypes.byref(restored))
 
     def close(self) -> None:
-        """Terminate and free the instance and unload its library."""
-        if self._worst >= _FATAL:
-            return  # after a fatal error no function of the FMU may be called (FMI 2.0.5 and 3.0.2, fmi2Fatal and fmi3Fatal)
-        if self._state:
-            self._function(f"Free{self.state_word}")(self._component, ctypes.byref(self._state))
-        if self._initialised and self._worst < _ERROR and self._function("Terminate")(self._component) > WARNING:
-            _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._complaint())
-        self._fmu.freeInstance()
+        """Terminate and free the instance, unload its library and remove what was extracted."""
+        with self._loaded:
+            if self._worst >= _FATAL:
+                return  # no function of the FMU may be called any more (fmi2Fatal, fmi3Fatal)
+            if self._state:
+                self._function(f"Free{self.state_word}")(self._component, ctypes.byref(self._state))
+            if self._initialised and self._worst < _ERROR and self._function("Terminate")(self._component) > WARNING:
+                _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._complaint())
+            self._function("FreeInstance")(self._component)
 
     def call(self, function: str, *arguments: Any) -> None:
         """Call an FMI function, named without its prefix."""

@@ -77,8 +77,10 @@ def given_start(row: ModelVariable, given: Any, major: int, size: int) -> Start:
 
 
 def _number(row: ModelVariable, item: Any) -> float:
-    if isinstance(item, bool) != (row.type == "Boolean") and item not in (0, 1):
-        raise ValueError(f"'{row.name}' takes {'true or false' if row.type == 'Boolean' else 'numbers'}, not {item!r}")
+    boolean = row.type == "Boolean"
+    fits = item in (False, True) if boolean else isinstance(item, int | float | str) and not isinstance(item, bool)
+    if not fits:
+        raise ValueError(f"'{row.name}' takes {'true or false' if boolean else 'numbers'}, not {item!r}")
     number = to_si(item, unit_of(row)) if isinstance(item, str) else float(item)
     if isinstance(item, int) and item != number:
         raise ValueError(f"'{row.name}' cannot take {item}: it is no exact double")

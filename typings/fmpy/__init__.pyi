@@ -1,6 +1,6 @@
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from fmpy.model_description import ModelDescription
 
@@ -11,4 +11,4 @@ calloc: Callable[..., Any]
 free: Callable[..., Any]
 
 def extract(filename: str | Path, unzipdir: str | Path | None = None) -> Path: ...
-def read_model_description(filename: str | Path, validate: bool = True) -> ModelDescription: ...
+def read_model_description(filename: str | Path | IO[bytes], validate: bool = True) -> ModelDescription: ...

@@ -5,6 +5,7 @@ class CoSimulation:
     modelIdentifier: str
     canHandleVariableCommunicationStepSize: bool
     canInterpolateInputs: bool
+    canBeInstantiatedOnlyOncePerProcess: bool
     canGetAndSetFMUstate: bool
     canSerializeFMUstate: bool
     hasEventMode: bool

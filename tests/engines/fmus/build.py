@@ -18,10 +18,12 @@ FOLDERS = {"mass_spring_damper": "linux64", "bouncing_ball": "x86_64-linux"}
 """Platform folders of FMI 2.0 and 3.0."""
 
 
-def compile_library(model: str, folder: Path) -> Path:
+def compile_library(model: str, folder: Path, *flags: str) -> Path:
     """Compile the shared library of `model` into `folder`."""
+    assert COMPILER, WHY_NOT
     library = folder / f"{model}.so"
-    subprocess.run([COMPILER, "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", HERE / model / "model.c", "-lm", "-o", library], check=True)
+    options = ["-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", *flags]
+    subprocess.run([COMPILER, *options, str(HERE / model / "model.c"), "-lm", "-o", str(library)], check=True)
     return library
 
 

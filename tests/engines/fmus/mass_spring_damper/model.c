@@ -25,6 +25,9 @@ typedef struct {
     double real[N_REALS];
     double slope; /* of F */
     double time;
+#ifdef WITH_ADDRESS
+    void *self; /* makes the bytes of equal states differ, as those of many FMUs do */
+#endif
     int integer[N_INTEGERS];
     int boolean[N_BOOLEANS];
 } Data;
@@ -47,6 +50,9 @@ void *fmi2Instantiate(const char *name, int type, const char *guid, const char *
     Instance *i = calloc(1, sizeof *i);
     strncpy(i->name, name, sizeof i->name - 1);
     i->callbacks = callbacks;
+#ifdef WITH_ADDRESS
+    i->data.self = i;
+#endif
     i->data.real[M] = 1;
     i->data.real[C] = 10;
     i->data.real[D] = 0.1;
