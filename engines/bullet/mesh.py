@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from schemas.vectors import Vector
 
-__all__ = ["FEWEST_NODES", "TetMesh", "block", "block_cells", "volumes"]
+__all__ = ["FEWEST_NODES", "Indices", "TetMesh", "block", "block_cells", "volumes"]
 
 Indices = NDArray[np.int64]
 

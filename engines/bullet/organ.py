@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from engines.bullet.client import quiet
+from engines.bullet.contact import contact_gain
 from engines.bullet.material import Material, highest_frequency
 from engines.bullet.mesh import FEWEST_NODES, TetMesh, block, block_cells
 from schemas.errors import SessionError
@@ -67,6 +68,7 @@ class Organ:
         self.name = name
         self.mesh = mesh = params.mesh
         self.anchored = mesh.nodes[:, 2] == mesh.nodes[:, 2].min()
+        self._touchable = mesh.triangles[~self.anchored[mesh.triangles].all(axis=1)]
         self.frequency = highest_frequency(mesh, np.where(self.anchored, 0.0, 1.0), params.material)
         """Highest natural frequency, rad/s."""
         self._client = client
@@ -95,8 +97,12 @@ class Organ:
             bullet.createSoftBodyAnchor(self._body, node, -1, -1, physicsClientId=client)
         self.sample(0)
 
-    def sample(self, time_ns: int) -> Vector:
-        """Read the nodes into `nodes`, shape (n, 3), metres, frame `world`, and return them.
+    def contact_gain(self, centre: Vector, radius: float) -> float:
+        """Return `contact.contact_gain` for a sphere at `centre` (m), shape (3,), of `radius` (m), on the nodes as last read."""
+        return contact_gain(centre, radius, self.nodes, self._touchable)
+
+    def sample(self, time_ns: int) -> None:
+        """Read the nodes into `nodes`, shape (n, 3), metres, frame `world`.
 
         Raises SessionError if the tissue has become unstable by `time_ns`.
         """
@@ -108,4 +114,3 @@ class Organ:
                 f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from its place. The likeliest cause is a probe driven "
                 f"deep into it; else shorten the tissue's timestep, raise its damping, or lower the probe's stiffness"
             )
-        return self.nodes

@@ -53,6 +53,9 @@ class Proxy:
         """Centre, m, frame `world`, shape (3,)."""
         self.velocity = np.zeros(3)
         """m/s, frame `world`, shape (3,)."""
+        self.radius = params.radius
+        self.gain = 1.0
+        """How much larger the force in Bullet is than that of the coupling, to make up for what contacts lose (see `contact`)."""
         self._side = ForceSide(bond, plan)
         self._stiffness, self._damping = params.stiffness, params.damping
         self._weight = np.array([0.0, 0.0, params.mass * gravity])
@@ -90,7 +93,7 @@ class Proxy:
         self._spring[:3] = self._stiffness * (self._side.position(tau) - self.position - 0.5 * dt * self.velocity)
         self._damper[:3] = self._damping * (self._side.velocity(tau)[:3] - self.velocity)
         self._side.add(self._spring, self._damper, tau, dt)
-        force = self._spring[:3] + self._damper[:3] + self._weight
+        force = self.gain * (self._spring[:3] + self._damper[:3]) + self._weight
         self._apply(self._body, -1, force.tolist(), self.position.tolist(), self._frame, physicsClientId=self._client)
 
     def read(self) -> None:
