@@ -11,7 +11,7 @@ import typer
 from rich.logging import RichHandler
 from rich.text import Text
 
-from hub.command_line import looking, recordings
+from hub.command_line import hosting, looking, recordings, running
 from hub.command_line.display import console
 from schemas.errors import ScenarioError, TrocarError
 
@@ -28,7 +28,18 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (looking.check, recordings.replay, recordings.recover, recordings.report, looking.ls, looking.doctor, looking.schema):
+for command in (
+    running.run,
+    looking.check,
+    recordings.replay,
+    recordings.recover,
+    recordings.report,
+    looking.ls,
+    hosting.engine,
+    hosting.device,
+    looking.doctor,
+    looking.schema,
+):
     app.command()(command)
 
 

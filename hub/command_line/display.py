@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, TextColumn
+from rich.progress import Progress as Bar
 from rich.table import Table
 
-__all__ = ["console", "show", "table"]
+from hub.session import Progress
+from schemas.scenario import Scenario
+
+__all__ = ["RunProgress", "console", "show", "table"]
+
+_UNITS = {"s": "s", "n": "N", "j": "J", "m": "m"}
 
 console = Console(stderr=True, highlight=False)
 
@@ -28,9 +36,36 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(result, indent=2, default=str))
         return
-    rows = [(name.replace("_", " "), _readable(value)) for name, value in result.items() if value is not None and not isinstance(value, dict)]
-    console.print(table(rows))
+    console.print(table(_readable(name, value) for name, value in result.items() if value is not None and not isinstance(value, dict)))
 
 
-def _readable(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _readable(name: str, value: Any) -> tuple[str, str]:
+    """Return label and value, with the unit that the name ends in behind the value."""
+    stem, _, suffix = name.rpartition("_")
+    unit = _UNITS.get(suffix)
+    label = (stem if unit else name).replace("_", " ")
+    return label, f"{f'{value:.6g}' if isinstance(value, float) else value} {unit or ''}".rstrip()
+
+
+class RunProgress:
+    """The progress line of a run: simulated time, real-time factor, late steps, live measures."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take what is run."""
+        self._bar = Bar(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[now]}"), console=console)
+        total = None if scenario.duration is None else scenario.duration / 1e9
+        self._task = self._bar.add_task(scenario.name, total=total, now="starting")
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._bar.stop()
+
+    def __call__(self, progress: Progress) -> None:
+        """Show where the run is."""
+        live = (f"{name} {value:.3f} {unit}".rstrip() for name, (value, unit) in progress.live.items())
+        late = (f"{progress.late_steps} late steps",) if progress.late_steps else ()
+        now = "  ".join((f"{progress.sim_time_s:.2f} s", f"{progress.real_time_factor:.2f} x real time", *late, *live))
+        self._bar.update(self._task, completed=progress.sim_time_s, now=now)

@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from hub import doctor as doctor_module
-from hub.launch import plan_of
 from hub.command_line.display import console, table
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
+from hub.launch import plan_of
 from hub.plan import Plan
 from hub.scenario_file import load
 from hub.scenario_schema import scenario_schema
@@ -22,14 +22,14 @@ __all__ = ["check", "doctor", "ls", "schema"]
 
 def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json = False) -> None:
     """Check a scenario without starting anything, and show its ports and wiring."""
-    loaded = load(scenario, overrides or ())
-    with locating(loaded.source):
-        plan = plan_of(loaded.scenario, loaded.params)[0]
+    file = load(scenario, overrides or ())
+    with locating(file.source):
+        plan, _ = plan_of(file.scenario, file.params)
     if as_json:
         typer.echo(plan.model_dump_json(indent=2))
         return
     _print_plan(plan)
-    console.print(f"[green]{loaded.source.file} is a valid scenario.")
+    console.print(f"[green]{file.source.file} is a valid scenario.")
 
 
 def _print_plan(plan: Plan) -> None:

@@ -1,0 +1,37 @@
+"""`trocar run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from hub.command_line.display import RunProgress, console, show
+from hub.command_line.scenarios import Json, Listen, Overrides, ScenarioName, locating
+from hub.launch import launch
+from hub.scenario_file import load
+
+__all__ = ["run"]
+
+
+def run(
+    scenario: ScenarioName,
+    *,
+    record: Annotated[Path | None, typer.Option(metavar="DIR", help="Record to a new rosbag2 directory.")] = None,
+    overrides: Overrides = None,
+    pace: Annotated[Literal["fast", "realtime"] | None, typer.Option(help="Instead of the scenario's own.")] = None,
+    listen: Listen = None,
+    one_host: Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Run a scenario."""
+    file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
+    with locating(file.source):
+        session = launch(file, endpoint=listen, record=record, one_host=one_host)
+        with RunProgress(session.scenario) as progress:
+            summary = session.run(progress)
+    show(summary.as_dict(), as_json=as_json)
+    if summary.recording_complete is False:
+        console.print("[bold red]error:[/] the recording is incomplete")
+        raise typer.Exit(1)
