@@ -26,6 +26,8 @@ _FRAME_SENSORS = {
 _JOINT_SENSORS = (mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL, mujoco.mjtSensor.mjSENS_JOINTACTFRC)
 _NO_MASS = 1e-6
 """kg (and kg m^2) of a link whose inertia is in the armature: MuJoCo wants a little in every moving body."""
+_HIDDEN = 4
+"""A group that MuJoCo's viewer does not show unless asked."""
 _GREY, _STEEL, _BLUE = [0.55, 0.57, 0.6, 1.0], [0.8, 0.8, 0.82, 1.0], [0.15, 0.35, 0.75, 1.0]
 _HOUSING = [0.068 / 2, 0.033 / 2, 0.093 / 2]
 """Half extents (m) of the tool housing as modelled in unina-icaros/dvrk-vrep."""
@@ -62,7 +64,7 @@ def build(params: MujocoParams) -> mujoco.MjModel:
 def _add_arm(spec: mujoco.MjSpec, name: str, arm: ArmParams) -> None:
     chain = arm.chain
     base = spec.worldbody.add_body(name=f"{name}/base", pos=arm.position, quat=_wxyz(np.array(arm.orientation)))
-    base.add_site(name=f"{name}/base")
+    base.add_site(name=f"{name}/base", group=_HIDDEN)
     body, bodies = base, list[mujoco.MjsBody]()
     for joint, servo in zip(chain.joints, psm.SERVO, strict=True):
         zero = joint.transform(0.0)
@@ -70,7 +72,7 @@ def _add_arm(spec: mujoco.MjSpec, name: str, arm: ArmParams) -> None:
         bodies.append(body)
         _add_joint(spec, body, name, joint, servo)
     tip = chain.tip
-    body.add_site(name=f"{name}/tip", pos=tip[:3, 3], quat=_wxyz(rotation.from_matrix(tip)))
+    body.add_site(name=f"{name}/tip", pos=tip[:3, 3], quat=_wxyz(rotation.from_matrix(tip)), group=_HIDDEN)
     _set_masses(bodies, chain, arm)
     _add_geoms(bodies, chain, arm)
     _add_sensors(spec, name)
