@@ -32,9 +32,10 @@ class Receiver(Protocol):
 class Cell:
     """The last values of one output port of a participant in this process."""
 
-    def __init__(self, stride: int, depth: int) -> None:
-        """Take the steps between two values, and how many values readers may look back."""
-        self.stride = stride
+    def __init__(self, period: int, stride: int, depth: int) -> None:
+        """Take the source's period and the distance of two values, both in steps, and how many values readers may look back."""
+        self._period = period
+        self._stride = stride
         self._depth = depth
         self._values: dict[int, Any] = {}
 
@@ -52,21 +53,25 @@ class Cell:
         return self._values[tag]
 
     def tag(self, step: int, *, fresh: bool) -> int:
-        """Return the tag that a reader in `step` sees: the newest started (fresh) or the newest completed by then."""
-        periods = step // self.stride
-        return periods * self.stride if fresh else (periods - 1) * self.stride if periods else INITIAL
+        """Return the tag that a reader in `step` sees: of the newest step begun (fresh), or of the newest completed by then."""
+        count = (step + self._period if fresh else step) // self._stride
+        return count * self._stride - self._period if count else INITIAL
 
     def before(self, tag: int) -> int:
         """Return the tag of the value before `tag`."""
-        return max(tag - self.stride, INITIAL) if tag > INITIAL else INITIAL
+        return max(tag - self._stride, INITIAL)
+
+    def after(self, tag: int) -> int:
+        """Return the tag of the value after `tag`."""
+        return (tag if tag > INITIAL else -self._period) + self._stride
 
 
 class RemoteCell(Cell):
     """The values of an output port of a participant in another process; `get` waits for them to arrive."""
 
-    def __init__(self, stride: int, depth: int, receiver: Receiver) -> None:
+    def __init__(self, period: int, stride: int, depth: int, receiver: Receiver) -> None:
         """Take where the values come from."""
-        super().__init__(stride, depth)
+        super().__init__(period, stride, depth)
         self._receiver = receiver
         self._newest = INITIAL - 1
 

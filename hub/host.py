@@ -131,7 +131,7 @@ class Host:
                 (k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links
             )
             publisher = self._wire.publisher(member, port, always=elsewhere) if self._wire else None
-            slot.sinks.append(_Sink(port, stride, PortCodec(port).vector is not None, Cell(stride, depth) if depth else None, publisher))
+            slot.sinks.append(_Sink(port, stride, PortCodec(port).vector is not None, Cell(member.period, stride, depth) if depth else None, publisher))
 
     def _lay_readers(self, slot: _Slot) -> None:
         for link in self.plan.links:
@@ -252,7 +252,7 @@ class Host:
         if reader.event:
             arrived: list[Any] = []
             while reader.seen < tag:
-                reader.seen = reader.seen + cell.stride if reader.seen > INITIAL else 0
+                reader.seen = cell.after(reader.seen)
                 arrived.extend(cell.get(reader.seen))
             if arrived:
                 slot.events[reader.port] = tuple(arrived)
@@ -263,7 +263,7 @@ class Host:
 
     def _hand_on(self, slot: _Slot, step: int, time_ns: int, outputs: Outputs) -> None:
         for sink in slot.sinks:
-            if step > INITIAL and step % sink.stride:
+            if step > INITIAL and (step + slot.member.period) % sink.stride:
                 continue
             name = sink.port.name
             if name not in outputs:

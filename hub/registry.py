@@ -19,12 +19,15 @@ from pydantic import ValidationError
 from hub.participant import Device, Stepped
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 
-__all__ = ["GROUPS", "Kind", "Participant", "broken", "find", "installed_packages", "kinds", "load", "make", "missing_packages", "require_extra"]
+__all__ = ["GROUPS", "UNPACKAGED", "Kind", "Participant", "broken", "find", "installed_packages", "kinds", "load", "make", "missing_packages", "require_extra"]
 
 Participant = type[Stepped] | type[Device]
 
 GROUPS = {"trocar.engines": "engine", "trocar.controllers": "controller", "trocar.devices": "device"}
 """Entry-point group to role."""
+
+UNPACKAGED = "PYTHONPATH"
+"""Stands for the distribution of a kind that is named `module:Class`."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def find(name: str) -> Kind:
     if name in kinds():
         return kinds()[name]
     if ":" in name:
-        return Kind(name, "engine", "PYTHONPATH", EntryPoint(name, name, "trocar.engines"))
+        return Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
     raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}")
 
 

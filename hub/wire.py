@@ -234,7 +234,7 @@ class Wire:
         """Return the cell of an output of a participant elsewhere."""
         receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
         self._receivers.append(receiver)
-        cell = RemoteCell(stride, depth, receiver)
+        cell = RemoteCell(member.period, stride, depth, receiver)
         self._cells.append(cell)
         return cell
 
