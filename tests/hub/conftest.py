@@ -10,6 +10,7 @@ from hub import registry
 PENDULUM = """
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from hub.participant import Params, Stepped
@@ -38,10 +39,12 @@ class Pendulum(Stepped):
         )
 
     def configure(self, setup):
-        return {}
+        return {"angle": np.zeros(1)}
 
     def step(self, t, h, inputs):
-        return {}
+        if self.params.length > 100.0:
+            raise ArithmeticError("the rope is torn")
+        return {"angle": 0.5 * inputs["goal"] + 1.0}
 
     def state_hash(self):
         return 0

@@ -1,10 +1,14 @@
 import json
+import subprocess
 import sys
+from collections.abc import Callable
 from importlib.metadata import version
+from typing import Any
 
 import pytest
 
 from hub.command_line import main
+from hub.endpoint import free_endpoint
 from hub.scenario_file import installed_scenarios
 
 SCENARIO = """\
@@ -16,6 +20,23 @@ participants:
 connections:
   - one.angle -> two.gaol
 """
+
+
+REMOTE = """\
+name: away
+step: 1 ms
+duration: 50 ms
+participants:
+  robot: {kind: mujoco, host: remote, arms: {PSM1: {}}}
+"""
+
+
+def wait_for(look: Callable[[], Any]) -> Any:
+    """Return the first answer of `look` that holds something."""
+    for _ in range(50):
+        if found := look():
+            return found
+    raise TimeoutError("nothing came")
 
 
 @pytest.fixture
@@ -91,3 +112,46 @@ def test_doctor_as_json(trocar):
 
 def test_ls_where_no_hub_is(trocar):
     assert trocar("ls", "--connect", "tcp/127.0.0.1:1", "--json") == (0, "[]\n", "")
+
+
+@pytest.fixture
+def swinging(pendulum, tmp_path):
+    file = tmp_path / "session.yaml"
+    file.write_text(SCENARIO.replace("gaol", "goal") + "duration: 20 ms\nmeasure:\n  last_angle: {kind: final, of: two.angle, live: true}\n")
+    return file
+
+
+def test_run_prints_its_summary_as_json_on_stdout_alone(trocar, swinging, tmp_path):
+    code, out, err = trocar("run", swinging, "--json", "--record", tmp_path / "recording")
+    assert code == 0, err
+    summary = json.loads(out)
+    assert {"steps": 20, "sim_time_s": 0.02, "late_steps": 0, "recording": str(tmp_path / "recording"), "last_angle": 1.5}.items() <= summary.items()
+    assert {"wall_time_s", "real_time_factor", "state_hash", "energy_residual_j"} <= set(summary)
+    assert (tmp_path / "recording" / "metadata.yaml").is_file()
+
+
+def test_run_shows_people_a_summary_on_stderr(trocar, swinging):
+    code, out, err = trocar("run", swinging, "--pace", "realtime")
+    assert (code, out) == (0, "")
+    assert {"sim time 0.02 s", "last angle 1.5"} <= {" ".join(line.split()) for line in err.splitlines()}
+
+
+def test_a_failing_participant_is_exit_code_1_and_a_clean_message(trocar, swinging):
+    code, out, err = trocar("run", swinging, "--set", "participants.two.length=101")
+    assert (code, out) == (1, "")
+    assert "participant 'two' failed at step 0: ArithmeticError: the rope is torn" in err
+
+
+def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
+    (tmp_path / "session.yaml").write_text(REMOTE)
+    endpoint = free_endpoint([0])
+    command = [sys.executable, "-P", "-m", "hub.command_line"]
+    hub = subprocess.Popen([*command, "run", "session.yaml", "--listen", endpoint, "--json"], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    with hub:
+        rows = wait_for(lambda: json.loads(subprocess.check_output([*command, "ls", "--json", "--connect", endpoint], text=True)))
+        assert rows[0]["session"] == "away"
+        assert rows[0]["participants"][0].items() >= {"name": "robot", "role": "engine", "host": "remote/robot", "step": -1}.items()
+        engine = subprocess.run([*command, "engine", "robot", "--connect", endpoint, "--session", "away"], cwd=tmp_path, timeout=60, check=False)
+        out, _ = hub.communicate(timeout=60)
+    assert (engine.returncode, hub.returncode) == (0, 0)
+    assert json.loads(out)["steps"] == 50
