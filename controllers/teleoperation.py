@@ -28,8 +28,6 @@ from schemas.vectors import Vector
 
 __all__ = ["Teleoperation", "TeleoperationParams"]
 
-_ITERATIONS = 2
-"""Of the inverse kinematics in a step. One follows a hand at 1 kHz to a nanometre; the second makes up for slower periods."""
 _JOINTS = len(psm.JOINT_NAMES)
 _POSE, _JOINT_STATE = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/JointState"
 
@@ -106,7 +104,7 @@ class Teleoperation(Stepped):
             self._take_reference(hand, scale)
         self._set_goal(hand)
         largest_move = self._chain.velocity * (h * 1e-9)
-        self._command[:] = approach(self._chain, self._command, self._goal[:3], self._goal[3:], largest_move, _ITERATIONS)
+        self._command[:] = approach(self._chain, self._command, self._goal[:3], self._goal[3:], largest_move)
         return self._outputs
 
     def _heed(self, events: tuple[Message, ...]) -> None:

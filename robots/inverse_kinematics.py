@@ -21,28 +21,27 @@ _LEAST_DAMPING = 1e-12
 """Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still moves the tip by a micrometre."""
 
 
-def approach(chain: SerialChain, q: Vector, position: Vector, orientation: Vector, step: Vector, iterations: int) -> Vector:
-    """Return joint positions, shape (n,), nearer to the goal than `q`, inside the joint ranges and at most `step` away from `q`.
+def approach(chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector) -> Vector:
+    """Return joint positions, shape (n,), nearer to the goal than `q`, inside the joint ranges and at most `largest_move` away.
+
+    One correction: near the goal it squares the error, so calling it at every step of a control loop follows a moving
+    goal (20 um a step: to some nanometres), and calling it again and again solves for one that stands.
 
     Args:
         chain: the kinematics.
         q: where to start, shape (n,), rad and m.
         position: goal of the tip in the base frame, m, shape (3,).
         orientation: goal of the tip in the base frame, quaternion (x, y, z, w).
-        step: largest distance of each joint from `q`, shape (n,); all joints slow down together, so that the way stays straight.
-        iterations: how often to correct; near the goal each one squares the error.
+        largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays straight.
     """
-    found = q
-    for _ in range(iterations):
-        frames = chain.frames(found)
-        tip = frames[-1]
-        turn = rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
-        error = np.concatenate([position - tip[:3, 3], _LENGTH * turn])
-        jacobian = chain.jacobian(frames)
-        jacobian[3:] *= _LENGTH
-        normal = jacobian.T @ jacobian
-        normal.flat[:: len(q) + 1] += 0.5 * error.dot(error) + _LEAST_DAMPING
-        found = np.minimum(np.maximum(found + np.linalg.solve(normal, jacobian.T @ error), chain.lower), chain.upper)
-    move = found - q
-    share = float(np.max(np.abs(move) / step))
-    return found if share <= 1.0 else q + move / share
+    frames = chain.frames(q)
+    tip = frames[-1]
+    error = np.empty(6)
+    error[:3] = position - tip[:3, 3]
+    error[3:] = _LENGTH * rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
+    jacobian = chain.jacobian(frames)
+    jacobian[3:] *= _LENGTH
+    normal = jacobian.T @ jacobian
+    normal.reshape(-1)[:: len(q) + 1] += 0.5 * error.dot(error) + _LEAST_DAMPING
+    move = np.minimum(np.maximum(q + np.linalg.solve(normal, jacobian.T @ error), chain.lower), chain.upper) - q
+    return q + move / max(1.0, float(np.abs(move / largest_move).max()))

@@ -78,13 +78,13 @@ def from_matrix(r: Vector) -> Vector:
     observation that q is the dominant eigenvector of this matrix, without the eigenvalues).
     """
     (a, b, c), (d, e, f), (g, h, i) = r[:3, :3].tolist()
-    rows = np.array(
-        [
-            [1 + a - e - i, b + d, c + g, h - f],
-            [b + d, 1 - a + e - i, f + h, c - g],
-            [c + g, f + h, 1 - a - e + i, d - b],
-            [h - f, c - g, d - b, 1 + a + e + i],
-        ]
+    rows = (
+        (1 + a - e - i, b + d, c + g, h - f),
+        (b + d, 1 - a + e - i, f + h, c - g),
+        (c + g, f + h, 1 - a - e + i, d - b),
+        (h - f, c - g, d - b, 1 + a + e + i),
     )
-    row = rows[int(np.argmax(np.diag(rows)))]
-    return row / np.linalg.norm(row)
+    largest = max(range(4), key=lambda k: rows[k][k])
+    x, y, z, w = rows[largest]
+    length = sqrt(x * x + y * y + z * z + w * w)
+    return np.array([x / length, y / length, z / length, w / length])

@@ -58,12 +58,12 @@ class SerialChain:
         self.lower = np.array([joint.lower for joint in joints])  # (n,)
         self.upper = np.array([joint.upper for joint in joints])  # (n,)
         self.velocity = np.array([joint.velocity for joint in joints])  # (n,)
-        self._revolute = np.array([joint.kind == "revolute" for joint in joints])
+        self._prismatic = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
         # A link's transform is affine in (cos q, sin q) or in q: all of them come from one multiplication.
         zero = np.array([joint.transform(0.0) for joint in joints])
         quarter = np.array([joint.transform(np.pi / 2 if joint.kind == "revolute" else 1.0) for joint in joints])
         half = np.array([joint.transform(np.pi) for joint in joints])
-        revolute = self._revolute[:, None, None]
+        revolute = np.array([joint.kind == "revolute" for joint in joints])[:, None, None]
         constant = np.where(revolute, (zero + half) / 2, zero)
         cosine = np.where(revolute, (zero - half) / 2, 0.0)
         other = quarter - constant  # factor of sin q, or of q
@@ -73,8 +73,10 @@ class SerialChain:
     def frames(self, q: Vector) -> Vector:
         """Return the poses of all links and of the tip in the base frame, shape (n + 1, 4, 4), at `q`, shape (n,)."""
         n = len(self.joints)
-        self._factors[:, 0, 1] = np.cos(q)
-        self._factors[:, 0, 2] = np.where(self._revolute, np.sin(q), q)
+        factors = self._factors
+        np.cos(q, out=factors[:, 0, 1])
+        np.sin(q, out=factors[:, 0, 2])
+        factors[self._prismatic, 0, 2] = q[self._prismatic]
         links = (self._factors @ self._basis).reshape(n, 4, 4)
         poses = np.empty((n + 1, 4, 4))
         pose = poses[0] = links[0]
@@ -89,7 +91,13 @@ class SerialChain:
 
     def jacobian(self, frames: Vector) -> Vector:
         """Return J, shape (6, n), with twist of the tip (m/s, rad/s; in the base frame) = J dq, from `frames(q)`."""
-        axes, arms = frames[:-1, :3, 2], frames[-1, :3, 3] - frames[:-1, :3, 3]  # (n, 3)
-        lever = axes[:, [1, 2, 0]] * arms[:, [2, 0, 1]] - axes[:, [2, 0, 1]] * arms[:, [1, 2, 0]]
-        revolute = self._revolute[:, None]
-        return np.hstack([np.where(revolute, lever, axes), revolute * axes]).T
+        jacobian = np.empty((6, len(self.joints)))
+        zx, zy, zz = axes = frames[:-1, :3, 2].T  # (3, n)
+        rx, ry, rz = frames[-1, :3, 3:] - frames[:-1, :3, 3].T  # (3, n)
+        jacobian[0] = zy * rz - zz * ry
+        jacobian[1] = zz * rx - zx * rz
+        jacobian[2] = zx * ry - zy * rx
+        jacobian[3:] = axes
+        jacobian[:3, self._prismatic] = axes[:, self._prismatic]
+        jacobian[3:, self._prismatic] = 0.0
+        return jacobian

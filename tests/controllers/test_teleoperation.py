@@ -73,6 +73,8 @@ def test_the_tip_moves_as_the_hand_does_but_smaller():
     for share in np.linspace(0.0, 1.0, 400):
         session.hand[:3] = hand + share * way
         session.step()
+        assert np.allclose(session.tip, session.outputs["goal_cp"][:3], atol=1e-8)
+    session.step()
     assert np.allclose(session.tip - start, 0.2 * way, atol=1e-9)
     assert np.allclose(session.outputs["goal_cp"][:3], session.tip, atol=1e-9)
 
