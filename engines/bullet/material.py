@@ -14,8 +14,8 @@ __all__ = ["Material", "highest_frequency", "longest_step"]
 
 _POWER_ITERATIONS = 200
 
-_LARGEST_PHASE = 5.0
-"""Largest timestep x highest frequency: a pressed block was steady at 4.7 and chattered at 5.6 (`tests/engines/test_bullet_limits.py`)."""
+_LARGEST_PHASE = 4.0
+"""Largest timestep x highest frequency: a block pressed at a node is steady at 4.0 and chatters at 4.7 (tests/engines/test_bullet_limits.py)."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ MS = 1_000_000
 BLOCK = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa"}
 SMALL_BLOCK = {**BLOCK, "nodes": 75}
 RADIUS = 5e-3
+IMPULSE = BondPlan(prediction="velocity", mean=True)
 
 
 def params(block=BLOCK, probe=None, **rest):
@@ -22,7 +23,7 @@ def params(block=BLOCK, probe=None, **rest):
 class Rig:
     """Moves the probe from `start` (m) on straight lines at constant speed, and keeps what came out."""
 
-    def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=BondPlan(prediction="velocity", mean=True)):
+    def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=IMPULSE):
         self.engine = BulletEngine("tissue", model or params())
         self.period, self.t = period, 0
         self.outputs = dict(self.engine.configure(Setup(period, Path(), {"probe": plan})))

@@ -2,7 +2,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engines.bullet.client import connect, disconnect
@@ -13,6 +13,7 @@ SIZES = st.tuples(*3 * [st.floats(5e-3, 0.2)]).map(np.array)
 NODES = st.integers(FEWEST_NODES, 600)
 
 
+@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES)
 def test_a_block_is_filled_exactly_by_positive_tetrahedra(size, nodes):
     mesh = block(size, nodes)
@@ -22,6 +23,7 @@ def test_a_block_is_filled_exactly_by_positive_tetrahedra(size, nodes):
     assert len(np.unique(mesh.tetrahedra)) == len(mesh.nodes)
 
 
+@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES)
 def test_the_node_count_is_near_the_request(size, nodes):
     count = len(block(size, nodes).nodes)
@@ -29,6 +31,7 @@ def test_the_node_count_is_near_the_request(size, nodes):
     assert abs(count / nodes - 1) < 0.2
 
 
+@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES)
 def test_the_surface_is_closed_and_faces_outwards(size, nodes):
     mesh = block(size, nodes)
@@ -40,6 +43,7 @@ def test_the_surface_is_closed_and_faces_outwards(size, nodes):
     assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2 * (size[0] * size[1] + size[1] * size[2] + size[0] * size[2]), rel=1e-9)
 
 
+@settings(deadline=None, max_examples=40)
 @given(SIZES, NODES, st.sampled_from([0, 1]))
 def test_a_block_is_its_own_mirror_image(size, nodes, axis):
     mesh = block(size, nodes)
