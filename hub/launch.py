@@ -13,6 +13,7 @@ from hub.participant import Device, Params, Stepped
 from hub.plan import Plan, make_plan
 from hub.scenario_file import ScenarioFile
 from hub.session import Session
+from hub.source import Source
 from schemas.scenario import Scenario
 
 __all__ = ["in_one_host", "launch", "plan_of"]
@@ -37,17 +38,18 @@ def launch(loaded: ScenarioFile, *, endpoint: str | None = None, record: Path | 
     plan, participants = plan_of(scenario, loaded.params)
     here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
     directory = loaded.source.directory
-    attachments = {} if record is None else _attachments(scenario, plan, directory, loaded.source.file)
+    attachments = {} if record is None else _attachments(scenario, plan, loaded.source)
     return Session(scenario, plan, here, directory, endpoint=endpoint, record=record, attachments=attachments)
 
 
-def _attachments(scenario: Scenario, plan: Plan, directory: Path, file: Path) -> dict[str, bytes]:
+def _attachments(scenario: Scenario, plan: Plan, source: Source) -> dict[str, bytes]:
     """Return what a recording needs to be understood and re-simulated elsewhere."""
     versions = {"python": platform.python_version(), "platform": platform.platform()}
     versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}
     return {
-        "scenario.yaml": file.read_bytes(),
+        "scenario.yaml": source.file.read_bytes(),
         "scenario.json": scenario.model_dump_json(indent=2).encode(),
         "plan.json": plan.model_dump_json(indent=2).encode(),
-        "versions.json": json.dumps({"directory": str(directory), "packages": versions}, indent=2).encode(),
+        "origin.json": json.dumps({"directory": str(source.directory), "overrides": sorted(set(source.overrides.values()))}, indent=2).encode(),
+        "versions.json": json.dumps(versions, indent=2).encode(),
     }

@@ -31,6 +31,7 @@ app = typer.Typer(
 for command in (
     running.run,
     looking.check,
+    recordings.verify,
     recordings.replay,
     recordings.recover,
     recordings.report,

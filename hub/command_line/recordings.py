@@ -1,4 +1,4 @@
-"""Commands on recordings: `replay`, `recover`, `report`."""
+"""Commands on recordings: `verify`, `replay`, `recover`, `report`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,26 @@ from typing import Annotated
 
 import typer
 
-from hub.command_line.display import console, show
+from hub.command_line.display import RunProgress, console, show
 from hub.command_line.scenarios import Json, Listen
 from hub.recording import Recording
 
-__all__ = ["recover", "replay", "report"]
+__all__ = ["recover", "replay", "report", "verify"]
 
 RecordingPath = Annotated[Path, typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it.")]
 Output = Annotated[Path | None, typer.Option("--output", "-o", help="Where to write; by default beside the recording.")]
+
+
+def verify(recording: RecordingPath, *, listen: Listen = None, as_json: Json = False) -> None:
+    """Simulate a recorded session again and compare every state hash; exit code 1 and the first difference if one is not the same."""
+    from hub.verify import verify as resimulate
+
+    opened = Recording(recording)
+    with RunProgress(opened.scenario()) as progress:
+        summary = resimulate(opened, endpoint=listen, progress=progress)
+    show(asdict(summary), as_json=as_json)
+    if not summary.same:
+        raise typer.Exit(1)
 
 
 def replay(

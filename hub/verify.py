@@ -1,0 +1,107 @@
+"""Re-simulates a recording from its grants and compares every state hash: the same bits, or the first step that differs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hub import registry
+from hub.plan import Member, Plan
+from hub.recording import Recording
+from hub.session import Progress, Session
+from schemas.errors import RecordingError
+from schemas.trocar_msgs import Ack
+
+__all__ = ["VerifySummary", "verify"]
+
+
+@dataclass(frozen=True)
+class VerifySummary:
+    """What the comparison found."""
+
+    recording: str
+    same: bool
+    """Every state hash that is recorded came out again."""
+    steps: int
+    hashes: int
+    """State hashes that were compared."""
+    first_difference_step: int | None
+    first_difference_participant: str | None
+
+
+def verify(recording: Recording, *, endpoint: str | None = None, progress: Callable[[Progress], None] | None = None) -> VerifySummary:
+    """Run the recorded session again, in fresh processes, with what entered it then.
+
+    Raises RecordingError if the recording is not one of a session, and what `Session.run` raises.
+    """
+    scenario, plan, directory = recording.scenario().model_copy(update={"pace": "fast"}), _plan(recording), _directory(recording)
+    here = [member for member in plan.members.values() if member.host == "hub" and member.role != "device"]
+    made = {member.name: registry.make(member.kind, member.name, scenario.participants[member.name].params, directory) for member in here}
+    comparison = _Comparison(recording, plan)
+    session = Session(scenario, plan, made, directory, endpoint=endpoint, grants=recording.grants(), on_ack=comparison.take)
+    comparison.stop = session.state.shutdown
+    ran = session.run(progress)
+    first = comparison.first
+    return VerifySummary(
+        recording=str(recording.file),
+        same=first is None,
+        steps=ran.steps,
+        hashes=comparison.hashes,
+        first_difference_step=None if first is None else first[0],
+        first_difference_participant=None if first is None else plan.order[first[1]],
+    )
+
+
+class _Comparison:
+    """Every ack beside the recorded one."""
+
+    def __init__(self, recording: Recording, plan: Plan) -> None:
+        self._recorded: dict[str, Iterator[Ack]] = {name: recording.acks(name) for name in plan.order}
+        self._order = plan.order
+        self._differences: list[tuple[int, int]] = []
+        self.hashes = 0
+        self.stop: Callable[[], None] = lambda: None
+
+    @property
+    def first(self) -> tuple[int, int] | None:
+        """Step and place in the step order of the first difference."""
+        return min(self._differences, default=None)
+
+    def take(self, member: Member, ack: Ack) -> None:
+        """Compare an ack; at a difference, end the session once the others of this step have been compared."""
+        then = next(self._recorded[member.name], None)
+        if then is None:
+            return  # the recording was cut short between the grant and this ack
+        count = min(len(then.state_hash), len(ack.state_hash))
+        self.hashes += count
+        different = np.flatnonzero(then.state_hash[:count] != ack.state_hash[:count])
+        if then.step != ack.step or len(then.state_hash) != len(ack.state_hash):
+            self._differ(ack.step, member)
+        elif different.size:
+            self._differ(ack.step + int(different[0]) * member.period, member)
+
+    def _differ(self, step: int, member: Member) -> None:
+        self._differences.append((step, self._order.index(member.name)))
+        self.stop()
+
+
+def _plan(recording: Recording) -> Plan:
+    """Return the recorded wiring; a participant that joined from elsewhere gets a process here."""
+    plan = Plan.model_validate_json(_attachment(recording, "plan.json"))
+    members = {name: member.model_copy(update={"host": member.host.replace("/", "_")}) for name, member in plan.members.items()}
+    return plan.model_copy(update={"members": members})
+
+
+def _directory(recording: Recording) -> Path:
+    return Path(json.loads(_attachment(recording, "origin.json"))["directory"])
+
+
+def _attachment(recording: Recording, name: str) -> bytes:
+    try:
+        return recording.attachments[name]
+    except KeyError:
+        raise RecordingError(f"'{recording.file}' holds no {name}: it was not recorded by `trocar run`") from None
