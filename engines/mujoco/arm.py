@@ -33,8 +33,9 @@ class RunningArm:
         self._setpoint, self._previous = self._setpoints[:_JOINTS], self._setpoints[_JOINTS:]
         self._servo = data.ctrl[control : control + 2 * _JOINTS]  # per joint: position, velocity
         # The velocity setpoint is the slope of the position setpoint: one product lays out all inputs of the servos.
-        self._layout = np.kron(np.eye(_JOINTS), [[1.0], [1.0 / period]]) @ np.eye(_JOINTS, 2 * _JOINTS)
-        self._layout[1::2, _JOINTS:] = -np.eye(_JOINTS) / period
+        now = np.eye(_JOINTS)
+        self._layout = np.zeros((2 * _JOINTS, 2 * _JOINTS))
+        self._layout[::2, :_JOINTS], self._layout[1::2, :_JOINTS], self._layout[1::2, _JOINTS:] = now, now / period, -now / period
         self._layout.dot(self._setpoints, self._servo)
         self._body = model.body(probe_body(name)).id
         self._wrench = data.xfrc_applied[self._body]  # at the body's centre of mass, which is the probe's centre; (6,)

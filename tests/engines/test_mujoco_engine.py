@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import mujoco
@@ -230,6 +232,11 @@ def test_without_mujoco_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setattr("engines.mujoco.engine.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"pip install 'trocar\[mujoco\]'"):
         Run()
+
+
+def test_the_engine_is_imported_without_mujoco():
+    code = "import sys, engines.mujoco.engine; sys.exit('mujoco' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_close_may_be_called_twice():
