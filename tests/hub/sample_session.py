@@ -71,7 +71,8 @@ def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
             for name, typical in (("robot", 70e3), ("tissue", 450e3)):
                 compute = np.array([noise.lognormal(np.log(typical), 0.15 + 0.6 * (noise.random() < 0.01))], np.uint64)
                 work = powers[name][step : step + 1]
-                recorder.write(ports[name], end, encode(Ack(run=7, epoch=0, step=step, state_hash=np.array([step], np.uint64), compute_ns=compute, work_j=work)))
+                ack = Ack(run=7, epoch=0, step=step, state_hash=np.array([step], np.uint64), compute_ns=compute, work_j=work)
+                recorder.write(ports[name], end, encode(ack))
             given, taken = float(powers["robot"][step]), float(powers["tissue"][step])
             header = Header(stamp=Time.from_ns(end))
             book = CouplingEnergy(header=header, bond=BOND, motion_work_j=given, force_work_j=taken, residual_j=taken - given)
