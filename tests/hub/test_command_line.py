@@ -125,15 +125,17 @@ def test_run_prints_its_summary_as_json_on_stdout_alone(trocar, swinging, tmp_pa
     code, out, err = trocar("run", swinging, "--json", "--record", tmp_path / "recording")
     assert code == 0, err
     summary = json.loads(out)
-    assert {"steps": 20, "sim_time_s": 0.02, "late_steps": 0, "recording": str(tmp_path / "recording"), "last_angle": 1.5}.items() <= summary.items()
-    assert {"wall_time_s", "real_time_factor", "state_hash", "energy_residual_j"} <= set(summary)
-    assert (tmp_path / "recording" / "metadata.yaml").is_file()
+    assert {"steps": 20, "sim_time_s": 0.02, "late_steps": 0, "recording": str(tmp_path / "recording"), "state": "done"}.items() <= summary.items()
+    assert {"last_angle", "wall_time_s", "real_time_factor", "state_hash", "energy_residual_j"} <= set(summary)
+    code, out, err = trocar("verify", tmp_path / "recording", "--json")
+    assert code == 0, err
+    assert {"same": True, "steps": 20, "hashes": 40}.items() <= json.loads(out).items()
 
 
 def test_run_shows_people_a_summary_on_stderr(trocar, swinging):
     code, out, err = trocar("run", swinging, "--pace", "realtime")
     assert (code, out) == (0, "")
-    assert {"sim time 0.02 s", "last angle 1.5"} <= {" ".join(line.split()) for line in err.splitlines()}
+    assert {"sim time 0.02 s", "steps 20", "state done"} <= {" ".join(line.split()) for line in err.splitlines()}
 
 
 def test_a_failing_participant_is_exit_code_1_and_a_clean_message(trocar, swinging):
