@@ -16,7 +16,10 @@ __all__ = ["RunningArm"]
 _JOINTS = len(psm.JOINT_NAMES)
 _POSES = np.array([18, 19, 20, 22, 23, 24, 21, 25, 26, 27, 29, 30, 31, 28])
 """Where two poses (x, y, z, qx, qy, qz, qw), tip in base and tip in world, stand in the arm's sensors (quaternions w first)."""
-_WORLD_POSE, _TWIST = slice(25, 32), slice(32, 38)
+_POSITION, _QUATERNION, _TWIST = slice(25, 28), slice(28, 32), slice(32, 38)
+"""Of the tip in the world, in the arm's sensors."""
+_W_FIRST = [6, 3, 4, 5]
+"""MuJoCo's quaternion in a ROS pose."""
 
 
 class RunningArm:
@@ -42,12 +45,10 @@ class RunningArm:
         self._torque = self._wrench[3:].data
         sensor = int(model.sensor(first_sensor(name)).adr[0])
         self._sensors = data.sensordata[sensor : sensor + _TWIST.stop]
-        self._world_pose, self._twist = self._sensors[_WORLD_POSE], self._sensors[_TWIST]  # (7,), quaternion w first; (6,)
-        self._world_position, self._world_quaternion = self._world_pose[:3], self._world_pose[3:]
+        self._world_position, self._world_quaternion, self._twist = (self._sensors[part] for part in (_POSITION, _QUATERNION, _TWIST))
         self._poses = np.empty(14)
         self._pose = self._poses[7:]
-        self._before, self._moved, self._turned = np.empty(7), np.zeros(6), np.empty(3)
-        self._position_before, self._quaternion_before = self._before[:3], self._before[3:]
+        self._moved, self._turned = np.zeros(6), np.empty(3)
         self._translation, self._rotation = self._moved[:3], self._moved[3:]
         self._motion: MotionSide | None = None
         self._command_port = f"{name}/servo_jp"
@@ -67,24 +68,22 @@ class RunningArm:
         if self._motion is not None:
             self._motion.begin(inputs, self._pose, self._twist)
             self._wrench[:] = self._motion.force(0.0, self._pose, self._twist)
-            self._before[:] = self._world_pose
 
     def correct(self, tau: float) -> None:
         """Follow the bond's correction: a new wrench from `tau` seconds into the step on."""
         if self._motion is not None:
             self.end()
             self._wrench[:] = self._motion.force(tau, self._pose, self._twist)
-            self._before[:] = self._world_pose
 
     def end(self) -> None:
-        """Bring the outputs up to the model's present state, and book the work of the wrench since it was set."""
-        self._sensors.take(_POSES, None, self._poses, "clip")  # three times as fast as the default mode
+        """Book the work of the wrench since it was set, and bring the outputs up to the model's present state."""
         if self._motion is not None:
-            np.subtract(self._world_position, self._position_before, out=self._translation)
+            np.subtract(self._world_position, self._pose[:3], out=self._translation)  # the pose is still the one before
             if any(self._torque):  # a sphere in contact feels none
-                mujoco.mju_subQuat(self._turned, self._world_quaternion, self._quaternion_before)  # in the probe's own axes
+                mujoco.mju_subQuat(self._turned, self._world_quaternion, self._pose[_W_FIRST])  # in the probe's own axes
                 mujoco.mju_rotVecQuat(self._rotation, self._turned, self._world_quaternion)
             self._motion.add(self._wrench, self._moved)
+        self._sensors.take(_POSES, None, self._poses, "clip")  # three times as fast as the default mode
 
     def refresh(self) -> None:
         """Follow the model after its state was set from outside."""
