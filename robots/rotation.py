@@ -11,7 +11,7 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["conjugate", "exp", "from_matrix", "log", "matrix", "product", "right_matrix"]
+__all__ = ["conjugate", "exp", "from_matrix", "log", "matrix", "product"]
 
 _SMALL_ANGLE = 1e-6
 """Below this (rad) the next term of the sine's series is under the rounding error of a double."""
@@ -29,12 +29,6 @@ def product(a: Vector, b: Vector) -> Vector:
             aw * bw - ax * bx - ay * by - az * bz,
         ]
     )
-
-
-def right_matrix(b: Vector) -> Vector:
-    """Return M, shape (4, 4), with product(a, b) = M a."""
-    x, y, z, w = b.tolist()
-    return np.array([[w, z, -y, x], [-z, w, x, y], [y, -x, w, z], [-x, -y, -z, w]])
 
 
 def conjugate(q: Vector) -> Vector:
