@@ -107,7 +107,7 @@ class BulletEngine(Stepped):
         for bond in self.bonds:
             if bond.name in setup.bonds:
                 self._proxies.append(Proxy(self.params.probes[bond.name], bond, setup.bonds[bond.name], self.params.gravity, client))
-        self._sample(0)
+        self._read_nodes(0)
         outputs = self._nodes(0)
         for proxy in self._proxies:
             outputs.update(proxy.idle)
@@ -125,9 +125,11 @@ class BulletEngine(Stepped):
             for proxy in proxies:
                 proxy.read()
         end = t + h
-        due = end % self.params.node_period == 0
-        if due or end // _CONTACT_PERIOD_NS != t // _CONTACT_PERIOD_NS:
-            self._sample(end)
+        due, touch = end % self.params.node_period == 0, end // _CONTACT_PERIOD_NS != t // _CONTACT_PERIOD_NS
+        if due or touch:
+            self._read_nodes(end)
+        if touch:
+            self._update_gains()
         outputs = self._nodes(end) if due else {}
         for proxy in proxies:
             outputs.update(proxy.result(end, seconds))
@@ -165,9 +167,11 @@ class BulletEngine(Stepped):
             outputs[f"{organ.name}/nodes"] = SoftBodyState(header=header, body=organ.name, nodes_m=organ.nodes.astype(np.float32).ravel(), triangles=triangles)
         return outputs
 
-    def _sample(self, t: int) -> None:
+    def _read_nodes(self, t: int) -> None:
         for organ in self._organs:
             organ.sample(t)
+
+    def _update_gains(self) -> None:
         for proxy in self._proxies:
             proxy.gain = max(organ.contact_gain(proxy.position, proxy.radius) for organ in self._organs)
 

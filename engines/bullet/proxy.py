@@ -63,7 +63,7 @@ class Proxy:
         self._placed = False
         self._client = client
         shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=params.radius, physicsClientId=client)
-        # As a multi-body: contacts between deformable and rigid bodies of maximal coordinates lose the reaction.
+        # A multi-body: with maximal coordinates the sphere is not finite after its first step (pybullet 3.2.7).
         self._body = bullet.createMultiBody(params.mass, shape, basePosition=self.position.tolist(), useMaximalCoordinates=False, physicsClientId=client)
         bullet.changeDynamics(
             self._body,

@@ -41,6 +41,14 @@ def test_nodes_come_at_their_period_only():
         assert due == [3, 7, 11]
 
 
+def test_how_often_the_nodes_are_output_does_not_change_the_physics():
+    forces = []
+    for node_period in ("1 ms", "64 ms"):
+        with Rig(params(SMALL_BLOCK, node_period=node_period)) as rig:
+            forces.append(rig.move((0.004, 0.003, RADIUS - 3e-3), 0.1))
+    np.testing.assert_array_equal(*forces)
+
+
 def test_same_inputs_give_the_same_hashes_in_another_process_and_beside_another_engine():
     program = subprocess.run([sys.executable, "-m", "tests.engines.bullet_rig"], capture_output=True, text=True, check=True)
     expected = [int(value, 16) for value in program.stdout.split()]  # also: nothing else on stdout
