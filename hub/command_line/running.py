@@ -15,10 +15,16 @@ from hub.scenario_file import load
 __all__ = ["run"]
 
 
+def _is_new(directory: Path | None) -> Path | None:
+    if directory is not None and directory.exists() and not (directory.is_dir() and not any(directory.iterdir())):
+        raise typer.BadParameter(f"'{directory}' is there already; name a new directory.")
+    return directory
+
+
 def run(
     scenario: ScenarioName,
     *,
-    record: Annotated[Path | None, typer.Option(metavar="DIR", help="Record to a new rosbag2 directory.")] = None,
+    record: Annotated[Path | None, typer.Option(metavar="DIR", callback=_is_new, help="Record to a new rosbag2 directory.")] = None,
     overrides: Overrides = None,
     pace: Annotated[Literal["fast", "realtime"] | None, typer.Option(help="Instead of the scenario's own.")] = None,
     listen: Listen = None,

@@ -127,6 +127,7 @@ def test_run_prints_its_summary_as_json_on_stdout_alone(trocar, swinging, tmp_pa
     summary = json.loads(out)
     assert {"steps": 20, "sim_time_s": 0.02, "late_steps": 0, "recording": str(tmp_path / "recording"), "state": "done"}.items() <= summary.items()
     assert {"last_angle", "wall_time_s", "real_time_factor", "state_hash", "energy_residual_j"} <= set(summary)
+    assert trocar("run", swinging, "--record", tmp_path / "recording")[0] == 2
     code, out, err = trocar("verify", tmp_path / "recording", "--json")
     assert code == 0, err
     assert {"same": True, "steps": 20, "hashes": 40}.items() <= json.loads(out).items()
