@@ -21,8 +21,8 @@ from hub.participant import Outputs, Setup, Stepped
 from hub.plan import Member, Plan
 from hub.wire import PortCodec, PortPublisher, Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
+from schemas.lockstep import Permission, Report
 from schemas.ports import BondSide, Port
-from schemas.trocar_msgs import Ack, Grant
 
 __all__ = ["Done", "Host", "Tap"]
 
@@ -31,8 +31,8 @@ log = logging.getLogger(__name__)
 Tap = Callable[[Member, Port, int, int, Any], None]
 """Is shown every output value: participant, port, step, time (ns) at which it is valid, value."""
 
-Done = Callable[[str, Ack], None]
-"""Gets the ack of a participant that has done its part of a grant."""
+Done = Callable[[Member, Report], None]
+"""Gets the report of a participant that has done its part of a grant."""
 
 
 @dataclass(slots=True)
@@ -104,7 +104,7 @@ class Host:
     def _slot(self, member: Member, participant: Stepped) -> _Slot:
         values = {port.name: _start_value(port) for port in member.ports if port.causality == "input" and port.variability == "signal"}
         inputs = Inputs(values)
-        rates, events, stale = inputs._rates, inputs._events, inputs._stale  # noqa: SLF001  # pyright: ignore[reportPrivateUsage]  # the host fills them
+        rates, events, stale = inputs._rates, inputs._events, inputs._stale  # pyright: ignore[reportPrivateUsage]  # the host fills them
         slot = _Slot(participant, member, member.period * self.plan.step_ns, inputs, values, rates, events, stale)
         slot.work_ports = tuple(f"{bond.name}/work" for bond in member.bonds)
         return slot
@@ -205,8 +205,8 @@ class Host:
         """Return who steps at least once in `count` steps from `step`, in step order."""
         return [s.member.name for s in self._slots if -step % s.member.period < count]
 
-    def run(self, grant: Grant, done: Done) -> None:
-        """Take what enters with `grant` and step to its horizon; `done` gets the ack of each participant as soon as it is through.
+    def run(self, grant: Permission, done: Done) -> None:
+        """Take what enters with `grant` and step to its horizon; `done` gets the report of each participant as soon as it is through.
 
         Raises ParticipantError.
         """
@@ -223,7 +223,7 @@ class Host:
                 if not step % period:
                     self._step(slot, step, step * step_ns)
                     if step + period >= end:
-                        done(slot.member.name, _ack(grant, slot))
+                        done(slot.member, Report(grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j))
 
     def _step(self, slot: _Slot, step: int, t: int) -> None:
         for reader in slot.readers:
@@ -306,18 +306,6 @@ class Host:
                 log.exception("participant '%s' raised while it was closed", slot.member.name)
         if self._wire is not None:
             self._wire.close()
-
-
-def _ack(grant: Grant, slot: _Slot) -> Ack:
-    return Ack.model_construct(
-        run=grant.run,
-        epoch=grant.epoch,
-        step=grant.step,
-        state_hash=np.array(slot.hashes, np.uint64),
-        compute_ns=np.array(slot.compute_ns, np.uint64),
-        work_j=np.array(slot.work_j, np.float64),
-        error="",
-    )
 
 
 def _start_value(port: Port) -> Any:

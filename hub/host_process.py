@@ -24,12 +24,12 @@ from hub.control import Empty, JoinReply, JoinRequest, ask
 from hub.devices import DeviceLoop
 from hub.host import Host
 from hub.participant import Device, Stepped
+from hub.plan import Member
 from hub.registry import make
 from hub.wire import Drops, Wire, open_session
-from schemas.codec import decode, encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.keys import Keys
-from schemas.trocar_msgs import Ack, Grant
+from schemas.lockstep import Permission, Report, pack_report, unpack_permission
 
 __all__ = ["main", "run_host"]
 
@@ -102,11 +102,11 @@ class _JoinedHost:
             try:
                 self._host.run(grant, self._done)
             except ParticipantError as error:
-                self._done(error.participant, Ack(run=self._run, epoch=0, step=error.step, error=error.cause))
+                self._acks[error.participant].put(pack_report(Report(self._run, 0, error.step, (), (), (), error.cause)))
                 raise
             grant = self._next_grant()
 
-    def _first_grant(self) -> Grant:
+    def _first_grant(self) -> Permission:
         """Repeat the values at time 0 until all links have carried theirs and the first grant is here."""
         told = False
         while True:
@@ -114,22 +114,22 @@ class _JoinedHost:
             if not told and self._host.linked():
                 told = True
                 for member in self._host.members:
-                    self._done(member.name, Ack(run=self._run, epoch=0, step=-1))
+                    self._done(member, Report(self._run, 0, -1, (), (), ()))
             if told and (sample := self._grants.try_recv()) is not None:
                 grant = self._accept(sample)
                 if grant is not None:
                     return grant
             sleep(_PRIME_S)
 
-    def _next_grant(self) -> Grant:
+    def _next_grant(self) -> Permission:
         while True:
             grant = self._accept(self._grants.recv())
             if grant is not None:
                 return grant
 
-    def _accept(self, sample: zenoh.Sample) -> Grant | None:
+    def _accept(self, sample: zenoh.Sample) -> Permission | None:
         try:
-            grant = decode(Grant, sample.payload.to_bytes())
+            grant = unpack_permission(sample.payload.to_bytes())
             if grant.run != self._run:
                 raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
         except MessageError as error:
@@ -137,8 +137,8 @@ class _JoinedHost:
             return None
         return grant
 
-    def _done(self, participant: str, ack: Ack) -> None:
-        self._acks[participant].put(encode(ack))
+    def _done(self, member: Member, report: Report) -> None:
+        self._acks[member.name].put(pack_report(report))
 
     def _device_failed(self, name: str, cause: str) -> None:
         log.error("device '%s' has failed: %s", name, cause)
@@ -186,7 +186,7 @@ def main() -> None:
     try:
         run_host(arguments.connect, arguments.session, arguments.host)
     except TrocarError as error:
-        log.error("%s", error)  # noqa: TRY400  # the cause is in the message; the traceback was logged where it happened
+        log.error("%s", error)  # the cause is in the message; the traceback was logged where it happened
         sys.exit(1)
 
 

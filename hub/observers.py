@@ -16,6 +16,7 @@ from hub.wire import Drops, PortCodec, Tag
 from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
+from schemas.lockstep import Permission, Report, pack_report
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.trocar_msgs import Ack, Grant, InletSample, SessionStatus
@@ -61,6 +62,11 @@ class Observers:
             self._channels[key] = self._recorder.channel(topic(key), type_name)
         return self._channels[key]
 
+    @property
+    def watches_values(self) -> bool:
+        """Say whether output values matter here at all."""
+        return self._recorder is not None or bool(self.measures.by_port)
+
     def subscriptions(self, plan: Plan) -> list[str]:
         """Return the keys on which values of other processes are to be watched."""
         away = [w for w in self._watched.values() if w.member.host != "hub" and w.member.role != "device"]
@@ -97,7 +103,7 @@ class Observers:
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
-    def grant(self, grant: Grant, payload: bytes) -> None:
+    def grant(self, grant: Permission, payload: bytes) -> None:
         """Take a grant and the device samples in it."""
         if self._recorder is None:
             return
@@ -110,12 +116,12 @@ class Observers:
         if watched is not None and sample.payload.size and self._recorder is not None:
             self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())
 
-    def ack(self, member: Member, ack: Ack, time_ns: int, payload: bytes | None) -> None:
-        """Take an ack; `payload` are its bytes if it came from the wire."""
-        self.energy.take(member.name, ack)
+    def report(self, member: Member, report: Report, time_ns: int, payload: bytes | None) -> None:
+        """Take a report; `payload` are its bytes if it came from the wire."""
+        self.energy.take(member.name, report)
         if self._recorder is not None:
             channel = self._channel(self._keys.ack(member.name), Ack.ros_type)
-            self._recorder.write(channel, time_ns, encode(ack) if payload is None else payload)
+            self._recorder.write(channel, time_ns, pack_report(report) if payload is None else payload)
 
     def books(self, time_ns: int) -> list[Message]:
         """Return (and record) the energy books when they are due."""

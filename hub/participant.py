@@ -120,7 +120,7 @@ class Stepped(_Participant):
         """Return the whole state. Raises StateError where the participant cannot."""
         raise StateError(f"participant '{self.name}' ({type(self).__name__}) cannot save its state")
 
-    def restore(self, state: bytes) -> None:
+    def restore(self, state: bytes) -> None:  # noqa: ARG002
         """Return to a saved state, bit for bit. Raises StateError where the participant cannot."""
         raise StateError(f"participant '{self.name}' ({type(self).__name__}) cannot restore a state")
 
@@ -152,5 +152,5 @@ def state_hash(*parts: bytes | Vector) -> int:
     """Return a 64-bit hash of `parts`, the same on every machine that has the same bits."""
     digest = hashlib.blake2b(digest_size=8)
     for part in parts:
-        digest.update(memoryview(part))
+        digest.update(part if isinstance(part, bytes) else part.tobytes())
     return int.from_bytes(digest.digest(), "little")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import json
 import logging
 import secrets
+import struct
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from time import monotonic, monotonic_ns, sleep
 from typing import Any
@@ -32,12 +30,13 @@ from hub.participant import Device, Stepped
 from hub.plan import Member, Plan
 from hub.recorder import Recorder, RecorderSummary
 from hub.wire import Drops, PortCodec, Wire, open_session
-from schemas.codec import decode, encode, message_type
+from schemas.codec import encode, message_type
 from schemas.errors import MessageError, ParticipantError, ScenarioError, SessionError
 from schemas.keys import Keys
+from schemas.lockstep import Permission, Report, pack_permission, pack_report, unpack_report
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import Ack, Grant, ParticipantStatus, SessionStatus
+from schemas.trocar_msgs import Grant, ParticipantStatus, SessionStatus
 
 __all__ = ["Progress", "Session", "Summary"]
 
@@ -98,12 +97,12 @@ class Session:
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
         grants: Iterator[Grant] | None = None,
-        on_ack: Callable[[Member, Ack], None] | None = None,
+        on_report: Callable[[Member, Report], None] | None = None,
     ) -> None:
         """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this process.
 
         `directory`: where relative paths of the scenario start. `grants`: re-simulate these instead of listening to devices.
-        `on_ack` sees every ack as it comes.
+        `on_report` sees every report as it comes.
         """
         self.scenario = scenario
         self.plan = plan
@@ -114,7 +113,7 @@ class Session:
         self._record = record
         self._attachments = dict(attachments or {})
         self._grants = grants
-        self._on_ack = on_ack
+        self._on_report = on_report
         self._run_id = secrets.randbits(63) | 1
         self._keys = Keys(scenario.name)
         steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
@@ -171,6 +170,7 @@ class Session:
         self._drops = Drops()
         self._fleet = Fleet()
         self._acks = session.declare_subscriber(self._keys.ack("*"), FifoChannel(4096))
+        self._by_ack = {self._keys.ack(name): self.plan.members[name] for name in self.plan.order}
         self._own_acks = {name: session.declare_publisher(self._keys.ack(name)) for name in self.plan.order}
         settings: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME, "express": True}
         self._grant_publisher = session.declare_publisher(self._keys.grant, encoding=zenoh.Encoding.APPLICATION_CDR, **settings)
@@ -190,7 +190,7 @@ class Session:
 
     def _lay_local(self) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
-        self._host = Host("hub", self.plan, stepped, wire=Wire(self._session, self._keys, self._run_id), tap=self._observers.value)
+        self._host = Host("hub", self.plan, stepped, wire=Wire(self._session, self._keys, self._run_id), tap=self._observers.value if self._observers.watches_values else None)
         self._remote = [name for name in self.plan.order if self.plan.members[name].host != "hub"]
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
         self._scripted = ScriptedDevices({n: d for n, d in devices.items() if follows_clock(self.plan.members[n])})
@@ -302,73 +302,68 @@ class Session:
         self._clock.start()
         return not self.state.ending
 
-    def _next_grant(self) -> Grant | None:
+    def _next_grant(self) -> Permission | None:
         """Return the next grant, with all that enters the simulation at this communication point."""
         if self._grants is not None:
             recorded = next(self._grants, None)
-            return None if recorded is None else recorded.model_copy(update={"run": self._run_id})
+            if recorded is None:
+                return None
+            return Permission(self._run_id, recorded.epoch, recorded.step, recorded.start_ns, recorded.horizon_ns, recorded.inlets)
         time_ns = self._clock.time_ns
         self._scripted.read(time_ns, self._clock.step, lambda name, port, payload: self._inlets.offer(name, port, payload, monotonic_ns()))
         count = self._clock.horizon(self.state.budget)
-        return Grant.model_construct(
-            run=self._run_id,
-            epoch=0,
-            step=self._clock.step,
-            start_ns=time_ns,
-            horizon_ns=time_ns + count * self.plan.step_ns,
-            inlets=self._inlets.sample(monotonic_ns()),
-        )
+        horizon_ns = time_ns + count * self.plan.step_ns
+        return Permission(self._run_id, 0, self._clock.step, time_ns, horizon_ns, self._inlets.sample(monotonic_ns()))
 
-    def _step(self, grant: Grant) -> None:
+    def _step(self, grant: Permission) -> None:
         """Publish a grant, take part in it, and wait until everybody else has."""
         count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         if self._remote or self._record is not None:
-            payload = encode(grant)
+            payload = pack_permission(grant)
             self._observers.grant(grant, payload)
             if self._remote:
                 self._grant_publisher.put(payload)
         waiting = [name for name in self.plan.order if -grant.step % self.plan.members[name].period < count]
         self._watchdog.wait_for(waiting)
         waiting = [name for name in waiting if self.plan.members[name].host != "hub"]
-        self._host.run(grant, self._take_own)
+        self._host.run(grant, self._take)
         while waiting:
             accepted = self._accept(self._acks.recv(), waiting, grant)
             if accepted is not None:
                 waiting.remove(accepted[0].name)
-                self._watchdog.wait_for(waiting)
-                self._take(accepted[0], accepted[1], accepted[2])
+                self._take(*accepted)
         self._watchdog.wait_for(())
         for message in self._observers.books(grant.horizon_ns):
             self._energy_publishers[message.bond].put(encode(message))  # pyright: ignore[reportAttributeAccessIssue]
         self._clock.advance(count)
         self.state.spend(count)
 
-    def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], grant: Grant | None = None) -> tuple[Member, Ack, bytes] | None:
+    def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None) -> tuple[Member, Report, bytes] | None:
         """Return a valid ack of this grant; raise what it reports; drop and count anything else."""
         try:
-            payload = sample.payload.to_bytes()
-            ack = decode(Ack, payload)
-            name = str(sample.key_expr).rsplit("/", 2)[1]
-            if ack.run != self._run_id or name not in self.plan.members:
+            member = self._by_ack.get(str(sample.key_expr))
+            if member is None:
                 raise MessageError("belongs to no participant of this run")
-            if ack.error:
-                raise ParticipantError(name, ack.step if ack.step >= 0 else self._clock.step, ack.error)
-            if name not in waiting or ack.step != (-1 if grant is None else grant.step):
-                raise MessageError(f"acknowledges step {ack.step}, which nobody waits for")
+            payload = sample.payload.to_bytes()
+            steps = 0 if grant is None else _steps_in(grant, member, self.plan.step_ns)
+            report = unpack_report(payload, steps, steps * len(member.bonds))
+            if report.run != self._run_id:
+                raise MessageError(f"belongs to run {report.run:x}, this is run {self._run_id:x}")
+            if report.error:
+                raise ParticipantError(member.name, report.step if report.step >= 0 else self._clock.step, report.error)
+            if member.name not in waiting or report.step != (-1 if grant is None else grant.step):
+                raise MessageError(f"acknowledges step {report.step}, which nobody waits for")
         except MessageError as error:
             self._drops.count(sample, error)
             return None
-        return self.plan.members[name], ack, payload
+        return member, report, payload
 
-    def _take_own(self, name: str, ack: Ack) -> None:
-        self._take(self.plan.members[name], ack, None)
-
-    def _take(self, member: Member, ack: Ack, payload: bytes | None) -> None:
-        self._digests[member.name].update(ack.state_hash)  # pyright: ignore[reportArgumentType]
-        self._done[member.name] = ack.step + (ack.state_hash.size - 1) * member.period
-        self._observers.ack(member, ack, (self._done[member.name] + member.period) * self.plan.step_ns, payload)
-        if self._on_ack is not None:
-            self._on_ack(member, ack)
+    def _take(self, member: Member, report: Report, payload: bytes | None = None) -> None:
+        self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
+        last = self._done[member.name] = report.step + (-report.step) % member.period + (len(report.state_hash) - 1) * member.period
+        self._observers.report(member, report, (last + member.period) * self.plan.step_ns, payload)
+        if self._on_report is not None:
+            self._on_report(member, report)
 
     def _close(self) -> None:
         """End processes and close everything; the hosts end when the hub's token is gone."""
@@ -391,10 +386,10 @@ class Session:
         """Report a failure from any thread: as an ack of the participant, so that whoever waits for it hears of it."""
         log.error("participant '%s': %s", participant, cause)
         if participant in self._own_acks:
-            self._own_acks[participant].put(encode(Ack(run=self._run_id, epoch=0, step=self._clock.step, error=cause)))
+            self._own_acks[participant].put(pack_report(Report(self._run_id, 0, self._clock.step, (), (), (), cause)))
         else:
             name = self.plan.order[0]
-            self._own_acks[name].put(encode(Ack(run=self._run_id, epoch=0, step=self._clock.step, error=f"device '{participant}': {cause}")))
+            self._own_acks[name].put(pack_report(Report(self._run_id, 0, self._clock.step, (), (), (), f"device '{participant}': {cause}")))
         if self.plan.members[participant].host == "hub" and participant in self._watchdog.waiting:
             self._hung = (participant, self._clock.step, cause)
             threading.main_thread().is_alive() and __import__("_thread").interrupt_main()
@@ -520,3 +515,9 @@ class Session:
             energy_residual_j=self._observers.energy.residual_j,
             measures=self._observers.measures.results(),
         )
+
+
+def _steps_in(grant: Permission, member: Member, step_ns: int) -> int:
+    """Return how many steps a participant takes in a grant."""
+    period = member.period
+    return (grant.horizon_ns // step_ns - 1) // period - (grant.step - 1) // period

@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from hub import registry
 from hub.plan import Member, Plan
 from hub.recording import Recording
 from hub.session import Progress, Session
 from schemas.errors import RecordingError
+from schemas.lockstep import Report
 from schemas.trocar_msgs import Ack
 
 __all__ = ["VerifySummary", "verify"]
@@ -42,7 +41,7 @@ def verify(recording: Recording, *, endpoint: str | None = None, progress: Calla
     here = [member for member in plan.members.values() if member.host == "hub" and member.role != "device"]
     made = {member.name: registry.make(member.kind, member.name, scenario.participants[member.name].params, directory) for member in here}
     comparison = _Comparison(recording, plan)
-    session = Session(scenario, plan, made, directory, endpoint=endpoint, grants=recording.grants(), on_ack=comparison.take)
+    session = Session(scenario, plan, made, directory, endpoint=endpoint, grants=recording.grants(), on_report=comparison.take)
     comparison.stop = session.state.shutdown
     ran = session.run(progress)
     first = comparison.first
@@ -71,18 +70,18 @@ class _Comparison:
         """Step and place in the step order of the first difference."""
         return min(self._differences, default=None)
 
-    def take(self, member: Member, ack: Ack) -> None:
-        """Compare an ack; at a difference, end the session once the others of this step have been compared."""
+    def take(self, member: Member, report: Report) -> None:
+        """Compare a report; at a difference, end the session once the others of this step have been compared."""
         then = next(self._recorded[member.name], None)
         if then is None:
             return  # the recording was cut short between the grant and this ack
-        count = min(len(then.state_hash), len(ack.state_hash))
-        self.hashes += count
-        different = np.flatnonzero(then.state_hash[:count] != ack.state_hash[:count])
-        if then.step != ack.step or len(then.state_hash) != len(ack.state_hash):
-            self._differ(ack.step, member)
-        elif different.size:
-            self._differ(ack.step + int(different[0]) * member.period, member)
+        recorded = then.state_hash.tolist()
+        self.hashes += min(len(recorded), len(report.state_hash))
+        first = next((i for i, (one, other) in enumerate(zip(recorded, report.state_hash, strict=False)) if one != other), None)
+        if then.step != report.step or len(recorded) != len(report.state_hash):
+            self._differ(report.step, member)
+        elif first is not None:
+            self._differ(report.step + first * member.period, member)
 
     def _differ(self, step: int, member: Member) -> None:
         self._differences.append((step, self._order.index(member.name)))

@@ -57,10 +57,11 @@ class VectorCodec:
         self.fields: dict[str, slice] = {}
         """Position of each block in the vector, by its full path and by its last word."""
         self._blocks = list(self._layout())
-        self.size = self._blocks[-1][2].stop
+        self.size: int = self._blocks[-1][2].stop
         self.neutral = np.zeros(self.size)
         """The value nobody has set: zeros, and the unit quaternion."""
-        if "pose.orientation" in self.fields:
+        self._is_pose = "pose.orientation" in self.fields
+        if self._is_pose:
             self.neutral[6] = 1.0
         self._compile()
 
@@ -78,12 +79,18 @@ class VectorCodec:
 
     def _compile(self) -> None:
         """Find where the stamp and the blocks stand in the CDR bytes, by serialising numbers that occur nowhere else."""
-        marks = np.random.default_rng(0).random(self.size)
+        marks: Vector = np.random.default_rng(0).random(self.size)
         template = bytearray(encode(self.to_message(marks, 0)))
         self._offsets = [(template.index(struct.pack("<d", marks[block.start])), block) for _, _, block in self._blocks]
         self._has_stamp = "header" in self.model.model_fields
-        for offset, block in self._offsets:
-            template[offset : offset + 8 * (block.stop - block.start)] = bytes(8 * (block.stop - block.start))
+        self._fixed: list[tuple[int, int, bytes]] = []
+        at = 0
+        for offset, block in [*self._offsets, (len(template), slice(0, 0))]:
+            if at == 0 and self._has_stamp:
+                self._fixed.append((0, 4, bytes(template[0:4])))
+                at = 12
+            self._fixed.append((at, offset, bytes(template[at:offset])))
+            at = offset + 8 * (block.stop - block.start)
         self._template = bytes(template)
         self._length = len(template)
 
@@ -104,28 +111,21 @@ class VectorCodec:
         """
         if len(payload) != self._length:
             raise MessageError(f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}")
-        value = np.empty(self.size)
-        rest = bytearray(payload)
-        for offset, block in self._offsets:
-            count = block.stop - block.start
-            value[block] = np.frombuffer(payload, np.float64, count, offset)
-            rest[offset : offset + 8 * count] = bytes(8 * count)
-        if self._has_stamp:
-            rest[4:12] = self._template[4:12]
-        if rest != self._template:
-            raise MessageError(f"port '{self.port.name}': frame, names or layout differ from what the port declares")
-        return self.checked(value)
+        for start, stop, expected in self._fixed:
+            if payload[start:stop] != expected:
+                raise MessageError(f"port '{self.port.name}': frame, names or layout differ from what the port declares")
+        parts = [np.frombuffer(payload, np.float64, block.stop - block.start, offset) for offset, block in self._offsets]
+        return self.checked(parts[0].copy() if len(parts) == 1 else np.concatenate(parts))
 
     def checked(self, value: Vector) -> Vector:
-        """Return `value` if it has the right shape, is finite and its quaternion (if any) is a unit quaternion."""
-        if value.shape != (self.size,):
-            raise MessageError(f"port '{self.port.name}': shape {value.shape}, expected ({self.size},)")
-        if not np.isfinite(value).all():
+        """Return `value` if it holds doubles, has the right shape, is finite and its quaternion (if any) is a unit quaternion."""
+        if value.shape != (self.size,) or value.dtype != np.float64:
+            raise MessageError(f"port '{self.port.name}': {value.dtype} of shape {value.shape}, expected float64 of shape ({self.size},)")
+        if 0 in np.isfinite(value).tobytes():  # a third of the cost of np.isfinite(...).all()
             raise MessageError(f"port '{self.port.name}': not all of {value} are finite")
-        if self.size == 7 and "pose.orientation" in self.fields:
+        if self._is_pose and abs(value[3:] @ value[3:] - 1.0) > 2.0 * _QUATERNION_TOLERANCE:
             norm = float(np.linalg.norm(value[3:]))
-            if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
-                raise MessageError(f"port '{self.port.name}': quaternion (x, y, z, w) has norm {norm:.6g}, expected 1")
+            raise MessageError(f"port '{self.port.name}': quaternion (x, y, z, w) has norm {norm:.6g}, expected 1")
         return value
 
     def to_message(self, value: Vector, time_ns: int) -> Message:
@@ -149,7 +149,10 @@ class VectorCodec:
 
         Joints may come in any order if they are named. Raises MessageError if frame, names or sizes do not fit the port.
         """
-        frame = message.header.frame_id if isinstance(getattr(message, "header", None), Header) else ""  # pyright: ignore[reportAttributeAccessIssue]
+        if not isinstance(message, self.model):
+            raise MessageError(f"port '{self.port.name}': {message.ros_type}, expected {self.port.type}")
+        header = getattr(message, "header", None)
+        frame = header.frame_id if isinstance(header, Header) else ""
         if self.port.frame and frame and frame != self.port.frame:
             raise MessageError(f"port '{self.port.name}': frame '{frame}', expected '{self.port.frame}'")
         value = np.empty(self.size)
@@ -165,6 +168,6 @@ class VectorCodec:
         names: list[str] = getattr(message, "name", [])
         if not names or tuple(names) == self.port.names:
             return slice(None)
-        if set(names) != set(self.port.names):
+        if sorted(names) != sorted(self.port.names):
             raise MessageError(f"port '{self.port.name}': joints {names}, expected {list(self.port.names)}")
         return [names.index(name) for name in self.port.names]
