@@ -89,7 +89,7 @@ class Block:
         if self._always_usable:
             return
         usable = np.isfinite(self.values) if self.type.dtype.kind == "f" else np.abs(self.values) <= LARGEST_EXACT
-        if not usable.all():
+        if 0 in usable.tobytes():  # a third of the cost of usable.all()
             port, value = next((port, self.values[part]) for port, part in self.parts.items() if not usable[part].all())
             limit = "finite numbers" if self.type.dtype.kind == "f" else "numbers of at most 2^53"
             raise SessionError(f"output '{self._names[port]}' is {value}, expected {limit}")
