@@ -19,6 +19,9 @@ __all__ = ["decode", "encode", "message_type", "message_types", "rihs01", "ros2m
 MAX_MESSAGE_BYTES = 16 * 2**20
 """Larger payloads are refused unread: the largest honest message, an uncompressed 1080p stereo image, has 12 MB."""
 
+_PLAIN_CDR = (b"\x00\x00", b"\x00\x01")
+"""The representation identifiers CDR_BE and CDR_LE of OMG DDSI-RTPS."""
+
 M = TypeVar("M", bound=Message)
 
 
@@ -59,6 +62,8 @@ def decode(model: type[M], payload: bytes) -> M:
     """
     if len(payload) > MAX_MESSAGE_BYTES:
         raise MessageError(f"{model.ros_type}: {len(payload)} bytes exceed the limit of {MAX_MESSAGE_BYTES}")
+    if bytes(payload[:2]) not in _PLAIN_CDR:
+        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message (they do not begin as CDR)")
     try:
         raw = typestore().deserialize_cdr(payload, model.ros_type)
         return model.model_validate(raw, from_attributes=True)

@@ -6,6 +6,7 @@ cannot drift from it. Numbers must be finite: a NaN never leaves or enters a sim
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, ClassVar, get_args, get_origin
 
 import numpy as np
@@ -47,17 +48,26 @@ class RosType:
         """Validate arrays as one-dimensional, of the right element type, finite and (if fixed) of the right length."""
         if self.dtype is None:
             return handler(source)
-        return core_schema.no_info_plain_validator_function(self._array, serialization=core_schema.plain_serializer_function_ser_schema(lambda a: a.tolist()))
+        return core_schema.no_info_plain_validator_function(
+            partial(self._array, self.dtype), serialization=core_schema.plain_serializer_function_ser_schema(lambda a: a.tolist())
+        )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
         """Arrays are JSON arrays of numbers."""
         return handler(schema) if self.dtype is None else {"type": "array", "items": {"type": "number"}}
 
-    def _array(self, value: Any) -> NDArray[Any]:
+    def _array(self, dtype: np.dtype[Any], value: Any) -> NDArray[Any]:
         try:
-            array = np.asarray(value, dtype=self.dtype)
+            exact = dtype.kind != "f" and not isinstance(value, np.ndarray)  # Python's integers are longer than any of numpy's
+            given: NDArray[Any] = np.asarray(value, object if exact else None)
+            if dtype.kind == "f" and given.size and given.dtype.kind not in "biuf":
+                raise ValueError(f"these are {given.dtype}")
+            with np.errstate(over="ignore", invalid="ignore"):
+                array = given.astype(dtype, copy=False)
         except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(f"expected {self.name}: {error}") from error
+        if dtype.kind != "f" and array.dtype != given.dtype and not np.array_equal(array, given):
+            raise ValueError(f"expected {self.name}: a number is not whole or out of range")
         if array.ndim != 1:
             raise ValueError(f"expected {self.name}, got an array of shape {array.shape}")
         length = self.name.partition("[")[2].rstrip("]")
@@ -86,7 +96,7 @@ Float64Array = Annotated[NDArray[np.float64], RosType("float64[]", np.float64)]
 
 
 def fixed_float64(length: int) -> RosType:
-    """Return the mark of a `float64[length]` field: `Annotated[NDArray[np.float64], fixed_float64(9)]`."""
+    """Make the mark of an array field of fixed length, for use in `Annotated[NDArray[np.float64], ...]`."""
     return RosType(f"float64[{length}]", np.float64)
 
 

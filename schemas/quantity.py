@@ -5,37 +5,59 @@ A bare number is taken in the SI unit of the field; another dimension is refused
 
 from __future__ import annotations
 
+import math
+import re
+import sys
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any
+from tokenize import TokenError
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
-
-if TYPE_CHECKING:
-    from pint import UnitRegistry
 
 __all__ = ["Acceleration", "Angle", "Damping", "Density", "Duration", "Force", "Length", "Mass", "Pressure", "Speed", "Stiffness", "same_unit", "to_si"]
 
 
+_FACTOR = r"(?:1|%|°?[^\W\d]\w*)(?:(?:\^|\*\*)-?\d)?"
+_UNIT = re.compile(rf"\(*{_FACTOR}\)*(?:(?:\s*[*/]\s*|\s+)\(*{_FACTOR}\)*)*")
+"""What is given to pint, which evaluates more than units: `9**9**9` would keep it busy for ever."""
+_QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.ASCII)
+
+
 @cache
-def _registry() -> UnitRegistry[float]:
+def _registry() -> Any:
     from pint import UnitRegistry  # 0.2 s to build, so only where a quantity is read
 
-    return UnitRegistry()
+    return UnitRegistry()  # pyright: ignore[reportUnknownVariableType]
+
+
+def _converted(number: float, unit: str, target: str) -> float:
+    """Return `number` in unit `target`. Raises ValueError where there is no way from `unit` to there."""
+    from pint.errors import PintError
+
+    if not _UNIT.fullmatch(unit) or not _UNIT.fullmatch(target):
+        raise ValueError(f"'{unit}' is no unit")
+    try:
+        return float(_registry().Quantity(number, unit).to(target).magnitude)
+    except (PintError, AssertionError, TokenError, TypeError, ValueError, ArithmeticError) as error:
+        raise ValueError(str(error) or f"'{unit}' is no unit") from error
 
 
 def to_si(value: Any, unit: str) -> float:
-    """Return `value`, a number or a text such as `80 mm`, in the SI unit `unit`. Raises ValueError if it is no such quantity."""
+    """Return `value`, a number or a text such as `80 mm`, in the SI unit `unit`. Raises ValueError if it is no such finite quantity."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit}, such as '1 {unit}'")
-    if not isinstance(value, str):
-        return float(value)
-    from pint.errors import PintError
-
     try:
-        quantity = _registry().Quantity(value)
-        return float(quantity.magnitude) if quantity.unitless else float(quantity.to(unit).magnitude)
-    except (PintError, AssertionError, TypeError, ValueError, ZeroDivisionError) as error:
+        match = _QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
+        if isinstance(value, str) and not match:
+            raise ValueError("expected a number and a unit")
+        number = float(match[1] if match else value)
+        if match and match[2]:
+            number = _converted(number, match[2], unit)
+    except (ValueError, OverflowError) as error:
         raise ValueError(f"'{value}' is no quantity in {unit} ({error})") from error
+    if not math.isfinite(number):
+        raise ValueError(f"'{value}' is no quantity in {unit} (it is not finite)")
+    return number
 
 
 @cache
@@ -43,11 +65,9 @@ def same_unit(one: str, other: str) -> bool:
     """Say whether two units are the same in dimension and size; an empty unit is the same as any."""
     if not one or not other or one == other:
         return True
-    from pint.errors import PintError
-
     try:
-        return float(_registry().Quantity(1.0, one).to(other).magnitude) == 1.0
-    except (PintError, AssertionError, TypeError, ValueError):
+        return math.isclose(_converted(1.0, one, other), 1.0, rel_tol=1e-12)
+    except ValueError:
         return False
 
 
@@ -57,11 +77,13 @@ def _quantity(unit: str, example: str) -> Any:
 
 
 def _nanoseconds(value: Any) -> int:
-    seconds = to_si(value, "s")
-    nanoseconds = round(seconds * 1e9)
-    if abs(nanoseconds - seconds * 1e9) > 1e-3:
+    nanoseconds = to_si(value, "s") * 1e9
+    if abs(nanoseconds) >= 2**63:
+        raise ValueError(f"'{value}' is longer than 64 bits of nanoseconds hold, 292 years")
+    whole = round(nanoseconds)
+    if not math.isclose(whole, nanoseconds, rel_tol=4 * sys.float_info.epsilon, abs_tol=1e-3):
         raise ValueError(f"'{value}' is no whole number of nanoseconds")
-    return nanoseconds
+    return whole
 
 
 Length = Annotated[float, *_quantity("m", "80 mm")]

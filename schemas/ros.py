@@ -102,7 +102,7 @@ class MultiArrayLayout(Message):
     """The dimensions of a multi-array, outermost first."""
 
     ros_type: ClassVar[str] = "std_msgs/msg/MultiArrayLayout"
-    dim: list[MultiArrayDimension] = []
+    dim: list[MultiArrayDimension] = Field(default_factory=list[MultiArrayDimension])
     data_offset: UInt32 = 0
 
 
@@ -211,7 +211,7 @@ class JointState(Message):
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/JointState"
     header: Header = Header()
-    name: StringArray = []
+    name: StringArray = Field(default_factory=list[str])
     position: Float64Array = Field(default_factory=_empty)
     velocity: Float64Array = Field(default_factory=_empty)
     effort: Float64Array = Field(default_factory=_empty)

@@ -35,7 +35,7 @@ class Grant(Message):
     step: Int64
     start_ns: Int64
     horizon_ns: Int64
-    inlets: list[InletSample] = []
+    inlets: list[InletSample] = Field(default_factory=list[InletSample])
 
 
 class Ack(Message):
@@ -101,4 +101,4 @@ class SessionStatus(Message):
     late_steps: UInt64
     dropped_messages: UInt64
     detail: String = ""
-    participants: list[ParticipantStatus] = []
+    participants: list[ParticipantStatus] = Field(default_factory=list[ParticipantStatus])

@@ -7,6 +7,7 @@ blocks of doubles change from step to step. `VectorCodec` writes them into a tem
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
 from functools import reduce
@@ -85,7 +86,7 @@ class VectorCodec:
         self._has_stamp = "header" in self.model.model_fields
         self._fixed: list[tuple[int, int, bytes]] = []
         at = 0
-        for offset, block in [*self._offsets, (len(template), slice(0, 0))]:
+        for offset, block in [*sorted(self._offsets, key=lambda row: row[0]), (len(template), slice(0, 0))]:
             if at == 0 and self._has_stamp:
                 self._fixed.append((0, 4, bytes(template[0:4])))
                 at = 12
@@ -123,8 +124,7 @@ class VectorCodec:
             raise MessageError(f"port '{self.port.name}': {value.dtype} of shape {value.shape}, expected float64 of shape ({self.size},)")
         if 0 in np.isfinite(value).tobytes():  # a third of the cost of np.isfinite(...).all()
             raise MessageError(f"port '{self.port.name}': not all of {value} are finite")
-        if self._is_pose and abs(value[3:] @ value[3:] - 1.0) > 2.0 * _QUATERNION_TOLERANCE:
-            norm = float(np.linalg.norm(value[3:]))
+        if self._is_pose and abs((norm := math.hypot(*value[3:].tolist())) - 1.0) > _QUATERNION_TOLERANCE:
             raise MessageError(f"port '{self.port.name}': quaternion (x, y, z, w) has norm {norm:.6g}, expected 1")
         return value
 

@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from schemas.codec import MAX_MESSAGE_BYTES, custom_types, decode, encode, message_type, message_types, rihs01, ros2msg_definition
+from schemas.errors import MessageError
+from schemas.message import Message, msg_text
+from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage
+from schemas.trocar_msgs import Grant
+from tests.strategies import any_message
+
+every_type = pytest.mark.parametrize("name", sorted(message_types()))
+STANDARD = sorted(set(message_types()) - set(custom_types()))
+models = st.sampled_from(sorted(message_types())).map(message_type)
+
+
+def same(one: Message, other: Message) -> bool:
+    return type(one) is type(other) and all(_same(getattr(one, name), getattr(other, name)) for name in type(one).model_fields)
+
+
+def _same(one: object, other: object) -> bool:
+    if isinstance(one, Message) and isinstance(other, Message):
+        return same(one, other)
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return one == other
+
+
+@settings(max_examples=400)
+@given(any_message)
+def test_every_message_comes_back_from_cdr(message: Message) -> None:
+    assert same(decode(type(message), encode(message)), message)
+
+
+@given(any_message)
+def test_every_message_comes_back_from_json(message: Message) -> None:
+    assert same(type(message).model_validate_json(message.model_dump_json()), message)
+
+
+@settings(max_examples=600)
+@given(models, st.binary(max_size=200))
+def test_bytes_are_a_message_or_a_message_error(model: type[Message], payload: bytes) -> None:
+    for start in (b"", b"\0\1\0\0", b"\0\0\0\0"):
+        with contextlib.suppress(MessageError):
+            assert isinstance(decode(model, start + payload), model)
+
+
+@settings(max_examples=300)
+@given(any_message, st.data())
+def test_a_changed_or_cut_message_is_a_message_or_a_message_error(message: Message, data: st.DataObject) -> None:
+    payload = bytearray(encode(message))
+    cut = data.draw(st.integers(0, len(payload) - 1))
+    with pytest.raises(MessageError):
+        decode(type(message), bytes(payload[:cut]))
+    payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
+    with contextlib.suppress(MessageError):
+        decode(type(message), bytes(payload))
+
+
+@given(any_message, st.binary(min_size=8, max_size=64))
+def test_bytes_behind_a_message_are_refused(message: Message, rest: bytes) -> None:
+    with pytest.raises(MessageError):
+        decode(type(message), encode(message) + rest)
+
+
+def test_a_payload_over_the_limit_is_refused_unread() -> None:
+    with pytest.raises(MessageError, match="exceed the limit"):
+        decode(StringMessage, bytes(MAX_MESSAGE_BYTES + 1))
+
+
+def test_a_sequence_that_claims_more_than_there_is() -> None:
+    grant = bytearray(encode(Grant(run=1, epoch=0, step=0, start_ns=0, horizon_ns=1)))
+    grant[-4:] = b"\xff\xff\xff\xff"
+    with pytest.raises(MessageError):
+        decode(Grant, bytes(grant))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_not_finite_are_refused_from_the_wire(bad: float) -> None:
+    payload = encode(Float64Message(data=1.5)).replace(np.float64(1.5).tobytes(), np.float64(bad).tobytes())
+    with pytest.raises(MessageError, match="data: Input should be a finite number"):
+        decode(Float64Message, payload)
+    payload = encode(JointState(position=np.array([1.5]))).replace(np.float64(1.5).tobytes(), np.float64(bad).tobytes())
+    with pytest.raises(MessageError, match=r"position: .*every number must be finite"):
+        decode(JointState, payload)
+
+
+def test_the_error_names_the_field() -> None:
+    payload = encode(PoseStamped()).replace(np.float64(1).tobytes(), np.float64(np.nan).tobytes())
+    with pytest.raises(MessageError, match=r"geometry_msgs/msg/PoseStamped: pose\.orientation\.w: "):
+        decode(PoseStamped, payload)
+
+
+def test_an_unknown_type_is_told_with_a_near_miss() -> None:
+    with pytest.raises(MessageError, match=r"Did you mean 'sensor_msgs/msg/JointState'"):
+        message_type("sensor_msgs/msg/JointStates")
+
+
+@pytest.mark.parametrize("name", STANDARD)
+def test_standard_types_are_those_of_ros_2(name: str) -> None:
+    theirs = get_typestore(Stores.ROS2_JAZZY).fielddefs[name]
+    assert get_types_from_msg(msg_text(message_types()[name]), name)[name][1] == theirs[1]
+
+
+@every_type
+def test_hashes_follow_from_the_derived_text_alone(name: str) -> None:
+    store = get_typestore(Stores.EMPTY)
+    for other in message_types():
+        store.register(get_types_from_msg(msg_text(message_types()[other]), other))
+    assert store.hash_rihs01(name) == rihs01(name)
+    if name in STANDARD:
+        assert rihs01(name) == get_typestore(Stores.ROS2_JAZZY).hash_rihs01(name)
+
+
+def test_a_published_hash() -> None:
+    """The hash of std_msgs/msg/String, as `ros2 topic info --verbose` prints it."""
+    assert rihs01("std_msgs/msg/String") == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+
+
+@every_type
+def test_definitions_are_complete(name: str) -> None:
+    text = ros2msg_definition(name)
+    types = get_types_from_msg(text.split("=" * 80)[0], name)
+    assert name in types
+    for part in text.split("=" * 80)[1:]:
+        assert part.strip().startswith("MSG: ")
+
+
+def test_every_model_has_its_own_ros_type() -> None:
+    assert all(model.ros_type == name for name, model in message_types().items())
+    assert message_type("std_msgs/msg/Bool") is BoolMessage
