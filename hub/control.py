@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable
+from time import monotonic_ns
+from typing import Any, Protocol, TypeVar
 
+import numpy as np
 import zenoh
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from zenoh.handlers import Callback
 
+from hub.inlets import Inlets
 from hub.plan import Plan
-from schemas.codec import decode, encode
+from hub.wire import PortCodec
+from schemas.codec import decode, encode, message_type
 from schemas.errors import ConnectError, MessageError, TrocarError
 from schemas.keys import Keys
 from schemas.ports import BondSide
@@ -24,6 +28,10 @@ from schemas.ros import StringMessage
 __all__ = ["ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask"]
 
 log = logging.getLogger(__name__)
+
+
+R = TypeVar("R", bound=BaseModel)
+Q = TypeVar("Q", bound=BaseModel)
 
 
 class _Json(BaseModel):
@@ -135,37 +143,62 @@ class RunState:
                 self._budget = max(self._budget - steps, 0)
 
 
-Handler = Callable[[Any], BaseModel]
+class Joins(Protocol):
+    """Who answers hosts that join."""
+
+    def join(self, request: JoinRequest) -> BaseModel:
+        """Return the reply; raises MessageError to refuse."""
+        ...
 
 
 class ControlServer:
     """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, handlers: Mapping[str, tuple[type[BaseModel], Handler]]) -> None:
-        """Take a request model and a handler per verb."""
-        self._queryables = [self._declare(session, keys.control(verb), model, handler) for verb, (model, handler) in handlers.items()]
+    def __init__(self, session: zenoh.Session, keys: Keys, state: RunState, inlets: Inlets, joins: Joins) -> None:
+        """Steer `state`, write into `inlets`, and let hosts join."""
+        self._state = state
+        self._inlets = inlets
+        self._queryables = [
+            self._declare(session, keys.control("join"), JoinRequest, joins.join),
+            self._declare(session, keys.control("pause"), Empty, lambda _: self._done(state.pause())),
+            self._declare(session, keys.control("resume"), Empty, lambda _: self._done(state.resume())),
+            self._declare(session, keys.control("step"), StepRequest, lambda request: self._done(state.step(request.steps))),
+            self._declare(session, keys.control("set"), SetRequest, self._set),
+            self._declare(session, keys.control("shutdown"), Empty, lambda _: self._done(state.shutdown())),
+        ]
 
-    def _declare(self, session: zenoh.Session, key: str, model: type[BaseModel], handler: Handler) -> zenoh.Queryable[None]:
+    def _declare(self, session: zenoh.Session, key: str, model: type[Q], handler: Callable[[Q], BaseModel]) -> zenoh.Queryable[None]:
         def answer(query: zenoh.Query) -> None:
             with query:
                 try:
                     payload = b"" if query.payload is None else query.payload.to_bytes()
                     text = decode(StringMessage, payload).data if payload else "{}"
                     reply = handler(model.model_validate_json(text))
-                except (TrocarError, ValidationError) as error:
+                except (TrocarError, ValidationError, ValueError, TypeError) as error:
                     log.warning("refused a request on %s: %s", key, error)
                     reply = Refusal(refused=str(error))
                 query.reply(key, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
 
-        return session.declare_queryable(key, Callback(answer, indirect=True))
+        return session.declare_queryable(key, Callback(answer))
 
-    def close(self) -> None:
+    @staticmethod
+    def _done(_nothing: None) -> Empty:
+        return Empty()
+
+    def _set(self, request: SetRequest) -> Empty:
+        port = self._inlets.settable(request.participant, request.port)
+        codec = PortCodec(port)
+        if codec.vector is not None:
+            message = codec.vector.to_message(codec.vector.checked(np.atleast_1d(np.asarray(request.value, np.float64))), 0)
+        else:
+            message = message_type(port.type).model_validate(request.value)
+        self._inlets.offer(request.participant, request.port, encode(message), monotonic_ns())
+        return Empty()
+
+    def undeclare(self) -> None:
         """Answer no more."""
         for queryable in self._queryables:
             queryable.undeclare()
-
-
-R = TypeVar("R", bound=BaseModel)
 
 
 def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R], *, timeout_s: float = 5.0) -> R:

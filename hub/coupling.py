@@ -70,9 +70,7 @@ def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: f
         return None
     rule, limit = min(broken.items(), key=lambda item: item[1])
     numbers = ", ".join(
-        f"{name} = {value:.4g}"
-        for name, value in (("m", mass), ("k", stiffness), ("b", damping), ("k_contact", force.contact_stiffness))
-        if value is not None
+        f"{name} = {value:.4g}" for name, value in (("m", mass), ("k", stiffness), ("b", damping), ("k_contact", force.contact_stiffness)) if value is not None
     )
     return (
         f"a step of {step_s * 1e3:.4g} ms breaks the rule {rule} of '{bond.algorithm}', which allows {limit * 1e3:.4g} ms ({numbers} in SI units). "

@@ -11,6 +11,7 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.inlets import Inlets
 from hub.participant import Device
 from hub.plan import Member, Plan
 from hub.wire import Drops, PortCodec, Tag
@@ -21,9 +22,6 @@ from schemas.keys import Keys
 __all__ = ["DeviceLoop", "ScriptedDevices", "follows_clock"]
 
 log = logging.getLogger(__name__)
-
-Offer = Callable[[str, str, bytes], None]
-"""Takes participant, port and CDR bytes of a sample."""
 
 
 def follows_clock(member: Member) -> bool:
@@ -43,12 +41,12 @@ class ScriptedDevices:
         for name, device in self._devices.items():
             _open(name, device, directory)
 
-    def read(self, time_ns: int, step: int, offer: Offer) -> None:
-        """Offer all samples up to `time_ns`."""
+    def read(self, time_ns: int, step: int, inlets: Inlets) -> None:
+        """Offer all samples up to `time_ns` to the inlets; their age is counted in simulated time."""
         for name, device in self._devices.items():
             try:
                 for sample in device.read(time_ns):
-                    offer(name, sample.port, encode(sample.message))
+                    inlets.offer(name, sample.port, encode(sample.message), time_ns)
             except Exception as error:
                 raise ParticipantError(name, step, f"{type(error).__name__}: {error}") from error
 
@@ -74,7 +72,11 @@ class DeviceLoop:
             for port in member.ports
             if port.causality == "output"
         }
-        self._subscribers = [self._subscribe(session, keys, plan, outlet.source, outlet.source_port, outlet.device_port) for outlet in plan.outlets if outlet.device == member.name]
+        self._subscribers = [
+            self._subscribe(session, keys, plan, outlet.source, outlet.source_port, outlet.device_port)
+            for outlet in plan.outlets
+            if outlet.device == member.name
+        ]
         self._thread = threading.Thread(target=self._run, name=f"device {member.name}", daemon=True)
 
     def start(self, directory: Path) -> None:

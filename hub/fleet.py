@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import subprocess
 import sys
@@ -32,11 +33,8 @@ class Fleet:
     def start(self, host: str, endpoint: str, session: str) -> None:
         """Start host `host`. It joins over `endpoint`; what it prints goes to stderr."""
         command = [sys.executable, "-P", "-m", "hub.host_process", "--connect", endpoint, "--session", session, "--host", host]
-        self._processes[host] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), start_new_session=True)
-
-    def pid(self, host: str) -> int:
-        """Return the process id of a host that was started here; 0 for others."""
-        return self._processes[host].pid if host in self._processes else 0
+        environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **os.environ}  # idle BLAS threads spin, and take the cores of other hosts
+        self._processes[host] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env=environment, start_new_session=True)
 
     def dead(self) -> dict[str, str]:
         """Return how each host ended that is no longer there."""

@@ -127,9 +127,7 @@ class Host:
                 continue
             stride = self.plan.stride(member.name, port.name)
             depth = self._depth(member.name, port.name, here=True)
-            elsewhere = any(
-                (k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links
-            )
+            elsewhere = any((k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links)
             publisher = self._wire.publisher(member, port, always=elsewhere) if self._wire else None
             slot.sinks.append(_Sink(port, stride, PortCodec(port).vector is not None, Cell(member.period, stride, depth) if depth else None, publisher))
 

@@ -53,9 +53,9 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
         request = JoinRequest(host=host, pid=os.getpid())
         reply = ask(session, keys.control("join"), request, JoinReply, timeout_s=10.0)
         with _ending_with_hub(session, keys):
-            joined = _JoinedHost(session, keys, host, reply, directory or Path(reply.directory))
+            joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory))
             try:
-                joined.serve(request)
+                joined.serve()
             finally:
                 joined.close()
 
@@ -63,9 +63,9 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
 class _JoinedHost:
     """The participants of this process and their connection to the hub."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, host: str, reply: JoinReply, directory: Path) -> None:
-        self._session, self._keys, self._run, self._directory = session, keys, reply.run, directory
-        plan = reply.plan
+    def __init__(self, session: zenoh.Session, keys: Keys, request: JoinRequest, reply: JoinReply, directory: Path) -> None:
+        self._session, self._keys, self._request, self._run, self._directory = session, keys, request, reply.run, directory
+        plan, host = reply.plan, request.host
         mine = {name: member for name, member in plan.members.items() if member.host == host}
         made = {name: make(member.kind, name, reply.params[name], directory) for name, member in mine.items()}
         self._drops = Drops()
@@ -83,20 +83,22 @@ class _JoinedHost:
             for member in self._host.members
         }
         self._loops = [
-            DeviceLoop(plan.members[name], plan, device, session, keys, failed=self._device_failed) for name, device in made.items() if isinstance(device, Device)
+            DeviceLoop(plan.members[name], plan, device, session, keys, failed=self._device_failed)
+            for name, device in made.items()
+            if isinstance(device, Device)
         ]
         self._tokens = [session.liveliness().declare_token(keys.alive(member.key_role, name)) for name, member in mine.items()]
 
-    def serve(self, request: JoinRequest) -> None:
+    def serve(self) -> None:
         """Configure, report ready, prime the links, and step until the hub says that the run is over."""
         try:
             bonds = self._host.configure(self._directory)
             for loop in self._loops:
                 loop.start(self._directory)
         except ParticipantError as error:
-            ask(self._session, self._keys.control("join"), request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
+            ask(self._session, self._keys.control("join"), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
             raise
-        ask(self._session, self._keys.control("join"), request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        ask(self._session, self._keys.control("join"), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
         grant = self._first_grant()
         while grant.horizon_ns > grant.start_ns:
             try:
@@ -141,7 +143,7 @@ class _JoinedHost:
         self._acks[member.name].put(pack_report(report))
 
     def _device_failed(self, name: str, cause: str) -> None:
-        log.error("device '%s' has failed: %s", name, cause)
+        ask(self._session, self._keys.control("join"), self._request.model_copy(update={"failed": f"{name}: {cause}"}), Empty)
 
     def close(self) -> None:
         """Close devices, participants and publishers."""

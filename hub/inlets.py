@@ -29,6 +29,7 @@ class _Inlet:
     source: str
     port: str
     codec: PortCodec
+    simulated: bool = False
     max_age_ns: int = 0
     queue: deque[tuple[bytes, int]] = field(default_factory=deque[tuple[bytes, int]])
     arrived_ns: int | None = None
@@ -44,7 +45,9 @@ class Inlets:
         self._inlets: dict[tuple[str, str], _Inlet] = {}
         for inlet in plan.inlets:
             port = plan.members[inlet.target].port(inlet.target_port)
-            known = self._inlets.setdefault((inlet.device, inlet.device_port), _Inlet(inlet.device, inlet.device_port, PortCodec(port)))
+            source = plan.members[inlet.device].port(inlet.device_port)
+            new = _Inlet(inlet.device, inlet.device_port, PortCodec(port), simulated=source.clock == "simulated")
+            known = self._inlets.setdefault((inlet.device, inlet.device_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
         fed = {(link.target, link.target_port) for link in plan.links} | {(i.target, i.target_port) for i in plan.inlets}
         self._settable = {
@@ -64,7 +67,7 @@ class Inlets:
         return found
 
     def offer(self, participant: str, port: str, payload: bytes, now_ns: int) -> None:
-        """Take a sample that arrived at `now_ns`; raises MessageError if it is none of this port."""
+        """Take a sample that arrived at `now_ns` of the port's clock; raises MessageError if it is none of this port."""
         inlet = self._inlets.get((participant, port))
         if inlet is None:
             raise MessageError(f"no connection takes '{participant}.{port}'")
@@ -77,11 +80,15 @@ class Inlets:
             inlet.queue.append((payload, now_ns))
             inlet.arrived_ns = now_ns
 
-    def sample(self, now_ns: int) -> list[InletSample]:
-        """Return what enters at a communication point at `now_ns`: samples that are new, and changes of staleness."""
+    def sample(self, time_ns: int, wall_ns: int) -> list[InletSample]:
+        """Return what enters at a communication point: samples that are new, and changes of staleness.
+
+        A device that follows the clock ages in simulated time `time_ns`, any other in `wall_ns`.
+        """
         entering: list[InletSample] = []
         with self._lock:
             for inlet in self._inlets.values():
+                now_ns = time_ns if inlet.simulated else wall_ns
                 stale = inlet.stale
                 if inlet.arrived_ns is not None:
                     stale = bool(inlet.max_age_ns) and now_ns - inlet.arrived_ns > inlet.max_age_ns

@@ -17,9 +17,8 @@ from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
 from schemas.lockstep import Permission, Report, pack_report
-from schemas.message import Message
 from schemas.ports import Port
-from schemas.trocar_msgs import Ack, Grant, InletSample, SessionStatus
+from schemas.trocar_msgs import Ack, CouplingEnergy, Grant, InletSample, SessionStatus
 
 __all__ = ["Observers"]
 
@@ -67,7 +66,7 @@ class Observers:
         """Say whether output values matter here at all."""
         return self._recorder is not None or bool(self.measures.by_port)
 
-    def subscriptions(self, plan: Plan) -> list[str]:
+    def subscriptions(self) -> list[str]:
         """Return the keys on which values of other processes are to be watched."""
         away = [w for w in self._watched.values() if w.member.host != "hub" and w.member.role != "device"]
         measured = set(self.measures.ports)
@@ -123,7 +122,7 @@ class Observers:
             channel = self._channel(self._keys.ack(member.name), Ack.ros_type)
             self._recorder.write(channel, time_ns, pack_report(report) if payload is None else payload)
 
-    def books(self, time_ns: int) -> list[Message]:
+    def books(self, time_ns: int) -> list[CouplingEnergy]:
         """Return (and record) the energy books when they are due."""
         if time_ns < self._next_energy_ns:
             return []
@@ -132,7 +131,7 @@ class Observers:
         if self._recorder is not None:
             for message in messages:
                 self._recorder.write(self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message))
-        return list(messages)
+        return messages
 
     def status(self, status: SessionStatus) -> None:
         """Record a status of the session."""

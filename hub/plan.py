@@ -240,20 +240,17 @@ class _Wiring:
 
     def couple(self, index: int, planned: PlannedBond) -> None:
         bond = planned.bond
-        position, velocity, force = (p.name for p in bond_ports(planned.motion))
-        for port in (position, velocity):
-            self._bond_link(index, bond.motion.participant, port, bond.force.participant, port.replace(planned.motion.name, planned.force.name, 1), bond, "motion")
-        self._bond_link(index, bond.force.participant, force.replace(planned.motion.name, planned.force.name, 1), bond.motion.participant, force, bond, "force")
+        *moving, force = zip(bond_ports(planned.motion), bond_ports(planned.force), strict=True)
+        for here, there in moving:
+            self._bond_link(index, _end(bond.motion, here), _end(bond.force, there), fresh=is_fresh(bond, "motion"))
+        self._bond_link(index, _end(bond.force, force[1]), _end(bond.motion, force[0]), fresh=is_fresh(bond, "force"))
 
-    def _bond_link(self, index: int, source: str, source_port: str, target: str, target_port: str, bond: Bond, side: str) -> None:
-        one, other = Endpoint(participant=source, port=source_port), Endpoint(participant=target, port=target_port)
+    def _bond_link(self, index: int, one: Endpoint, other: Endpoint, *, fresh: bool) -> None:
         self._feed(other, str(one), ("bonds", index))
-        self._link(one, other, fresh=is_fresh(bond, side), linear=False)
+        self._link(one, other, fresh=fresh, linear=False)
 
     def _link(self, one: Endpoint, other: Endpoint, *, fresh: bool, linear: bool) -> None:
-        self.links.append(
-            Link(source=one.participant, source_port=one.port, target=other.participant, target_port=other.port, fresh=fresh, linear=linear)
-        )
+        self.links.append(Link(source=one.participant, source_port=one.port, target=other.participant, target_port=other.port, fresh=fresh, linear=linear))
 
     def _in_order(self, source: str, target: str) -> bool:
         if self._scenario.algorithm == "jacobi" or source == target:
@@ -300,6 +297,10 @@ class _Wiring:
             order.append(free)
             del waiting[free]
         return tuple(order)
+
+
+def _end(side: Endpoint, port: Port) -> Endpoint:
+    return Endpoint(participant=side.participant, port=port.name)
 
 
 def _check_fit(one: Endpoint, source: Port, other: Endpoint, target: Port, path: Path) -> None:

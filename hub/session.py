@@ -6,18 +6,16 @@ import hashlib
 import logging
 import secrets
 import struct
-import threading
+from _thread import interrupt_main
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from time import monotonic, monotonic_ns, sleep
-from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from hub.clock import Clock
-from hub.control import ControlServer, Empty, JoinReply, JoinRequest, RunState, SetRequest, StepRequest
+from hub.control import ControlServer, RunState
 from hub.coupling import stable_step_problem
 from hub.devices import DeviceLoop, ScriptedDevices, follows_clock
 from hub.endpoint import free_endpoint
@@ -25,62 +23,27 @@ from hub.fleet import Fleet, Watchdog
 from hub.host import Host
 from hub.inlets import Inlets
 from hub.measures import Measures
+from hub.membership import Failures, Membership
 from hub.observers import Observers
 from hub.participant import Device, Stepped
 from hub.plan import Member, Plan
 from hub.recorder import Recorder, RecorderSummary
-from hub.wire import Drops, PortCodec, Wire, open_session
-from schemas.codec import encode, message_type
+from hub.summary import Progress, Summary
+from hub.wire import Drops, Wire, open_session
+from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, ScenarioError, SessionError
 from schemas.keys import Keys
-from schemas.lockstep import Permission, Report, pack_permission, pack_report, unpack_report
+from schemas.lockstep import Permission, Report, pack_permission, unpack_report
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Grant, ParticipantStatus, SessionStatus
 
-__all__ = ["Progress", "Session", "Summary"]
+__all__ = ["Session"]
 
 log = logging.getLogger(__name__)
 
 _PROGRESS_S = 0.1
 _STATUS_S = 0.5
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a progress line shows."""
-
-    step: int
-    steps: int | None
-    sim_time_s: float
-    real_time_factor: float
-    late_steps: int
-    live: Mapping[str, tuple[float, str]]
-
-
-@dataclass
-class Summary:
-    """What a run was like."""
-
-    session: str
-    state: str
-    steps: int
-    sim_time_s: float
-    wall_time_s: float
-    real_time_factor: float
-    late_steps: int
-    dropped_messages: int
-    state_hash: str
-    """Over every state hash of every participant: equal for equal runs, whatever the placement or the grants' windows."""
-    recording: str | None
-    recording_complete: bool | None
-    energy_residual_j: float
-    measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the summary as JSON would have it, the measures beside the rest."""
-        row = asdict(self)
-        return {**{k: v for k, v in row.items() if k != "measures"}, **row["measures"]}
 
 
 class Session:
@@ -102,7 +65,7 @@ class Session:
         """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this process.
 
         `directory`: where relative paths of the scenario start. `grants`: re-simulate these instead of listening to devices.
-        `on_report` sees every report as it comes.
+        `on_report` sees what every participant reports of every grant.
         """
         self.scenario = scenario
         self.plan = plan
@@ -116,17 +79,16 @@ class Session:
         self._on_report = on_report
         self._run_id = secrets.randbits(63) | 1
         self._keys = Keys(scenario.name)
-        steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
-        self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
-        self._steps = steps
+        self._steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
+        self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=self._steps)
         self._inlets = Inlets(plan)
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
-        self._done: dict[str, int] = dict.fromkeys(plan.order, -1)
-        self._joined: dict[str, JoinRequest] = {}
-        self._join_changed = threading.Condition()
+        self._last_steps = dict.fromkeys(plan.order, -1)
+        self._drops = Drops()
         self._phase = "starting"
-        self._failure = ""
-        self._wall_ns = 0
+        self._detail = ""
+        self._started_ns: int | None = None
+        self._wall_ns: int | None = None
 
     # --- the run ---------------------------------------------------------------------------------------------------
 
@@ -146,56 +108,52 @@ class Session:
                     self._loop(progress)
                     self._phase = "done"
                 except KeyboardInterrupt:
-                    raise self._interrupted() from None
-                except BaseException as error:
-                    self._failure = str(error)
-                    raise
+                    self._failures.check()  # the watchdog's way out of a participant that hangs in this process
+                    raise SessionError(f"interrupted at step {self._clock.step}") from None
                 finally:
-                    self._phase = "done" if self._phase == "done" else "failed"
                     self._close()
         finally:
             recorded = recorder.close() if recorder is not None else None
         return self._summary(recorded)
 
-    def _interrupted(self) -> SessionError:
-        """Return what a keyboard interrupt means: Ctrl-C, or the watchdog's way out of a participant that hangs in this process."""
-        error: SessionError = ParticipantError(*self._hung) if self._hung else SessionError(f"interrupted at step {self._clock.step}")
-        self._failure = str(error)
-        return error
-
     def _open(self, session: zenoh.Session) -> None:
-        """Declare everything on `session`, make the local host, and start the processes."""
-        self._session = session
-        self._hung: tuple[str, int, str] | None = None
-        self._drops = Drops()
-        self._fleet = Fleet()
-        self._acks = session.declare_subscriber(self._keys.ack("*"), FifoChannel(4096))
-        self._by_ack = {self._keys.ack(name): self.plan.members[name] for name in self.plan.order}
-        self._own_acks = {name: session.declare_publisher(self._keys.ack(name)) for name in self.plan.order}
-        settings: dict[str, Any] = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME, "express": True}
-        self._grant_publisher = session.declare_publisher(self._keys.grant, encoding=zenoh.Encoding.APPLICATION_CDR, **settings)
-        self._status_publisher = session.declare_publisher(self._keys.status, encoding=zenoh.Encoding.APPLICATION_CDR)
-        self._energy_publishers = {b.bond.name: session.declare_publisher(self._keys.energy(b.bond.name)) for b in self.plan.bonds}
-        self._status_queryable = session.declare_queryable(self._keys.status, Callback(self._answer_status, indirect=True))
+        """Declare everything on `session`, and lay out what runs in this process."""
+        keys = self._keys
+        self._by_ack = {keys.ack(name): self.plan.members[name] for name in self.plan.order}
+        self._acks = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
+        self._failures = Failures(wake=lambda: session.put(keys.ack("hub"), b""))
+        self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, self._fail)
+        block, real_time, cdr = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME, zenoh.Encoding.APPLICATION_CDR
+        self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
+        self._status_publisher = session.declare_publisher(keys.status, encoding=cdr)
+        self._energy_publishers = {b.bond.name: session.declare_publisher(keys.energy(b.bond.name), encoding=cdr) for b in self.plan.bonds}
         watch = Callback(self._observers.sample, indirect=False)
-        self._taps: list[zenoh.Subscriber[None]] = [session.declare_subscriber(key, watch) for key in self._observers.subscriptions(self.plan)]
+        self._entities: list[zenoh.Subscriber[None] | zenoh.Queryable[None] | ControlServer] = [
+            session.declare_queryable(keys.status, Callback(self._answer_status)),
+            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._lost)),
+            ControlServer(session, keys, self.state, self._inlets, self._membership),
+            *(session.declare_subscriber(key, watch) for key in self._observers.subscriptions()),
+        ]
         if self._grants is None:
-            sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets})
             take = Callback(self._device_sample, indirect=False)
-            self._taps += [session.declare_subscriber(self._keys.output("device", *source), take) for source in sources]
-        self._control = ControlServer(session, self._keys, self._handlers())
-        self._token = session.liveliness().declare_token(self._keys.alive("hub", "hub"))
+            sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets})
+            self._entities += [session.declare_subscriber(keys.output("device", *source), take) for source in sources]
+        self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
+        self._fleet = Fleet()
         self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, self._fail)
-        self._lay_local()
+        self._lay_local(session)
 
-    def _lay_local(self) -> None:
+    def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
-        self._host = Host("hub", self.plan, stepped, wire=Wire(self._session, self._keys, self._run_id), tap=self._observers.value if self._observers.watches_values else None)
+        tap = self._observers.value if self._observers.watches_values else None
+        self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id), tap=tap)
         self._remote = [name for name in self.plan.order if self.plan.members[name].host != "hub"]
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
-        self._scripted = ScriptedDevices({n: d for n, d in devices.items() if follows_clock(self.plan.members[n])})
-        loops = {n: d for n, d in devices.items() if not follows_clock(self.plan.members[n])}
-        self._loops = [DeviceLoop(self.plan.members[n], self.plan, d, self._session, self._keys, failed=self._fail) for n, d in loops.items()]
+        scripted = {n: device for n, device in devices.items() if follows_clock(self.plan.members[n])}
+        self._scripted = ScriptedDevices(scripted)
+        self._loops = [
+            DeviceLoop(self.plan.members[n], self.plan, device, session, self._keys, failed=self._fail) for n, device in devices.items() if n not in scripted
+        ]
 
     def _start(self) -> None:
         """Start the hosts, wait until all participants are configured and every link has carried a value."""
@@ -208,47 +166,29 @@ class Session:
         for loop in self._loops:
             loop.start(self._directory)
         self._await_hosts(hosts)
-        for request in self._joined.values():
-            bonds |= request.bonds
-        self._check_steps(bonds)
+        self._check_steps({**bonds, **self._membership.bonds()})
         self._await_links()
 
     def _is_needed(self, host: str) -> bool:
         roles = {member.role for member in self.plan.members.values() if member.host == host}
         return self._grants is None or roles != {"device"}
 
-    def _await_hosts(self, hosts: Sequence[str]) -> None:
-        deadline = monotonic() + self.scenario.join_limit / 1e9
-        told = ""
-        while True:
-            missing = [host for host in hosts if host not in self._joined or not self._joined[host].ready]
-            if not missing:
-                return
-            self._raise_failures()
-            waiting = ", ".join(missing)
-            if waiting != told:
-                told = waiting
-                log.info("waiting for %s to join at %s", waiting, self.endpoint)
+    def _await_hosts(self, hosts: list[str]) -> None:
+        limit_s = self.scenario.join_limit / 1e9
+        deadline = monotonic() + limit_s
+        told: list[str] = []
+        while missing := self._membership.missing(hosts):
+            self._failures.check()
+            if missing != told:
+                log.info("waiting for %s to join at %s", ", ".join(missing), self.endpoint)
+            told = missing
             if monotonic() > deadline:
-                raise SessionError(f"{waiting} did not join within {self.scenario.join_limit / 1e9:g} s (join_limit) at {self.endpoint}")
-            with self._join_changed:
-                self._join_changed.wait(0.05)
-
-    def _raise_failures(self) -> None:
-        """Raise what hosts and the watchdog have reported while nobody waited for acks."""
-        for request in self._joined.values():
-            if request.failed:
-                participant, _, cause = request.failed.partition(": ")
-                raise ParticipantError(participant, -1, cause)
-        while (sample := self._acks.try_recv()) is not None:
-            self._accept(sample, [])
+                raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {self.endpoint}")
 
     def _check_steps(self, bonds: Mapping[str, Sequence[BondSide]]) -> None:
         for index, planned in enumerate(self.plan.bonds):
             bond = planned.bond
-            motion, force = (
-                next(side for side in bonds[end.participant] if side.name == end.port) for end in (bond.motion, bond.force)
-            )
+            motion, force = (next(s for s in bonds[end.participant] if s.name == end.port) for end in (bond.motion, bond.force))
             step_s = self.plan.members[bond.force.participant].period * self.plan.step_ns / 1e9
             problem = stable_step_problem(bond, motion, force, step_s)
             if problem and bond.check == "refuse":
@@ -261,10 +201,11 @@ class Session:
         self._watchdog.wait_for(waiting)
         while waiting or not self._host.linked():
             self._host.publish_initial()
+            self._failures.check()
             sample = self._acks.try_recv()
             if sample is None:
                 sleep(0.005)
-            elif (accepted := self._accept(sample, waiting)) is not None and accepted[1].step == -1:
+            elif (accepted := self._accept(sample, waiting)) is not None:
                 waiting.remove(accepted[0].name)
         self._watchdog.wait_for(())
 
@@ -274,7 +215,9 @@ class Session:
         shown = told = 0.0
         self._clock.start()
         while not self._clock.done and not self.state.ending:
-            if not self._may_go_on():
+            self._failures.check()
+            if self.state.paused:
+                self._wait_while_paused()
                 continue
             grant = self._next_grant()
             if grant is None:
@@ -291,16 +234,13 @@ class Session:
         if progress is not None:
             progress(self._progress())
 
-    def _may_go_on(self) -> bool:
-        if not self.state.paused:
-            return True
+    def _wait_while_paused(self) -> None:
         self._phase = "paused"
         self._tell_status()
         while not self.state.wait(0.2):
-            self._raise_failures()
+            self._failures.check()
         self._phase = "running"
         self._clock.start()
-        return not self.state.ending
 
     def _next_grant(self) -> Permission | None:
         """Return the next grant, with all that enters the simulation at this communication point."""
@@ -309,24 +249,23 @@ class Session:
             if recorded is None:
                 return None
             return Permission(self._run_id, recorded.epoch, recorded.step, recorded.start_ns, recorded.horizon_ns, recorded.inlets)
-        time_ns = self._clock.time_ns
-        self._scripted.read(time_ns, self._clock.step, lambda name, port, payload: self._inlets.offer(name, port, payload, monotonic_ns()))
-        count = self._clock.horizon(self.state.budget)
-        horizon_ns = time_ns + count * self.plan.step_ns
-        return Permission(self._run_id, 0, self._clock.step, time_ns, horizon_ns, self._inlets.sample(monotonic_ns()))
+        step, time_ns = self._clock.step, self._clock.time_ns
+        self._scripted.read(time_ns, step, self._inlets)
+        horizon_ns = time_ns + self._clock.horizon(self.state.budget) * self.plan.step_ns
+        return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._inlets.sample(time_ns, monotonic_ns()))
 
     def _step(self, grant: Permission) -> None:
         """Publish a grant, take part in it, and wait until everybody else has."""
-        count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         if self._remote or self._record is not None:
             payload = pack_permission(grant)
             self._observers.grant(grant, payload)
             if self._remote:
                 self._grant_publisher.put(payload)
-        waiting = [name for name in self.plan.order if -grant.step % self.plan.members[name].period < count]
-        self._watchdog.wait_for(waiting)
-        waiting = [name for name in waiting if self.plan.members[name].host != "hub"]
+        due = [name for name in self.plan.order if _steps_in(grant, self.plan.members[name], self.plan.step_ns)]
+        waiting = [name for name in due if self.plan.members[name].host != "hub"]
+        self._watchdog.wait_for(due)
         self._host.run(grant, self._take)
+        self._watchdog.wait_for(waiting)
         while waiting:
             accepted = self._accept(self._acks.recv(), waiting, grant)
             if accepted is not None:
@@ -334,12 +273,14 @@ class Session:
                 self._take(*accepted)
         self._watchdog.wait_for(())
         for message in self._observers.books(grant.horizon_ns):
-            self._energy_publishers[message.bond].put(encode(message))  # pyright: ignore[reportAttributeAccessIssue]
+            self._energy_publishers[message.bond].put(encode(message))
+        count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         self._clock.advance(count)
         self.state.spend(count)
 
     def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None) -> tuple[Member, Report, bytes] | None:
-        """Return a valid ack of this grant; raise what it reports; drop and count anything else."""
+        """Return a valid report on this grant (None: on being ready); raise a failure; drop and count anything else."""
+        self._failures.check()
         try:
             member = self._by_ack.get(str(sample.key_expr))
             if member is None:
@@ -350,23 +291,28 @@ class Session:
             if report.run != self._run_id:
                 raise MessageError(f"belongs to run {report.run:x}, this is run {self._run_id:x}")
             if report.error:
-                raise ParticipantError(member.name, report.step if report.step >= 0 else self._clock.step, report.error)
+                raise ParticipantError(member.name, report.step, report.error)
             if member.name not in waiting or report.step != (-1 if grant is None else grant.step):
-                raise MessageError(f"acknowledges step {report.step}, which nobody waits for")
+                raise MessageError(f"reports on step {report.step}, for which nobody waits")
         except MessageError as error:
             self._drops.count(sample, error)
             return None
         return member, report, payload
 
     def _take(self, member: Member, report: Report, payload: bytes | None = None) -> None:
+        """Book what a participant reports: its hashes, its last step, the work of its bonds."""
         self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
-        last = self._done[member.name] = report.step + (-report.step) % member.period + (len(report.state_hash) - 1) * member.period
+        first = report.step + -report.step % member.period
+        last = self._last_steps[member.name] = first + (len(report.state_hash) - 1) * member.period
         self._observers.report(member, report, (last + member.period) * self.plan.step_ns, payload)
         if self._on_report is not None:
             self._on_report(member, report)
 
     def _close(self) -> None:
         """End processes and close everything; the hosts end when the hub's token is gone."""
+        if self._phase != "done":
+            self._phase = "failed"
+            self._detail = "" if self._failures.first is None else str(self._failures.first)
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()
@@ -375,80 +321,35 @@ class Session:
         self._scripted.close()
         self._host.close()
         self._fleet.end()
-        self._control.close()
-        self._status_queryable.undeclare()
-        for tap in self._taps:
-            tap.undeclare()
+        for entity in self._entities:
+            entity.undeclare()
 
-    # --- what others ask and report --------------------------------------------------------------------------------
+    # --- what others report and ask --------------------------------------------------------------------------------
 
     def _fail(self, participant: str, cause: str) -> None:
-        """Report a failure from any thread: as an ack of the participant, so that whoever waits for it hears of it."""
-        log.error("participant '%s': %s", participant, cause)
-        if participant in self._own_acks:
-            self._own_acks[participant].put(pack_report(Report(self._run_id, 0, self._clock.step, (), (), (), cause)))
-        else:
-            name = self.plan.order[0]
-            self._own_acks[name].put(pack_report(Report(self._run_id, 0, self._clock.step, (), (), (), f"device '{participant}': {cause}")))
+        """End the run because of `participant`; may be called from any thread."""
+        self._failures.report(participant, self._clock.step, cause)
         if self.plan.members[participant].host == "hub" and participant in self._watchdog.waiting:
-            self._hung = (participant, self._clock.step, cause)
-            threading.main_thread().is_alive() and __import__("_thread").interrupt_main()
+            interrupt_main()
+
+    def _lost(self, sample: zenoh.Sample) -> None:
+        """Take note that a liveliness token came or went. A lost engine ends the run; a lost device makes its arm hold."""
+        name = str(sample.key_expr).rsplit("/", 1)[1]
+        member = self.plan.members.get(name)
+        if sample.kind != zenoh.SampleKind.DELETE or member is None or not member.host.startswith("remote/"):
+            return
+        self._membership.lose(member.host)
+        if member.role == "device":
+            log.warning("device '%s' is gone; it may join again", name)
+        elif self._phase in ("starting", "running", "paused"):
+            self._fail(name, "its host is gone")
 
     def _device_sample(self, sample: zenoh.Sample) -> None:
-        _, _, _, device, _, port = str(sample.key_expr).split("/", 5)
+        device, _, port = str(sample.key_expr).split("/", 5)[3:]
         try:
             self._inlets.offer(device, port, sample.payload.to_bytes(), monotonic_ns())
         except MessageError as error:
             self._drops.count(sample, error)
-
-    def _handlers(self) -> dict[str, tuple[type[Any], Callable[[Any], Any]]]:
-        def then(action: Callable[[], None]) -> Callable[[Any], Empty]:
-            def handler(_request: Empty) -> Empty:
-                action()
-                return Empty()
-
-            return handler
-
-        return {
-            "join": (JoinRequest, self._join),
-            "pause": (Empty, then(self.state.pause)),
-            "resume": (Empty, then(self.state.resume)),
-            "shutdown": (Empty, then(self.state.shutdown)),
-            "step": (StepRequest, self._request_steps),
-            "set": (SetRequest, self._request_set),
-        }
-
-    def _request_steps(self, request: StepRequest) -> Empty:
-        self.state.step(request.steps)
-        return Empty()
-
-    def _request_set(self, request: SetRequest) -> Empty:
-        port = self._inlets.settable(request.participant, request.port)
-        codec = PortCodec(port)
-        value = request.value
-        if codec.vector is not None:
-            import numpy as np
-
-            message = codec.vector.to_message(codec.vector.checked(np.atleast_1d(np.asarray(value, np.float64))), self._clock.time_ns)
-        else:
-            message = message_type(port.type).model_validate(value)
-        self._inlets.offer(request.participant, request.port, encode(message), monotonic_ns())
-        return Empty()
-
-    def _join(self, request: JoinRequest) -> JoinReply | Empty:
-        names = [name for name, member in self.plan.members.items() if member.host == request.host]
-        if not names or request.host == "hub":
-            raise MessageError(f"session '{self.scenario.name}' has no host '{request.host}'; it has {', '.join(self.plan.hosts()[1:]) or 'none'}")
-        known = self._joined.get(request.host)
-        if known is not None and known.pid != request.pid:
-            raise MessageError(f"host '{request.host}' is here already, as process {known.pid}")
-        with self._join_changed:
-            self._joined[request.host] = request
-            self._join_changed.notify_all()
-        if request.ready or request.failed:
-            return Empty()
-        params = {name: self.scenario.participants[name].params for name in names}
-        return JoinReply(run=self._run_id, plan=self.plan, params=params, directory=str(self._directory))
 
     def _answer_status(self, query: zenoh.Query) -> None:
         with query:
@@ -462,28 +363,22 @@ class Session:
     def status(self) -> SessionStatus:
         """Return what the session is doing now."""
         members = [
-            ParticipantStatus(name=m.name, role=m.role, host=m.host, pid=self._pid(m.host), step=self._done.get(m.name, self._clock.step))
+            ParticipantStatus(name=m.name, role=m.role, host=m.host, pid=self._membership.pid(m.host), step=self._last_steps.get(m.name, self._clock.step))
             for m in self.plan.members.values()
         ]
+        progress = self._progress()
         return SessionStatus(
             session=self.scenario.name,
             run=self._run_id,
             state=self._phase,
-            step=self._clock.step,
+            step=progress.step,
             sim_time_ns=self._clock.time_ns,
-            real_time_factor=self._progress().real_time_factor,
-            late_steps=self._clock.late_steps,
+            real_time_factor=progress.real_time_factor,
+            late_steps=progress.late_steps,
             dropped_messages=self._dropped,
-            detail=self._failure,
+            detail=self._detail,
             participants=members,
         )
-
-    def _pid(self, host: str) -> int:
-        import os
-
-        if host == "hub":
-            return os.getpid()
-        return self._joined[host].pid if host in self._joined else self._fleet.pid(host)
 
     @property
     def _dropped(self) -> int:
@@ -491,7 +386,8 @@ class Session:
 
     def _progress(self) -> Progress:
         sim_s = self._clock.time_ns / 1e9
-        wall_ns = self._wall_ns or (monotonic_ns() - self._started_ns if hasattr(self, "_started_ns") else 0)
+        running_ns = 0 if self._started_ns is None else monotonic_ns() - self._started_ns
+        wall_ns = running_ns if self._wall_ns is None else self._wall_ns
         factor = sim_s / (wall_ns / 1e9) if wall_ns else 0.0
         return Progress(self._clock.step, self._steps, sim_s, factor, self._clock.late_steps, self._observers.measures.live())
 
@@ -503,11 +399,11 @@ class Session:
         return Summary(
             session=self.scenario.name,
             state=self._phase,
-            steps=self._clock.step,
+            steps=progress.step,
             sim_time_s=progress.sim_time_s,
-            wall_time_s=self._wall_ns / 1e9,
+            wall_time_s=(self._wall_ns or 0) / 1e9,
             real_time_factor=progress.real_time_factor,
-            late_steps=self._clock.late_steps,
+            late_steps=progress.late_steps,
             dropped_messages=self._dropped,
             state_hash=digest.hexdigest(),
             recording=None if recorded is None else str(recorded.path),
@@ -519,5 +415,4 @@ class Session:
 
 def _steps_in(grant: Permission, member: Member, step_ns: int) -> int:
     """Return how many steps a participant takes in a grant."""
-    period = member.period
-    return (grant.horizon_ns // step_ns - 1) // period - (grant.step - 1) // period
+    return (grant.horizon_ns // step_ns - 1) // member.period - (grant.step - 1) // member.period

@@ -10,7 +10,8 @@ from pathlib import Path
 from hub import registry
 from hub.plan import Member, Plan
 from hub.recording import Recording
-from hub.session import Progress, Session
+from hub.session import Session
+from hub.summary import Progress
 from schemas.errors import RecordingError
 from schemas.lockstep import Report
 from schemas.trocar_msgs import Ack

@@ -240,7 +240,7 @@ class Wire:
 
     def linked(self) -> bool:
         """Say whether the initial value of every remote cell has arrived, that is, whether every link works."""
-        return all([cell.primed() for cell in self._cells])
+        return all(cell.primed() for cell in self._cells)
 
     def close(self) -> None:
         """Stop publishing and receiving; the session stays open."""

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
-from hub.session import Progress
+from hub.summary import Progress
 from schemas.scenario import Scenario
 
 __all__ = ["RunProgress", "console", "show", "table"]

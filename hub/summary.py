@@ -1,0 +1,49 @@
+"""What a run tells about itself: while it goes, and at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+__all__ = ["Progress", "Summary"]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a progress line shows."""
+
+    step: int
+    steps: int | None
+    """Steps of the whole run; None if it goes on until it is stopped."""
+    sim_time_s: float
+    real_time_factor: float
+    late_steps: int
+    live: Mapping[str, tuple[float, str]]
+    """Present value and unit of each measure that is shown live."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a run was like."""
+
+    session: str
+    state: str
+    steps: int
+    sim_time_s: float
+    wall_time_s: float
+    real_time_factor: float
+    late_steps: int
+    dropped_messages: int
+    state_hash: str
+    """Over every state hash of every participant: equal for equal runs, whatever the placement or the grants' windows."""
+    recording: str | None
+    recording_complete: bool | None
+    energy_residual_j: float
+    measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the summary as JSON would have it, the measures beside the rest."""
+        row = asdict(self)
+        measures = row.pop("measures")
+        return row | measures
