@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import queue
+import statistics
 import struct
 import subprocess
 import sys
@@ -133,35 +134,50 @@ def _turns(step_s: float) -> int:
     return int(1_000_000 * step_s / (time.perf_counter() - begin))
 
 
-def _block(rows: list[list[tuple[int, int, bytes]]], turns: int, write: Callable[[int, int, bytes], object]) -> tuple[float, float]:
-    wall, cpu = time.perf_counter(), time.process_time()
+def _block(rows: list[list[tuple[int, int, bytes]]], turns: int, write: Callable[[int, int, bytes], object]) -> float:
+    begin = time.perf_counter()
     for row in rows:
         _work(turns)
         for channel, time_ns, payload in row:
             write(channel, time_ns, payload)
-    return time.perf_counter() - wall, time.process_time() - cpu
+    return time.perf_counter() - begin
 
 
 def _ignore(_channel: int, _time_ns: int, _payload: bytes) -> None:
     return
 
 
-def measure(step_ms: float, steps: int, rounds: int) -> dict[str, float]:
-    """Return, for each recorder, loop time with it over loop time without: of the wall clock, and of CPU time in this process.
-
-    Blocks with and without take turns, and the fastest of each are compared, because other load on the machine only adds. CPU time counts compression
-    too, which runs beside the loop where a core is free.
-    """
+def _ratio(name: str, step_ms: float, steps: int, rounds: int) -> float:
+    """Return loop time with a recorder over loop time without: the median over pairs of short blocks, so that other load falls on both of a pair."""
     rows, turns = _messages(steps), _turns(step_ms * 1e-3)
-    results: dict[str, float] = {"step_ms": step_ms}
-    for name in ("recorder", "mcap_writer_thread", "mcap_writer_process"):
+    with tempfile.TemporaryDirectory() as directory:
+        sink = _sink(name, Path(directory))
+        pairs = [(_block(rows, turns, _ignore), _block(rows, turns, sink.write)) for _ in range(rounds)]
+        sink.close()
+    return statistics.median(on / off for off, on in pairs)
+
+
+def _cpu_us_per_step(name: str, rounds: int) -> float:
+    """Return the CPU time that recording a step takes in this process, writer thread and compression included: the fastest round."""
+    rows, times = _messages(4000), list[float]()  # many, so that opening and closing the file do not count
+    for _ in range(rounds):
         with tempfile.TemporaryDirectory() as directory:
             sink = _sink(name, Path(directory))
-            blocks = [(_block(rows, turns, _ignore), _block(rows, turns, sink.write)) for _ in range(rounds)]
+            begin = time.process_time()
+            for row in rows:
+                for channel, time_ns, payload in row:
+                    sink.write(channel, time_ns, payload)
             sink.close()
-        for clock, label in enumerate(("", "_cpu")):
-            off, on = (min(pair[side][clock] for pair in blocks) for side in (0, 1))
-            results[f"{name}{label}_ratio"] = on / off
+            times.append(time.process_time() - begin)
+    return min(times) / len(rows) * 1e6
+
+
+def measure(step_ms: float, steps: int, rounds: int) -> dict[str, float]:
+    """Return ratio and CPU time of each recorder."""
+    results: dict[str, float] = {"step_ms": step_ms}
+    for name in ("recorder", "mcap_writer_thread", "mcap_writer_process"):
+        results[f"{name}_ratio"] = _ratio(name, step_ms, steps, rounds)
+        results[f"{name}_cpu_us_per_step"] = _cpu_us_per_step(name, 8)
     return results
 
 
@@ -180,8 +196,8 @@ def main() -> None:
     """Print the ratios."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--step-ms", type=float, default=1.0, help="length of a step of the loop")
-    parser.add_argument("--steps", type=int, default=100, help="steps per block")
-    parser.add_argument("--rounds", type=int, default=40, help="blocks with, and without")
+    parser.add_argument("--steps", type=int, default=50, help="steps per block")
+    parser.add_argument("--rounds", type=int, default=200, help="blocks with, and without")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--sink", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -1,7 +1,7 @@
 """Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside them.
 
-The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at about eight times the cost in
-Python (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so the many message
+The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three times
+the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so the many message
 headers and index entries of a chunk are laid out here by numpy.
 Format: https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 """

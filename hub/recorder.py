@@ -25,8 +25,8 @@ from schemas.errors import RecordingError, did_you_mean
 __all__ = ["Recorder", "RecorderSummary"]
 
 CHUNK_BYTES = 64 * 2**10
-"""A killed process loses at most this much, and laying out this much keeps the interpreter from the step loop for 0.2 ms
-(bench/recorder.py)."""
+"""A killed process loses about this much; small, so that laying it out does not keep the interpreter from the step loop for long
+(docs/decisions/0005-recorder.md)."""
 
 CHUNK_AGE_S = 1.0
 """Or, where little is recorded, the messages of this much wall time."""

@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
@@ -63,7 +64,11 @@ def test_zeros_at_the_end_after_a_power_loss(session: Path, tmp_path: Path) -> N
 def test_a_damaged_chunk_is_left_out_and_counted(session: Path, tmp_path: Path) -> None:
     whole = bytearray((session / "run_0.mcap").read_bytes())
     total = sum(Recording(session).counts.values())
-    whole[len(whole) // 2] ^= 0xFF
+    with (session / "run_0.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    chunk = summary.chunk_indexes[1]
+    whole[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0xFF
     (tmp_path / "x.mcap").write_bytes(whole)
     saved = recover(tmp_path / "x.mcap")
     assert (saved.damaged_chunks, saved.cut_short) == (1, False)
