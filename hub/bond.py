@@ -70,17 +70,16 @@ class ForceSide:
         force = spring + damper
         self._impulse += dt * force
         self._summed += dt
-        self._last = force
         moved = damper if self._plan.prediction == "hold" else force
         self._work[0] += dt * float(moved @ self.velocity(tau))
 
-    def result(self, spring: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond: the reaction on the other side (minus the mean or the last force), and the work.
+    def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
+        """Return the outputs of the bond: the reaction on the other side (minus the mean force, or the one at the end), and the work.
 
-        `spring`: elastic force (N, N m; shape (dof,)) at the end of the step, on the predicted motion.
+        `spring`, `damper`: forces (N, N m; shape (dof,)) at the end of the step, on the predicted motion.
         """
         self._spring = spring[: self._linear].copy()
-        force = self._impulse / self._summed if self._plan.mean else self._last
+        force = self._impulse / self._summed if self._plan.mean else spring + damper
         return {self.force_port: -force, self.work_port: self._work.copy()}
 
     @property

@@ -129,7 +129,9 @@ class Host:
             depth = self._depth(member.name, port.name, here=True)
             elsewhere = any((k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links)
             publisher = self._wire.publisher(member, port, always=elsewhere) if self._wire else None
-            slot.sinks.append(_Sink(port, stride, PortCodec(port).vector is not None, Cell(member.period, stride, depth) if depth else None, publisher))
+            cell = Cell(member.period, stride, depth) if depth else None
+            sink = _Sink(port, stride, PortCodec(port).vector is not None, cell, publisher)
+            slot.sinks.insert(0 if elsewhere else len(slot.sinks), sink)  # first what another host waits for
 
     def _lay_readers(self, slot: _Slot) -> None:
         for link in self.plan.links:
@@ -229,9 +231,9 @@ class Host:
         begun = perf_counter_ns()
         try:
             outputs = slot.participant.step(t, slot.h_ns, slot.inputs)
-            slot.hashes.append(slot.participant.state_hash())
             slot.compute_ns.append(perf_counter_ns() - begun)
-            self._hand_on(slot, step, t + slot.h_ns, outputs)
+            self._hand_on(slot, step, t + slot.h_ns, outputs)  # before the hash: somebody may wait for it
+            slot.hashes.append(slot.participant.state_hash())
             for port in slot.work_ports:
                 slot.work_j.append(float(outputs[port][0]))  # pyright: ignore[reportArgumentType, reportIndexIssue]
         except ParticipantError:

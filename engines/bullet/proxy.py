@@ -112,7 +112,8 @@ class Proxy:
                 f"probe '{self.name}' is at {self.position} at {t * 1e-9:.6g} s. The likeliest cause is a contact that became unstable: "
                 f"shorten the timestep, or lower the probe's stiffness"
             )
-        return self._side.result(self._spring)
+        self._damper[:3] = self._damping * (self._side.velocity(h)[:3] - self.velocity)
+        return self._side.result(self._spring, self._damper)
 
     @property
     def idle(self) -> dict[str, Vector]:

@@ -11,11 +11,11 @@ from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
 from schemas.ports import BondSide, Port
 
-SUB_STEPS = 20
+SUB_STEPS = 50
 
 
 class MassParams(Params):
-    """One mass on a spring-damper to ground, in SI units; `coupling_*` on mass 2 only."""
+    """One mass on a spring-damper to ground, in SI units; on mass 2 also the coupling, and where mass 1 starts."""
 
     mass: float
     stiffness: float
@@ -23,6 +23,7 @@ class MassParams(Params):
     x: float = 0.0
     coupling_stiffness: float = 0.0
     coupling_damping: float = 0.0
+    coupled_x: float = 0.0
 
 
 class Mass(Stepped):
@@ -71,7 +72,8 @@ class SprungMass(Mass):
     def configure(self, setup: Setup) -> Outputs:
         self.side = ForceSide(self.bonds[0], setup.bonds["tip"])
         self.x, self.v = np.array([self.params.x]), np.zeros(1)
-        return {self.side.force_port: np.zeros(1), self.side.work_port: np.zeros(1)}
+        spring = self.params.coupling_stiffness * (self.params.coupled_x - self.x)
+        return {self.side.force_port: -spring, self.side.work_port: np.zeros(1)}
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         self.side.begin(inputs, h / 1e9)
@@ -82,4 +84,5 @@ class SprungMass(Mass):
             damper = p.coupling_damping * (side.velocity(tau) - self.v)
             side.add(spring, damper, tau, dt)
             self.move(spring + damper, dt)
-        return side.result(p.coupling_stiffness * (side.position(h / 1e9) - self.x))
+        end = h / 1e9
+        return side.result(p.coupling_stiffness * (side.position(end) - self.x), p.coupling_damping * (side.velocity(end) - self.v))
