@@ -7,7 +7,7 @@ A package brings its own kinds by an entry point in one of the groups `trocar.en
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, distribution, entry_points
 from pathlib import Path
@@ -58,12 +58,14 @@ def kinds() -> dict[str, Kind]:
 def find(name: str) -> Kind:
     """Return the kind called `name`: an installed one, or `module:Class` for a class of one's own on PYTHONPATH.
 
-    Raises ScenarioError if there is none.
+    Raises ScenarioError if there is none, or if that class cannot be imported.
     """
     if name in kinds():
         return kinds()[name]
     if ":" in name:
-        return Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
+        kind = Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
+        loaded = _import(kind)  # only the class itself says what it is
+        return replace(kind, role="device") if isinstance(loaded, type) and issubclass(loaded, Device) else kind
     raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}")
 
 
@@ -71,15 +73,19 @@ def find(name: str) -> Kind:
 def load(name: str) -> Participant:
     """Return the class of kind `name`. Raises ScenarioError if there is no such kind or its package cannot be imported."""
     kind = find(name)
-    try:
-        loaded = kind.entry.load()
-    except Exception as error:  # whatever a plugin's module does on import
-        raise ScenarioError(
-            f"{kind.role} '{name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}: {type(error).__name__}: {error}"
-        ) from error
+    loaded = _import(kind)
     if not (isinstance(loaded, type) and issubclass(loaded, Device if kind.role == "device" else Stepped)):
         raise ScenarioError(f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no {'Device' if kind.role == 'device' else 'Stepped'}")
     return loaded
+
+
+def _import(kind: Kind) -> Any:
+    try:
+        return kind.entry.load()
+    except Exception as error:  # whatever a plugin's module does on import
+        raise ScenarioError(
+            f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}: {type(error).__name__}: {error}"
+        ) from error
 
 
 def make(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Stepped | Device:

@@ -1,11 +1,18 @@
+import faulthandler
 import importlib
+import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from hub import registry
+from hub.endpoint import free_endpoint
+from hub.launch import launch
+from hub.scenario_file import load
+from hub.session import Session
 
 PENDULUM = """
 from typing import Literal
@@ -56,6 +63,10 @@ class Pendulum(Stepped):
 """
 
 InstallPlugin = Callable[..., None]
+Prepare = Callable[..., Session]
+
+_HANGS_S = 90
+"""A test of the hub that takes longer hangs: every thread's stack is printed, and the run of the tests ends."""
 
 
 @pytest.fixture
@@ -99,3 +110,26 @@ def _forget() -> None:
     importlib.invalidate_caches()
     registry.kinds.cache_clear()
     registry.load.cache_clear()
+
+
+@pytest.fixture
+def toys(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let this process and its children find the participants of `toys.py`, and end a test that hangs."""
+    here = str(Path(__file__).parent)
+    monkeypatch.syspath_prepend(here)
+    monkeypatch.setenv("PYTHONPATH", here, prepend=os.pathsep)
+    faulthandler.dump_traceback_later(_HANGS_S, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.fixture
+def prepare(toys: None, tmp_path: Path) -> Prepare:
+    """Return a function that makes a session of a scenario's text, with overrides, on an endpoint of its own."""
+
+    def prepare(text: str, *overrides: str, **options: Any) -> Session:
+        file = tmp_path / "session.yaml"
+        file.write_text(text)
+        return launch(load(str(file), overrides), endpoint=free_endpoint(range(1)), **options)
+
+    return prepare

@@ -1,0 +1,304 @@
+"""Small participants for the tests of the hub. Child processes find them as `toys:Name` through PYTHONPATH.
+
+Their states are chaotic or chained hashes, so that a value that comes a step too early or too late, twice or not at all,
+changes every state hash from there on.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from typing import Literal
+
+import numpy as np
+
+from hub.bond import ForceSide, MotionSide
+from hub.participant import Device, Params, Sample, Stepped, state_hash
+from schemas.ports import BondSide, Port
+from schemas.ros import Header, Joy, Point, Pose, PoseStamped, StringMessage, Time
+
+SIZE = 3
+POSE, JOY, TEXT = PoseStamped.ros_type, Joy.ros_type, StringMessage.ros_type
+
+
+class Bare(Stepped):
+    """No ports, no state."""
+
+    ports = ()
+
+    def configure(self, setup):
+        return {}
+
+    def step(self, t, h, inputs):
+        return {}
+
+    def state_hash(self):
+        return 0
+
+    def close(self):
+        pass
+
+
+class MixerParams(Params):
+    out_every: int = 1
+    """The output comes at this many of its own steps."""
+    step_ns: int = 1_000_000
+    """Its own step; needed to state the output's period."""
+    seed: int = 1
+
+
+class Mixer(Bare):
+    """Folds three inputs into a chaotic state and gives it on."""
+
+    params_model = MixerParams
+
+    @property
+    def ports(self):
+        inputs = (Port(name=name, causality="input", size=SIZE, start=(0.25,) * SIZE) for name in "abc")
+        return (*inputs, Port(name="out", causality="output", size=SIZE, period_ns=self.params.step_ns * self.params.out_every))
+
+    def configure(self, setup):
+        self.x = np.random.default_rng(self.params.seed).random(SIZE)
+        return {"out": self.x}
+
+    def step(self, t, h, inputs):
+        middle = h * 0.5e-9
+        taken = inputs["a"] + 2.0 * inputs.at("b", middle) + 3.0 * inputs.at("c", middle)
+        slope = sum(float(rate.sum()) for name in "bc" if (rate := inputs.rate(name)) is not None)
+        self.x[:] = (3.9 * self.x * (1.0 - self.x) + 0.1 * taken + 1e-4 * slope + h * 1e-12) % 1.0  # in place: neighbours must not see it early
+        return {"out": self.x}
+
+    def state_hash(self):
+        return state_hash(self.x)
+
+
+class Chain(Bare):
+    """A state that is a hash of everything so far."""
+
+    def configure(self, setup):
+        self.digest = 0
+        return {}
+
+    def fold(self, *parts):
+        self.digest = state_hash(self.digest.to_bytes(8, "little"), *parts)
+
+    def state_hash(self):
+        return self.digest
+
+
+class Talker(Chain):
+    """Says between 0 and 4 things in a step."""
+
+    ports = (Port(name="words", causality="output", type=TEXT, variability="event"),)
+
+    def configure(self, setup):
+        super().configure(setup)
+        self.said = 0
+        return {"words": ()}
+
+    def step(self, t, h, inputs):
+        count = (self.digest >> 3) % 5
+        words = tuple(StringMessage(data=f"word {self.said + i}") for i in range(count))
+        self.said += count
+        self.fold(t.to_bytes(8, "little"))
+        return {"words": words}
+
+
+class Listener(Chain):
+    """Expects every word of a `Talker` once and in order; `heard` counts them."""
+
+    ports = (
+        Port(name="words", causality="input", type=TEXT, variability="event"),
+        Port(name="heard", causality="output", type="std_msgs/msg/Float64"),
+    )
+
+    def configure(self, setup):
+        super().configure(setup)
+        self.heard = np.zeros(1)
+        return {"heard": self.heard}
+
+    def step(self, t, h, inputs):
+        for word in inputs.events("words"):
+            if word.data != f"word {int(self.heard[0])}":
+                raise ValueError(f"expected word {int(self.heard[0])}, got {word.data}")
+            self.heard[0] += 1
+        self.fold(t.to_bytes(8, "little"), self.heard)
+        return {"heard": self.heard}
+
+
+class Follower(Chain):
+    """Listens to a device: a pose, the staleness of it, and buttons of which none may be lost."""
+
+    ports = (
+        Port(name="hand", causality="input", type=POSE),
+        Port(name="buttons", causality="input", type=JOY, variability="event"),
+        Port(name="pressed", causality="output", type="std_msgs/msg/Float64"),
+        Port(name="stale_steps", causality="output", type="std_msgs/msg/Float64"),
+    )
+
+    def configure(self, setup):
+        super().configure(setup)
+        self.pressed, self.stale_steps = np.zeros(1), np.zeros(1)
+        return {"pressed": self.pressed, "stale_steps": self.stale_steps}
+
+    def step(self, t, h, inputs):
+        for joy in inputs.events("buttons"):
+            if joy.buttons[0] != self.pressed[0]:
+                raise ValueError(f"expected press {self.pressed[0]}, got {joy.buttons[0]}")
+            self.pressed[0] += 1
+        self.stale_steps[0] += inputs.stale("hand")
+        self.fold(inputs["hand"], self.pressed, self.stale_steps)
+        return {"pressed": self.pressed, "stale_steps": self.stale_steps}
+
+
+class PlayerParams(Params):
+    clock: Literal["simulated", "wall"] = "simulated"
+    silent_after_ms: int = 10**9
+    max_age_ms: int = 0
+
+
+class Player(Device):
+    """A pose every 3 ms and a button every 2 ms, in simulated or wall time."""
+
+    params_model = PlayerParams
+
+    @property
+    def ports(self):
+        clock, age = self.params.clock, self.params.max_age_ms * 1_000_000
+        return (
+            Port(name="hand", causality="output", type=POSE, frame="stylus_base", clock=clock, max_age_ns=age),
+            Port(name="buttons", causality="output", type=JOY, variability="event", clock=clock),
+        )
+
+    def open(self, directory):
+        self.next = {"hand": 0, "buttons": 0}
+
+    def read(self, t):
+        made = []
+        while (ms := self.next["hand"]) <= min(t // 1_000_000, self.params.silent_after_ms):
+            pose = Pose(position=Point(x=ms / 7.0))
+            made.append((ms, Sample("hand", PoseStamped(header=Header(stamp=Time.from_ns(ms * 1_000_000), frame_id="stylus_base"), pose=pose))))
+            self.next["hand"] += 3
+        while (ms := self.next["buttons"]) <= t // 1_000_000:
+            joy = Joy(header=Header(stamp=Time.from_ns(ms * 1_000_000)), buttons=np.array([ms // 2], np.int32))
+            made.append((ms, Sample("buttons", joy)))
+            self.next["buttons"] += 2
+        return [sample for _, sample in sorted(made, key=lambda row: row[0])]
+
+    def close(self):
+        pass
+
+
+class FaultParams(Params):
+    at: int = 5
+    how: Literal["raise", "nan", "hang", "exit", "configure", "nan-work", "shape"] = "raise"
+
+
+class Fault(Bare):
+    """Goes wrong at step `at`, which its input does not change."""
+
+    params_model = FaultParams
+    ports = (
+        Port(name="a", causality="input", size=SIZE, start=(0.0,) * SIZE),
+        Port(name="out", causality="output", size=SIZE),
+    )
+
+    def configure(self, setup):
+        if self.params.how == "configure":
+            raise OSError("the robot is not plugged in")
+        self.steps = 0
+        return {"out": np.zeros(SIZE)}
+
+    def step(self, t, h, inputs):
+        wrong = self.steps == self.params.at
+        self.steps += 1
+        return self._go_wrong() if wrong else {"out": inputs["a"] + self.steps}
+
+    def _go_wrong(self):
+        how = self.params.how
+        if how == "raise":
+            raise ArithmeticError("the rope is torn")
+        if how == "hang":
+            while True:
+                time.sleep(1000.0)
+        if how == "exit":
+            os._exit(7)
+        return {"out": np.zeros(SIZE - 1) if how == "shape" else np.array([0.0, np.nan, 0.0])}
+
+    def state_hash(self):
+        return self.steps
+
+
+class PacedParams(Params):
+    milliseconds: float = 1.0
+    kill_at: int = -1
+
+
+class Paced(Mixer):
+    """A mixer whose steps take a while; kills its own process at a step if told to, and writes when (ns) to stderr."""
+
+    params_model = PacedParams
+    ports = Mixer("", MixerParams()).ports
+
+    def configure(self, setup):
+        self.steps = 0
+        self.x = np.full(SIZE, 0.3)
+        return {"out": self.x}
+
+    def step(self, t, h, inputs):
+        if self.steps == self.params.kill_at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        self.steps += 1
+        time.sleep(self.params.milliseconds * 1e-3)
+        return super().step(t, h, inputs)
+
+
+class MassParams(Params):
+    mass: float = 1.0
+    x: float = 1.0
+    nan_at: int = -1
+
+
+class Mass(Bare):
+    """A free mass under the force of a bond."""
+
+    params_model = MassParams
+    bonds = (BondSide(name="tip", side="motion", dof=1),)
+
+    def configure(self, setup):
+        self.side = MotionSide(self.bonds[0], setup.bonds["tip"])
+        self.x, self.v, self.steps = np.array([self.params.x]), np.zeros(1), 0
+        return self.side.result(self.x.copy(), self.v.copy())
+
+    def step(self, t, h, inputs):
+        self.side.begin(inputs, self.x, self.v)
+        force, before = self.side.force(0.0, self.x, self.v), self.x
+        self.v = self.v + h * 1e-9 * force / self.params.mass
+        self.x = self.x + h * 1e-9 * self.v
+        self.side.add(force, self.x - before)
+        self.steps += 1
+        outputs = self.side.result(self.x.copy(), self.v.copy())
+        return outputs | ({self.side.work_port: np.array([np.nan])} if self.steps == self.params.nan_at + 1 else {})
+
+    def state_hash(self):
+        return state_hash(self.x, self.v, self.side.state)
+
+
+class Spring(Bare):
+    """A spring-damper to the ground at the other end of a bond."""
+
+    bonds = (BondSide(name="tip", side="force", dof=1, stiffness=100.0, damping=1.0, proxy_mass=0.1),)
+
+    def configure(self, setup):
+        self.side = ForceSide(self.bonds[0], setup.bonds["tip"])
+        return {self.side.force_port: np.zeros(1), self.side.work_port: np.zeros(1)}
+
+    def step(self, t, h, inputs):
+        s = h * 1e-9
+        self.side.begin(inputs, s)
+        self.side.add(100.0 * self.side.position(0.5 * s), 1.0 * self.side.velocity(0.5 * s), 0.5 * s, s)
+        return self.side.result(100.0 * self.side.position(s), 1.0 * self.side.velocity(s))
+
+    def state_hash(self):
+        return state_hash(self.side.state)
