@@ -45,6 +45,7 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
         "connect/timeout_ms": 5000,
         "connect/exit_on_failure": True,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
