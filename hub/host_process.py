@@ -11,7 +11,6 @@ import logging
 import os
 import sys
 import threading
-from _thread import interrupt_main
 from collections.abc import Generator
 from importlib.metadata import version
 from pathlib import Path
@@ -23,6 +22,7 @@ from zenoh.handlers import Callback, FifoChannel
 from hub.control import Empty, JoinReply, JoinRequest, ask
 from hub.devices import DeviceLoop
 from hub.host import Host
+from hub.interrupt import Interrupt
 from hub.participant import Device, Stepped
 from hub.plan import Member
 from hub.registry import make
@@ -157,12 +157,12 @@ class _JoinedHost:
 @contextlib.contextmanager
 def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
     """Interrupt the main thread when the hub's liveliness token is gone, and end the process if that does not help."""
-    over = threading.Event()
+    over, interrupt = threading.Event(), Interrupt()
 
     def gone(sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE and not over.is_set():
             log.info("the hub is gone")
-            interrupt_main()
+            interrupt()
             threading.Thread(target=force, daemon=True).start()
 
     def force() -> None:
@@ -171,8 +171,9 @@ def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
 
     watch = session.liveliness().declare_subscriber(keys.alive("hub", "hub"), Callback(gone, indirect=True), history=True)
     try:
-        with contextlib.suppress(KeyboardInterrupt):
+        with interrupt, contextlib.suppress(KeyboardInterrupt):
             yield
+            interrupt.disarm()
     finally:
         over.set()
         watch.undeclare()

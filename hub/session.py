@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
 import secrets
 import struct
-from _thread import interrupt_main
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from time import monotonic, monotonic_ns, sleep
@@ -22,6 +22,7 @@ from hub.endpoint import free_endpoint
 from hub.fleet import Fleet, Watchdog
 from hub.host import Host
 from hub.inlets import Inlets
+from hub.interrupt import Interrupt
 from hub.measures import Measures
 from hub.membership import Failures, Membership
 from hub.observers import Observers
@@ -85,6 +86,7 @@ class Session:
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
         self._drops = Drops()
+        self._interrupt = Interrupt()
         self._phase = "starting"
         self._detail = ""
         self._started_ns: int | None = None
@@ -93,14 +95,16 @@ class Session:
     # --- the run ---------------------------------------------------------------------------------------------------
 
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
-        """Run to the end and return the summary.
+        """Run to the end and return the summary. SIGTERM ends it as Ctrl-C does.
+
+        Call it in the main thread: nowhere else can a participant of this process be interrupted that hangs or waits for a dead one.
 
         Raises ParticipantError or SessionError when the session fails (the recording is then closed and readable),
         ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
         """
         recorder = Recorder(self._record, attachments=self._attachments) if self._record is not None else None
         try:
-            with open_session("router", listen=[self.endpoint]) as session:
+            with self._interrupt, open_session("router", listen=[self.endpoint]) as session:
                 self._observers = Observers(self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder)
                 self._open(session)
                 try:
@@ -108,9 +112,10 @@ class Session:
                     self._loop(progress)
                     self._phase = "done"
                 except KeyboardInterrupt:
-                    self._failures.check()  # the watchdog's way out of a participant that hangs in this process
+                    self._check()
                     raise SessionError(f"interrupted at step {self._clock.step}") from None
                 finally:
+                    self._interrupt.disarm()
                     self._close()
         finally:
             recorded = recorder.close() if recorder is not None else None
@@ -121,7 +126,7 @@ class Session:
         keys = self._keys
         self._by_ack = {keys.ack(name): self.plan.members[name] for name in self.plan.order}
         self._acks = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
-        self._failures = Failures(wake=lambda: session.put(keys.ack("hub"), b""))
+        self._failures = Failures(wake=lambda: self._wake(session))
         self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, self._fail)
         block, real_time, cdr = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME, zenoh.Encoding.APPLICATION_CDR
         self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
@@ -178,7 +183,7 @@ class Session:
         deadline = monotonic() + limit_s
         told: list[str] = []
         while missing := self._membership.missing(hosts):
-            self._failures.check()
+            self._check()
             if missing != told:
                 log.info("waiting for %s to join at %s", ", ".join(missing), self.endpoint)
             told = missing
@@ -201,7 +206,7 @@ class Session:
         self._watchdog.wait_for(waiting)
         while waiting or not self._host.linked():
             self._host.publish_initial()
-            self._failures.check()
+            self._check()
             sample = self._acks.try_recv()
             if sample is None:
                 sleep(0.005)
@@ -215,7 +220,7 @@ class Session:
         shown = told = 0.0
         self._clock.start()
         while not self._clock.done and not self.state.ending:
-            self._failures.check()
+            self._check()
             if self.state.paused:
                 self._wait_while_paused()
                 continue
@@ -238,7 +243,7 @@ class Session:
         self._phase = "paused"
         self._tell_status()
         while not self.state.wait(0.2):
-            self._failures.check()
+            self._check()
         self._phase = "running"
         self._clock.start()
 
@@ -280,10 +285,10 @@ class Session:
 
     def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None) -> tuple[Member, Report, bytes] | None:
         """Return a valid report on this grant (None: on being ready); raise a failure; drop and count anything else."""
-        self._failures.check()
         try:
             member = self._by_ack.get(str(sample.key_expr))
             if member is None:
+                self._check()
                 raise MessageError("belongs to no participant of this run")
             payload = sample.payload.to_bytes()
             steps = 0 if grant is None else _steps_in(grant, member, self.plan.step_ns)
@@ -329,8 +334,23 @@ class Session:
     def _fail(self, participant: str, cause: str) -> None:
         """End the run because of `participant`; may be called from any thread."""
         self._failures.report(participant, self._clock.step, cause)
-        if self.plan.members[participant].host == "hub" and participant in self._watchdog.waiting:
-            interrupt_main()
+
+    def _wake(self, session: zenoh.Session) -> None:
+        """Make the step loop look at the failures: it may wait for acks, or be inside a participant of this process."""
+        session.put(self._keys.ack("hub"), b"")
+        self._interrupt()
+
+    def _check(self) -> None:
+        """Raise the first failure, if there is one: in the words of a participant, if they are here already."""
+        if self._failures.first is None:
+            return
+        while (sample := self._acks.try_recv()) is not None:
+            member = self._by_ack.get(str(sample.key_expr))
+            with contextlib.suppress(MessageError):
+                report = unpack_report(sample.payload.to_bytes(), 0, 0)
+                if member is not None and report.run == self._run_id and report.error:
+                    raise ParticipantError(member.name, report.step, report.error)
+        self._failures.check()
 
     def _lost(self, sample: zenoh.Sample) -> None:
         """Take note that a liveliness token came or went. A lost engine ends the run; a lost device makes its arm hold."""

@@ -1,0 +1,53 @@
+"""Takes the main thread out of whatever it waits for or computes."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from _thread import interrupt_main
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+__all__ = ["Interrupt"]
+
+
+class Interrupt:
+    """While it is entered, SIGTERM raises KeyboardInterrupt in the main thread; calling it does the same from any thread.
+
+    SIGINT itself would not do: a shell lets the programs that it starts in the background ignore it. Entered in another
+    thread than the main one, it does nothing.
+    """
+
+    def __init__(self) -> None:
+        self._armed = False
+        self._before: Any = None
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGTERM, self._raise)
+            self._armed = True
+        return self
+
+    def disarm(self) -> None:
+        """Raise nothing any more: the main thread is closing what it has opened."""
+        self._armed = False
+
+    def __call__(self) -> None:
+        """Interrupt the main thread, also out of a call that sleeps."""
+        if not self._armed:
+            return
+        if hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
+        else:
+            interrupt_main(signal.SIGTERM)
+
+    def _raise(self, _number: int, _frame: FrameType | None) -> None:
+        """Runs in the main thread, between two of its instructions: after `disarm` nothing can come."""
+        if self._armed:
+            self._armed = False
+            raise KeyboardInterrupt
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._before is not None:
+            self._armed = False
+            signal.signal(signal.SIGTERM, self._before)
