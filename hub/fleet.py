@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from time import monotonic, monotonic_ns
 
 from hub.plan import Plan
@@ -64,27 +64,23 @@ def _how(code: int) -> str:
 class Watchdog:
     """Looks after processes and the time that answers take, in a thread of its own."""
 
-    def __init__(self, plan: Plan, fleet: Fleet, answer_limit_ns: int, failed: Callable[[str, str], None]) -> None:
-        """`failed` is called once, with a participant's name and the cause."""
+    def __init__(self, plan: Plan, fleet: Fleet, answer_limit_ns: int, awaited: Callable[[], str | None], failed: Callable[[str, str], None]) -> None:
+        """`awaited` says who keeps this process from going on; `failed` is called once, with a participant's name and the cause."""
         self._plan = plan
         self._fleet = fleet
         self._limit_ns = answer_limit_ns
+        self._awaited = awaited
         self._failed = failed
-        self._waiting: tuple[str, ...] = ()
+        self._waiting: Sequence[str] = ()
         self._since_ns = 0
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self._thread.start()
 
-    def wait_for(self, participants: Iterable[str]) -> None:
-        """Say whose answers are waited for from now on, in step order; an empty one: nobody's."""
+    def wait_for(self, participants: Sequence[str]) -> None:
+        """Say whose answers are waited for from now on, in step order; who answers may be removed from the list meanwhile."""
         self._since_ns = monotonic_ns()
-        self._waiting = tuple(participants)
-
-    @property
-    def waiting(self) -> tuple[str, ...]:
-        """Whose answers are waited for."""
-        return self._waiting
+        self._waiting = participants
 
     def _run(self) -> None:
         while not self._ending.wait(_LOOK_S):
@@ -99,9 +95,11 @@ class Watchdog:
             missing = [name for name in self._waiting if name in names] or names
             others = f" (host '{host}' also ran {', '.join(n for n in names if n != missing[0])})" if len(names) > 1 else ""
             return missing[0], f"{how}{others}"
-        waiting, since_ns = self._waiting, self._since_ns
+        since_ns, waiting = self._since_ns, tuple(self._waiting)
         if waiting and monotonic_ns() - since_ns > self._limit_ns:
-            return waiting[0], f"it has not answered for {self._limit_ns / 1e9:g} s (answer_limit)"
+            awaited = self._awaited()
+            others = "" if awaited is not None or len(waiting) == 1 else f"; nor have {', '.join(waiting[1:])}, which may wait for it"
+            return awaited or waiting[0], f"it has not answered for {self._limit_ns / 1e9:g} s (answer_limit){others}"
         return None
 
     def end(self) -> None:

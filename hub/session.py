@@ -145,7 +145,7 @@ class Session:
             self._entities += [session.declare_subscriber(keys.output("device", *source), take) for source in sources]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         self._fleet = Fleet()
-        self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, self._fail)
+        self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail)
         self._lay_local(session)
 
     def _lay_local(self, session: zenoh.Session) -> None:

@@ -65,7 +65,7 @@ class Pendulum(Stepped):
 InstallPlugin = Callable[..., None]
 Prepare = Callable[..., Session]
 
-_HANGS_S = 90
+_HANGS_S = 60
 """A test of the hub that takes longer hangs: every thread's stack is printed, and the run of the tests ends."""
 
 
@@ -113,14 +113,17 @@ def _forget() -> None:
 
 
 @pytest.fixture
-def toys(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def toys(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
     """Let this process and its children find the participants of `toys.py`, and end a test that hangs."""
     here = str(Path(__file__).parent)
     monkeypatch.syspath_prepend(here)
     monkeypatch.setenv("PYTHONPATH", here, prepend=os.pathsep)
-    faulthandler.dump_traceback_later(_HANGS_S, exit=True)
+    with capfd.disabled():
+        terminal = os.dup(2)
+    faulthandler.dump_traceback_later(_HANGS_S, exit=True, file=terminal)
     yield
     faulthandler.cancel_dump_traceback_later()
+    os.close(terminal)
 
 
 @pytest.fixture

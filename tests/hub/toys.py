@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -192,7 +193,9 @@ class Player(Device):
 
 class FaultParams(Params):
     at: int = 5
-    how: Literal["raise", "nan", "hang", "exit", "configure", "nan-work", "shape"] = "raise"
+    how: Literal["configure", "raise", "nan", "shape", "hang", "exit", "kill"] = "raise"
+    stamp: str = ""
+    """File that gets the time (ns, monotonic) just before `kill`."""
 
 
 class Fault(Bare):
@@ -224,32 +227,25 @@ class Fault(Bare):
                 time.sleep(1000.0)
         if how == "exit":
             os._exit(7)
+        if how == "kill":
+            Path(self.params.stamp).write_text(str(time.monotonic_ns()))
+            os.kill(os.getpid(), signal.SIGKILL)
         return {"out": np.zeros(SIZE - 1) if how == "shape" else np.array([0.0, np.nan, 0.0])}
 
     def state_hash(self):
         return self.steps
 
 
-class PacedParams(Params):
+class PacedParams(MixerParams):
     milliseconds: float = 1.0
-    kill_at: int = -1
 
 
 class Paced(Mixer):
-    """A mixer whose steps take a while; kills its own process at a step if told to, and writes when (ns) to stderr."""
+    """A mixer whose steps take a while."""
 
     params_model = PacedParams
-    ports = Mixer("", MixerParams()).ports
-
-    def configure(self, setup):
-        self.steps = 0
-        self.x = np.full(SIZE, 0.3)
-        return {"out": self.x}
 
     def step(self, t, h, inputs):
-        if self.steps == self.params.kill_at:
-            os.kill(os.getpid(), signal.SIGKILL)
-        self.steps += 1
         time.sleep(self.params.milliseconds * 1e-3)
         return super().step(t, h, inputs)
 
@@ -264,7 +260,10 @@ class Mass(Bare):
     """A free mass under the force of a bond."""
 
     params_model = MassParams
-    bonds = (BondSide(name="tip", side="motion", dof=1),)
+
+    @property
+    def bonds(self):
+        return (BondSide(name="tip", side="motion", dof=1, effective_mass=self.params.mass),)
 
     def configure(self, setup):
         self.side = MotionSide(self.bonds[0], setup.bonds["tip"])

@@ -1,0 +1,122 @@
+"""Bad days: whoever fails is named with the step, the recording is closed and readable, and nothing is left behind."""
+
+from pathlib import Path
+from time import monotonic_ns
+
+import numpy as np
+import pytest
+
+from hub.recording import Recording
+from schemas.errors import ParticipantError, ScenarioError, SessionError
+from tests.hub.processes import processes
+
+TRIO = """\
+name: trio
+step: 1 ms
+duration: 40 ms
+answer_limit: 1 s
+participants:
+  source: {kind: "toys:Mixer"}
+  bad: {kind: "toys:Fault"}
+  sink: {kind: "toys:Mixer"}
+connections:
+  - source.out -> bad.a
+  - bad.out -> sink.a
+"""
+BAD_AWAY, ALL_AWAY = ["participants.bad.host=other"], [f"participants.{name}.host=other" for name in ("source", "bad", "sink")]
+THREE_HOSTS = ["participants.source.host=one", "participants.bad.host=two", "participants.sink.host=three"]
+PLACEMENTS = {"hub": [], "process": BAD_AWAY, "one process": ALL_AWAY, "three processes": THREE_HOSTS}
+placements = pytest.mark.parametrize("placement", PLACEMENTS)
+
+
+@pytest.fixture
+def fail(prepare, tmp_path):
+    """Run a session that must fail, recorded; return the error after a look at what is left."""
+
+    def fail(text, *overrides, error=ParticipantError):
+        segments = set(Path("/dev/shm").iterdir())
+        session = prepare(text, *overrides, record=tmp_path / "recording")
+        with pytest.raises(error) as raised:
+            session.run()
+        assert processes(session.endpoint) == []
+        assert set(Path("/dev/shm").iterdir()) <= segments
+        recording = Recording(tmp_path / "recording")
+        assert recording.scenario().name == session.scenario.name
+        assert [status.state for _, status in recording.statuses()][-1] == "failed"
+        raised.value.grants = len(list(recording.grants()))
+        return raised.value
+
+    return fail
+
+
+@placements
+@pytest.mark.parametrize(
+    ("how", "cause"), [("raise", "ArithmeticError: the rope is torn"), ("nan", "port 'out': not all of"), ("shape", "port 'out': float64 of shape (2,)")]
+)
+def test_a_participant_that_goes_wrong_is_named_with_step_and_cause(fail, placement, how, cause):
+    error = fail(TRIO, f"participants.bad.how={how}", "participants.bad.at=7", "window=3", *PLACEMENTS[placement])
+    assert (error.participant, error.step) == ("bad", 7)
+    assert cause in str(error)
+
+
+@placements
+def test_a_participant_that_cannot_be_configured(fail, placement):
+    error = fail(TRIO, "participants.bad.how=configure", *PLACEMENTS[placement])
+    assert error.participant == "bad"
+    assert "the robot is not plugged in" in str(error)
+
+
+@placements
+def test_a_participant_that_hangs(fail, placement):
+    error = fail(TRIO, "participants.bad.how=hang", "participants.bad.at=7", *PLACEMENTS[placement])
+    assert (error.participant, error.step) == ("bad", 7)
+    assert "not answered for 1 s (answer_limit)" in str(error)
+
+
+@pytest.mark.parametrize("placement", ["process", "one process", "three processes"])
+@pytest.mark.parametrize("step", np.random.default_rng(1).integers(0, 40, 3).tolist())
+def test_a_killed_process(fail, tmp_path, placement, step):
+    error = fail(TRIO, "participants.bad.how=kill", f"participants.bad.at={step}", f"participants.bad.stamp={tmp_path / 'killed'}", *PLACEMENTS[placement])
+    told_ms = (monotonic_ns() - int((tmp_path / "killed").read_text())) / 1e6
+    assert error.step == step
+    assert "killed by SIGKILL" in str(error)
+    assert error.participant == "bad" or "bad" in str(error)
+    assert error.grants == step + 1
+    assert told_ms < 5000
+
+
+def test_a_process_that_ends_by_itself(fail):
+    error = fail(TRIO, "participants.bad.how=exit", *BAD_AWAY)
+    assert (error.participant, error.step) == ("bad", 5)
+    assert "exit code 7" in str(error)
+
+
+def test_a_remote_participant_that_does_not_come(fail):
+    error = fail(TRIO, "participants.bad.host=remote", "join_limit=300 ms", error=SessionError)
+    assert "remote/bad did not join within 0.3 s (join_limit) at tcp/127.0.0.1" in str(error)
+
+
+BOND = """\
+name: bond
+step: 1 ms
+duration: 20 ms
+answer_limit: 1 s
+participants:
+  mass: {kind: "toys:Mass"}
+  spring: {kind: "toys:Spring"}
+bonds:
+  - {motion: mass.tip, force: spring.tip}
+"""
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_work_that_is_not_finite(fail, host):
+    error = fail(BOND, "participants.mass.nan_at=4", f"participants.mass.host={host}")
+    assert (error.participant, error.step) == ("mass", 4)
+    assert "tip/work" in str(error)
+
+
+def test_a_step_that_breaks_the_stable_step_rule_is_refused(fail):
+    error = fail(BOND.replace("mass: {", "mass: {mass: 0.001, "), error=ScenarioError)
+    assert "H <= 0.5 m/b" in str(error)
+    assert error.path == ("bonds", 0)
