@@ -74,6 +74,8 @@ class RemoteCell(Cell):
         super().__init__(period, stride, depth)
         self._receiver = receiver
         self._newest = INITIAL - 1
+        self.waiting = False
+        """Whether somebody waits in `get` now."""
 
     def primed(self) -> bool:
         """Say whether the value at time 0 is here; later values must not have been asked for yet."""
@@ -91,5 +93,7 @@ class RemoteCell(Cell):
         while tag not in self._values:
             if self._newest > tag:
                 raise SessionError(f"the value of step {tag} was lost on its way: step {self._newest} arrived instead")
+            self.waiting = True
             self._keep(*self._receiver.receive())
+            self.waiting = False
         return self._values[tag]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hub.cells import INITIAL, Cell
+from hub.cells import INITIAL, Cell, RemoteCell
 from hub.inputs import Inputs
 from hub.participant import Outputs, Setup, Stepped
 from hub.plan import Member, Plan
@@ -23,6 +23,7 @@ from hub.wire import PortCodec, PortPublisher, Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.lockstep import Permission, Report
 from schemas.ports import BondSide, Port
+from schemas.vectors import VectorCodec
 
 __all__ = ["Done", "Host", "Tap"]
 
@@ -54,7 +55,8 @@ class _Sink:
 
     port: Port
     stride: int
-    vector: bool
+    vector: VectorCodec | None
+    shape: tuple[int, ...]
     cell: Cell | None
     publisher: PortPublisher | None
 
@@ -90,7 +92,8 @@ class Host:
         self._tap = tap
         self._slots = [self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name]
         self._by_name = {slot.member.name: slot for slot in self._slots}
-        self._remote: dict[tuple[str, str], Cell] = {}
+        self._remote: dict[tuple[str, str], RemoteCell] = {}
+        self._stepping: str | None = None
         self._inlets: dict[tuple[str, str], list[tuple[_Slot, str, PortCodec]]] = {}
         self._initial: list[tuple[PortPublisher, Any]] = []
         for slot in self._slots:
@@ -130,7 +133,8 @@ class Host:
             elsewhere = any((k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links)
             publisher = self._wire.publisher(member, port, always=elsewhere) if self._wire else None
             cell = Cell(member.period, stride, depth) if depth else None
-            sink = _Sink(port, stride, PortCodec(port).vector is not None, cell, publisher)
+            vector = PortCodec(port).vector
+            sink = _Sink(port, stride, vector, () if vector is None else vector.neutral.shape, cell, publisher)
             slot.sinks.insert(0 if elsewhere else len(slot.sinks), sink)  # first what another host waits for
 
     def _lay_readers(self, slot: _Slot) -> None:
@@ -182,13 +186,14 @@ class Host:
         for slot in self._slots:
             setup = Setup(period_ns=slot.h_ns, directory=directory, bonds=slot.member.bond_plans)
             try:
-                outputs = slot.participant.configure(setup)
+                self._hand_on(slot, INITIAL, 0, slot.participant.configure(setup))
+            except ParticipantError:
+                raise
             except TrocarError as error:
                 raise ParticipantError(slot.member.name, INITIAL, str(error)) from error
             except Exception as error:
                 log.exception("participant '%s' raised while it was configured", slot.member.name)
                 raise ParticipantError(slot.member.name, INITIAL, f"{type(error).__name__}: {error}") from error
-            self._hand_on(slot, INITIAL, 0, outputs)
             bonds[slot.member.name] = slot.participant.bonds
         return bonds
 
@@ -200,6 +205,11 @@ class Host:
     def linked(self) -> bool:
         """Say whether the values at time 0 of all other hosts that this one needs are here."""
         return self._wire is None or self._wire.linked()
+
+    @property
+    def awaited(self) -> str | None:
+        """Who keeps `run` from going on: the participant in its step, or the one elsewhere whose value it waits for."""
+        return next((source for (source, _), cell in self._remote.items() if cell.waiting), self._stepping)
 
     def due(self, step: int, count: int) -> list[str]:
         """Return who steps at least once in `count` steps from `step`, in step order."""
@@ -224,8 +234,10 @@ class Host:
                     self._step(slot, step, step * step_ns)
                     if step + period >= end:
                         done(slot.member, Report(grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j))
+        self._stepping = None
 
     def _step(self, slot: _Slot, step: int, t: int) -> None:
+        self._stepping = slot.member.name
         for reader in slot.readers:
             self._read(slot, reader, step)
         begun = perf_counter_ns()
@@ -235,7 +247,10 @@ class Host:
             self._hand_on(slot, step, t + slot.h_ns, outputs)  # before the hash: somebody may wait for it
             slot.hashes.append(slot.participant.state_hash())
             for port in slot.work_ports:
-                slot.work_j.append(float(outputs[port][0]))  # pyright: ignore[reportArgumentType, reportIndexIssue]
+                work = float(outputs[port][0])  # pyright: ignore[reportArgumentType, reportIndexIssue]
+                if not isfinite(work):
+                    raise ParticipantError(slot.member.name, step, f"output '{port}' is not finite: {work}")
+                slot.work_j.append(work)
         except ParticipantError:
             raise
         except TrocarError as error:
@@ -269,14 +284,14 @@ class Host:
             if name not in outputs:
                 raise ParticipantError(slot.member.name, step, f"output '{name}' is missing from what step() returned")
             value: Any = outputs[name]
-            if sink.vector and not isfinite(value @ value):
-                raise ParticipantError(slot.member.name, step, f"output '{name}' is not finite: {value}")
+            if sink.vector is not None and (value.shape != sink.shape or not isfinite(value @ value) or step == INITIAL):
+                sink.vector.checked(value)  # raises what is wrong, unless the numbers are only large
             if sink.cell is not None:
                 sink.cell.put(step, value)
             if sink.publisher is not None:
                 sink.publisher.put(step, time_ns, value)
                 if step == INITIAL:
-                    self._initial.append((sink.publisher, value.copy() if sink.vector else value))
+                    self._initial.append((sink.publisher, value if sink.vector is None else value.copy()))
             if self._tap is not None:
                 self._tap(slot.member, sink.port, step, time_ns, value)
 
