@@ -57,6 +57,10 @@ class Cell:
         count = (step + self._period if fresh else step) // self._stride
         return count * self._stride - self._period if count else INITIAL
 
+    def valid_from(self, tag: int) -> int:
+        """Return the communication point at which the value of `tag` holds: the end of the step that made it."""
+        return tag + self._period if tag > INITIAL else 0
+
     def before(self, tag: int) -> int:
         """Return the tag of the value before `tag`."""
         return max(tag - self._stride, INITIAL)

@@ -88,6 +88,7 @@ class Host:
         """Lay out the participants of host `name`; `wire` carries values to and from other processes, `tap` sees every output."""
         self.name = name
         self.plan = plan
+        self._step_s = plan.step_ns / 1e9
         self._wire = wire
         self._tap = tap
         self._slots = [self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name]
@@ -272,9 +273,11 @@ class Host:
             if arrived:
                 slot.events[reader.port] = tuple(arrived)
             return
-        value = slot.values[reader.port] = cell.get(tag)
+        value = cell.get(tag)
         if reader.linear:
-            slot.rates[reader.port] = (value - cell.get(cell.before(tag))) / reader.stride_s
+            rate = slot.rates[reader.port] = (value - cell.get(cell.before(tag))) / reader.stride_s
+            value = value + rate * ((step - cell.valid_from(tag)) * self._step_s)
+        slot.values[reader.port] = value
 
     def _hand_on(self, slot: _Slot, step: int, time_ns: int, outputs: Outputs) -> None:
         for sink in slot.sinks:

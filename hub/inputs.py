@@ -14,8 +14,8 @@ __all__ = ["Inputs"]
 class Inputs:
     """The inputs of one participant in one step.
 
-    `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the connection
-    extrapolates. The arrays belong to whoever produced them: read, do not write.
+    `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the connection is
+    linear: between the source's last two values while it is ahead, beyond them while it is not. The arrays belong to whoever produced them: read, do not write.
     """
 
     __slots__ = ("_events", "_rates", "_stale", "_values")
