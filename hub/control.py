@@ -5,7 +5,6 @@ Requests and replies are `std_msgs/String` messages that hold JSON.
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Callable
 from time import monotonic_ns
@@ -18,7 +17,7 @@ from zenoh.handlers import Callback
 
 from hub.inlets import Inlets
 from hub.plan import Plan
-from hub.wire import PortCodec
+from hub.wire import Drops, PortCodec
 from schemas.codec import decode, encode, message_type
 from schemas.errors import ConnectError, MessageError, TrocarError
 from schemas.keys import Keys
@@ -26,9 +25,6 @@ from schemas.ports import BondSide
 from schemas.ros import StringMessage
 
 __all__ = ["ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask"]
-
-log = logging.getLogger(__name__)
-
 
 R = TypeVar("R", bound=BaseModel)
 Q = TypeVar("Q", bound=BaseModel)
@@ -154,9 +150,9 @@ class Joins(Protocol):
 class ControlServer:
     """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, state: RunState, inlets: Inlets, joins: Joins) -> None:
-        """Steer `state`, write into `inlets`, and let hosts join."""
-        self._state = state
+    def __init__(self, session: zenoh.Session, keys: Keys, state: RunState, inlets: Inlets, joins: Joins, drops: Drops) -> None:
+        """Steer `state`, write into `inlets`, and let hosts join; what is refused is counted in `drops`."""
+        self._drops = drops
         self._inlets = inlets
         self._queryables = [
             self._declare(session, keys.control("join"), JoinRequest, joins.join),
@@ -174,8 +170,8 @@ class ControlServer:
                     payload = b"" if query.payload is None else query.payload.to_bytes()
                     text = decode(StringMessage, payload).data if payload else "{}"
                     reply = handler(model.model_validate_json(text))
-                except (TrocarError, ValidationError, ValueError, TypeError) as error:
-                    log.warning("refused a request on %s: %s", key, error)
+                except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
+                    self._drops.refuse(key, error)
                     reply = Refusal(refused=str(error))
                 query.reply(key, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
 

@@ -59,13 +59,15 @@ class ScriptedDevices:
 class DeviceLoop:
     """Reads a device at its period in a thread of its own, and writes to it what the simulation has for it."""
 
-    def __init__(self, member: Member, plan: Plan, device: Device, session: zenoh.Session, keys: Keys, *, failed: Callable[[str, str], None]) -> None:
-        """`failed` is told the device's name and the cause when the loop ends by an error."""
+    def __init__(
+        self, member: Member, plan: Plan, device: Device, session: zenoh.Session, keys: Keys, drops: Drops, *, failed: Callable[[str, str], None]
+    ) -> None:
+        """`drops` counts what the device is not given; `failed` is told the device's name and the cause when the loop ends by an error."""
         self._name = member.name
         self._device = device
         self._period_s = member.period * plan.step_ns / 1e9
         self._failed = failed
-        self._drops = Drops()
+        self._drops = drops
         self._ending = threading.Event()
         self._publishers = {
             port.name: session.declare_publisher(keys.output("device", member.name, port.name), encoding=zenoh.Encoding.APPLICATION_CDR, express=True)

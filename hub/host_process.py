@@ -27,9 +27,11 @@ from hub.participant import Device, Stepped
 from hub.plan import Member
 from hub.registry import make
 from hub.wire import Drops, Wire, open_session
+from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.keys import Keys
 from schemas.lockstep import Permission, Report, pack_report, unpack_permission
+from schemas.ros import StringMessage
 
 __all__ = ["main", "run_host"]
 
@@ -68,9 +70,11 @@ class _JoinedHost:
         plan, host = reply.plan, request.host
         mine = {name: member for name, member in plan.members.items() if member.host == host}
         made = {name: make(member.kind, name, reply.params[name], directory) for name, member in mine.items()}
-        self._drops = Drops()
+        first = next(iter(mine.values()))
+        refused = session.declare_publisher(keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR)
+        self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
         self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
-        self._wire = Wire(session, keys, reply.run)
+        self._wire = Wire(session, keys, reply.run, self._drops)
         self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
         self._acks = {
             member.name: session.declare_publisher(
@@ -83,7 +87,7 @@ class _JoinedHost:
             for member in self._host.members
         }
         self._loops = [
-            DeviceLoop(plan.members[name], plan, device, session, keys, failed=self._device_failed)
+            DeviceLoop(plan.members[name], plan, device, session, keys, self._drops, failed=self._device_failed)
             for name, device in made.items()
             if isinstance(device, Device)
         ]

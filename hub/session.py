@@ -31,11 +31,12 @@ from hub.plan import Member, Plan
 from hub.recorder import Recorder, RecorderSummary
 from hub.summary import Progress, Summary
 from hub.wire import Drops, Wire, open_session
-from schemas.codec import encode
+from schemas.codec import decode, encode
 from schemas.errors import MessageError, ParticipantError, ScenarioError, SessionError
 from schemas.keys import Keys
 from schemas.lockstep import Permission, Report, pack_permission, unpack_report
 from schemas.ports import BondSide
+from schemas.ros import StringMessage
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Grant, ParticipantStatus, SessionStatus
 
@@ -136,13 +137,13 @@ class Session:
         self._entities: list[zenoh.Subscriber[None] | zenoh.Queryable[None] | ControlServer] = [
             session.declare_queryable(keys.status, Callback(self._answer_status)),
             session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._lost)),
-            ControlServer(session, keys, self.state, self._inlets, self._membership),
+            ControlServer(session, keys, self.state, self._inlets, self._membership, self._drops),
+            session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
             *(session.declare_subscriber(key, watch) for key in self._observers.subscriptions()),
         ]
         if self._grants is None:
-            take = Callback(self._device_sample, indirect=False)
             sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets})
-            self._entities += [session.declare_subscriber(keys.output("device", *source), take) for source in sources]
+            self._entities += [session.declare_subscriber(keys.output("device", *source), self._inlet_callback(*source)) for source in sources]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         self._fleet = Fleet()
         self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail)
@@ -151,13 +152,15 @@ class Session:
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
         tap = self._observers.value if self._observers.watches_values else None
-        self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id), tap=tap)
+        self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id, self._drops), tap=tap)
         self._remote = [name for name in self.plan.order if self.plan.members[name].host != "hub"]
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
         scripted = {n: device for n, device in devices.items() if follows_clock(self.plan.members[n])}
         self._scripted = ScriptedDevices(scripted)
         self._loops = [
-            DeviceLoop(self.plan.members[n], self.plan, device, session, self._keys, failed=self._fail) for n, device in devices.items() if n not in scripted
+            DeviceLoop(self.plan.members[n], self.plan, device, session, self._keys, self._drops, failed=self._fail)
+            for n, device in devices.items()
+            if n not in scripted
         ]
 
     def _start(self) -> None:
@@ -221,10 +224,11 @@ class Session:
         self._clock.start()
         while not self._clock.done and not self.state.ending:
             self._check()
-            if self.state.paused:
+            budget = self.state.budget  # read once: control threads may change it at any time
+            if budget == 0:
                 self._wait_while_paused()
                 continue
-            grant = self._next_grant()
+            grant = self._next_grant(budget)
             if grant is None:
                 break
             self._step(grant)
@@ -247,8 +251,8 @@ class Session:
         self._phase = "running"
         self._clock.start()
 
-    def _next_grant(self) -> Permission | None:
-        """Return the next grant, with all that enters the simulation at this communication point."""
+    def _next_grant(self, budget: int | None) -> Permission | None:
+        """Return the next grant, of at most `budget` steps, with all that enters the simulation at this communication point."""
         if self._grants is not None:
             recorded = next(self._grants, None)
             if recorded is None:
@@ -256,7 +260,7 @@ class Session:
             return Permission(self._run_id, recorded.epoch, recorded.step, recorded.start_ns, recorded.horizon_ns, recorded.inlets)
         step, time_ns = self._clock.step, self._clock.time_ns
         self._scripted.read(time_ns, step, self._inlets)
-        horizon_ns = time_ns + self._clock.horizon(self.state.budget) * self.plan.step_ns
+        horizon_ns = time_ns + self._clock.horizon(budget) * self.plan.step_ns
         return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._inlets.sample(time_ns, monotonic_ns()))
 
     def _step(self, grant: Permission) -> None:
@@ -364,10 +368,20 @@ class Session:
         elif self._phase in ("starting", "running", "paused"):
             self._fail(name, "its host is gone")
 
-    def _device_sample(self, sample: zenoh.Sample) -> None:
-        device, _, port = str(sample.key_expr).split("/", 5)[3:]
+    def _inlet_callback(self, device: str, port: str) -> Callback[zenoh.Sample]:
+        def take(sample: zenoh.Sample) -> None:
+            try:
+                self._inlets.offer(device, port, sample.payload.to_bytes(), monotonic_ns())
+            except MessageError as error:
+                self._drops.count(sample, error)
+
+        return Callback(take, indirect=False)
+
+    def _refused_elsewhere(self, sample: zenoh.Sample) -> None:
+        """Count what another host had to drop; it has logged why."""
         try:
-            self._inlets.offer(device, port, sample.payload.to_bytes(), monotonic_ns())
+            decode(StringMessage, sample.payload.to_bytes())
+            self._drops.add(str(sample.key_expr))
         except MessageError as error:
             self._drops.count(sample, error)
 

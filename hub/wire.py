@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import logging
 import struct
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import zenoh
@@ -79,27 +80,40 @@ class Tag:
 
 
 class Drops:
-    """Counts what was refused, per key, and logs each key's first refusals with their source."""
+    """Counts what was refused, per key, and logs each key's first refusals with their source. For use from any thread."""
 
     _LOGGED_PER_KEY = 3
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[str], object] | None = None) -> None:
+        """`tell` gets the key of each message that is refused."""
         self.by_key: dict[str, int] = {}
+        self._tell = tell
+        self._lock = threading.Lock()
 
     @property
     def total(self) -> int:
         """How many messages were refused."""
         return sum(self.by_key.values())
 
-    def count(self, sample: zenoh.Sample, reason: object) -> None:
-        """Count a refused sample and say where it came from."""
-        key = str(sample.key_expr)
-        n = self.by_key[key] = self.by_key.get(key, 0) + 1
+    def add(self, key: str) -> int:
+        """Count one refusal on `key`; return how many there are by now."""
+        with self._lock:
+            n = self.by_key[key] = self.by_key.get(key, 0) + 1
+        if self._tell is not None:
+            self._tell(key)
+        return n
+
+    def refuse(self, key: str, reason: object, sender: str = "") -> None:
+        """Count a refused message, and say why and where it came from."""
+        n = self.add(key)
         if n <= self._LOGGED_PER_KEY:
-            source = sample.source_info
-            sender = f" from {source.source_id.zid}" if source is not None else ""
             more = "; further ones on this key are only counted" if n == self._LOGGED_PER_KEY else ""
             log.warning("dropped a message on %s%s: %s%s", key, sender, reason, more)
+
+    def count(self, sample: zenoh.Sample, reason: object) -> None:
+        """Refuse a sample."""
+        source = sample.source_info
+        self.refuse(str(sample.key_expr), reason, f" from {source.source_id.zid}" if source is not None else "")
 
 
 class PortCodec:
@@ -216,11 +230,11 @@ class PortPublisher:
 class Wire:
     """A host's publishers and receivers on one Zenoh session."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, run: int) -> None:
+    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops) -> None:
         self.session = session
         self.keys = keys
         self.run = run
-        self.drops = Drops()
+        self.drops = drops
         self._publishers: list[PortPublisher] = []
         self._receivers: list[PortReceiver] = []
         self._cells: list[RemoteCell] = []

@@ -41,6 +41,10 @@ class Keys:
         """Key of an output port; `role` is `engine` for all that is stepped, else `device`."""
         return f"{self.prefix}/{role}/{participant}/out/{port}"
 
+    def refused(self, role: str, participant: str) -> str:
+        """Key on which a host tells of messages that it had to drop, under the name of one of its participants."""
+        return f"{self.prefix}/{role}/{participant}/refused"
+
     def control(self, verb: str) -> str:
         """Key of a control queryable."""
         return f"{self.prefix}/control/{verb}"
