@@ -87,6 +87,7 @@ class Session:
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
         self._drops = Drops()
+        self._reports: list[tuple[Member, Report, bytes | None]] = []
         self._interrupt = Interrupt()
         self._phase = "starting"
         self._detail = ""
@@ -240,6 +241,7 @@ class Session:
                 told = now
                 self._tell_status()
         self._wall_ns = monotonic_ns() - self._started_ns
+        self._settle()
         if progress is not None:
             progress(self._progress())
 
@@ -264,25 +266,26 @@ class Session:
         return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._inlets.sample(time_ns, monotonic_ns()))
 
     def _step(self, grant: Permission) -> None:
-        """Publish a grant, take part in it, and wait until everybody else has."""
-        if self._remote or self._record is not None:
-            payload = pack_permission(grant)
-            self._observers.grant(grant, payload)
-            if self._remote:
-                self._grant_publisher.put(payload)
+        """Publish a grant, take part in it, and wait until everybody else has.
+
+        The reports of the grant before are booked while the others are at work on this one.
+        """
+        if self._remote:
+            self._grant_publisher.put(pack_permission(grant))
+        self._settle()
+        if self._record is not None:
+            self._observers.grant(grant, pack_permission(grant))
         due = [name for name in self.plan.order if _steps_in(grant, self.plan.members[name], self.plan.step_ns)]
         waiting = [name for name in due if self.plan.members[name].host != "hub"]
         self._watchdog.wait_for(due)
-        self._host.run(grant, self._take)
+        self._host.run(grant, lambda member, report: self._reports.append((member, report, None)))
         self._watchdog.wait_for(waiting)
         while waiting:
             accepted = self._accept(self._acks.recv(), waiting, grant)
             if accepted is not None:
                 waiting.remove(accepted[0].name)
-                self._take(*accepted)
+                self._reports.append(accepted)
         self._watchdog.wait_for(())
-        for message in self._observers.books(grant.horizon_ns):
-            self._energy_publishers[message.bond].put(encode(message))
         count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         self._clock.advance(count)
         self.state.spend(count)
@@ -308,7 +311,15 @@ class Session:
             return None
         return member, report, payload
 
-    def _take(self, member: Member, report: Report, payload: bytes | None = None) -> None:
+    def _settle(self) -> None:
+        """Book the reports that have come in, and publish the energy books when they are due."""
+        for member, report, payload in self._reports:
+            self._take(member, report, payload)
+        self._reports.clear()
+        for message in self._observers.books(self._clock.time_ns):
+            self._energy_publishers[message.bond].put(encode(message))
+
+    def _take(self, member: Member, report: Report, payload: bytes | None) -> None:
         """Book what a participant reports: its hashes, its last step, the work of its bonds."""
         self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
         first = report.step + -report.step % member.period
@@ -319,6 +330,7 @@ class Session:
 
     def _close(self) -> None:
         """End processes and close everything; the hosts end when the hub's token is gone."""
+        self._settle()
         if self._phase != "done":
             self._phase = "failed"
             self._detail = "" if self._failures.first is None else str(self._failures.first)
