@@ -1,0 +1,1 @@
+"""Participants that own simulated state: MuJoCo, Bullet, FMUs."""
