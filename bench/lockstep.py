@@ -16,7 +16,7 @@ import struct
 import subprocess
 import sys
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, sleep
 
 import zenoh
 from zenoh.handlers import FifoChannel
@@ -85,32 +85,33 @@ def worker(endpoint: str, index: int, participants: int, window: int, steps: int
     with open_session("peer", listen=["tcp/127.0.0.1:0"], connect=[endpoint]) as session:
         out = session.declare_publisher(f"bare/{index}/out", **QOS)
         grants = session.declare_subscriber("bare/grant", FifoChannel(64))
-        inputs = session.declare_subscriber(f"bare/{(index - 1) % participants}/out", FifoChannel(4096)) if window > 1 else None
-        first = None
-        while first is None:  # the neighbour's and the hub's subscriptions take a while to get around
-            session.put("bare/ready/x", str(index).encode()) if inputs is None or inputs.try_recv() is not None else None
-            if window > 1:
-                out.put(HEAD.pack(2**63, index) + PAYLOAD)
-            session_grant = grants.try_recv()
-            first = session_grant
-            if first is None:
-                import time
-
-                time.sleep(0.01)
-        if inputs is None:
+        neighbour = session.declare_subscriber(f"bare/{(index - 1) % participants}/out", FifoChannel(4096)) if window > 1 else None
+        _wait_for_start(session, out, grants, neighbour, index)
+        if neighbour is None:
             for step in range(steps):
                 out.put(HEAD.pack(step, index) + PAYLOAD)
-                if step + 1 < steps:
-                    grants.recv()
-            grants.recv()
+                grants.recv()
+            return
         begun = perf_counter()
         for step in range(steps):
             out.put(HEAD.pack(step, index) + PAYLOAD)
-            while HEAD.unpack_from(inputs.recv().payload.to_bytes())[0] != step:
-                pass
+            while HEAD.unpack_from(neighbour.recv().payload.to_bytes())[0] != step:
+                pass  # what was sent before the start
         if index == 0:
             session.put("bare/done", struct.pack("<d", steps / (perf_counter() - begun)), congestion_control=zenoh.CongestionControl.BLOCK)
         grants.recv()
+
+
+def _wait_for_start(session: zenoh.Session, out: zenoh.Publisher, grants: zenoh.Subscriber, neighbour: zenoh.Subscriber | None, index: int) -> None:
+    """Report ready once the neighbour can be heard, until the first grant says that all are."""
+    heard = neighbour is None
+    while grants.try_recv() is None:
+        if neighbour is not None:
+            out.put(HEAD.pack(2**63, index) + PAYLOAD)
+            heard = heard or neighbour.try_recv() is not None
+        if heard:
+            session.put("bare/ready/x", str(index).encode())
+        sleep(0.01)
 
 
 def plain_loop(participants: int, steps: int) -> float:
@@ -126,7 +127,7 @@ def plain_loop(participants: int, steps: int) -> float:
     begun = perf_counter()
     for step in range(steps):
         for i, participant in enumerate(made):
-            inputs[i]._values["taken"] = values[i - 1]["given"]  # noqa: SLF001
+            inputs[i]._values["taken"] = values[i - 1]["given"]
             values[i] = participant.step(step * 10**6, 10**6, inputs[i])
     return steps / (perf_counter() - begun)
 

@@ -2,7 +2,7 @@
 
 Both engines run in one host; the RMS error of x1 over the communication points of 2 s is taken against the exact
 solution (matrix exponential of the coupled system). With --stiff the coupling spring is 1e4 N/m, and the largest step
-is sought at which the error stays below 0.1 m.
+is sought at which the motion stays bounded (below 3 m, from a start at 1 m) over 300 steps.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ALGORITHMS = {
 class LoggedMass(Mass):
     """Mass 1, remembering its position at every communication point."""
 
-    def step(self, t, h, inputs):  # noqa: ANN001, ANN201, D102
+    def step(self, t, h, inputs):
         outputs = super().step(t, h, inputs)
         self.log.append(float(self.x[0]))
         return outputs
@@ -60,8 +60,8 @@ def exact(two: MassParams, times: np.ndarray) -> np.ndarray:
     return np.array([(expm(a * t) @ [one.x, 0, 0, 0])[0] for t in times])
 
 
-def rms_error(coupling: dict, step_ms: float, two: MassParams, duration_s: float = 2.0) -> tuple[float, float]:
-    """Return the RMS error of x1 (m) and the residual of the energy book (J)."""
+def positions(coupling: dict, step_ms: float, two: MassParams, duration_s: float = 2.0) -> np.ndarray:
+    """Return x1 (m) at the communication points of a run."""
     names = {"one": LoggedMass("one", ONE), "two": SprungMass("two", two)}
     names["one"].log = []
     scenario = Scenario.model_validate(
@@ -75,19 +75,23 @@ def rms_error(coupling: dict, step_ms: float, two: MassParams, duration_s: float
     )
     plan = make_plan(scenario, names, dict.fromkeys(names, "engine"))
     with np.errstate(all="ignore"):
-        summary = Session(scenario, plan, names, Path.cwd(), endpoint=free_endpoint(range(1))).run()
-    x = np.array(names["one"].log)
-    times = np.arange(1, len(x) + 1) * step_ms * 1e-3
-    return float(np.sqrt(np.mean((x - exact(two, times)) ** 2))), summary.energy_residual_j
+        Session(scenario, plan, names, Path.cwd(), endpoint=free_endpoint(range(1))).run()
+    return np.array(names["one"].log)
+
+
+def rms_error(coupling: dict, step_ms: float, two: MassParams) -> float:
+    """Return the RMS error of x1 (m)."""
+    x = positions(coupling, step_ms, two)
+    return float(np.sqrt(np.mean((x - exact(two, np.arange(1, len(x) + 1) * step_ms * 1e-3)) ** 2)))
 
 
 def survives(coupling: dict, step_ms: float, two: MassParams) -> bool:
-    """Say whether a run stays near the exact solution."""
+    """Say whether a run stays bounded."""
     try:
-        error, _ = rms_error(coupling, step_ms, two, duration_s=0.3)
+        x = positions(coupling, step_ms, two, duration_s=0.3 * step_ms)
     except Exception:  # noqa: BLE001  # an unstable run ends in overflow, in whichever part notices first
         return False
-    return np.isfinite(error) and error < 0.1
+    return bool(np.isfinite(x).all() and np.abs(x).max() < 3.0)
 
 
 def main() -> None:
@@ -102,10 +106,10 @@ def main() -> None:
     rows: dict[str, dict[str, float]] = {}
     for name, coupling in ALGORITHMS.items():
         if args.stiff:
-            steps = [s for s in (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 12, 15, 20) if survives(coupling, s, two)]
+            steps = [s for s in (0.05, 0.1, 0.2, 0.5, 1, 2, 3, 5, 8, 10, 12, 14, 15, 20) if survives(coupling, s, two)]
             rows[name] = {"largest_stable_step_ms": max(steps, default=0.0)}
         else:
-            rows[name] = {f"rms_error_m_at_{h:g}_ms": rms_error(coupling, h, two)[0] for h in args.steps_ms}
+            rows[name] = {f"rms_error_m_at_{h:g}_ms": rms_error(coupling, h, two) for h in args.steps_ms}
     if args.output:
         args.output.write_text(json.dumps(rows, indent=2) + "\n")
     if args.json:
