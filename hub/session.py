@@ -18,7 +18,7 @@ from hub.clock import Clock
 from hub.control import ControlServer, RunState
 from hub.coupling import stable_step_problem
 from hub.devices import DeviceLoop, ScriptedDevices, follows_clock
-from hub.endpoint import free_endpoint
+from hub.endpoint import free_endpoint, require_loopback
 from hub.fleet import Fleet, Watchdog
 from hub.host import Host
 from hub.inlets import Inlets
@@ -71,7 +71,7 @@ class Session:
         """
         self.scenario = scenario
         self.plan = plan
-        self.endpoint = endpoint or free_endpoint()
+        self.endpoint = require_loopback(endpoint) if endpoint else free_endpoint()
         self.state = RunState()
         self._participants = participants
         self._directory = directory

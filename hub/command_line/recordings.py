@@ -38,11 +38,11 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Publish a recording again, so that consoles see it as they would see it live."""
-    from hub.endpoint import free_endpoint
+    from hub.endpoint import free_endpoint, require_loopback
     from hub.replay import replay as publish
     from hub.wire import open_session
 
-    endpoint = listen or free_endpoint()
+    endpoint = require_loopback(listen) if listen else free_endpoint()
     console.print(f"publishing on {endpoint}")
     with open_session("router", listen=[endpoint]) as session:
         show(asdict(publish(Recording(recording), session, rate)), as_json=as_json)

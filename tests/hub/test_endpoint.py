@@ -3,7 +3,8 @@ import socket
 import pytest
 
 from hub import endpoint
-from schemas.errors import ConnectError
+from hub.endpoint import require_loopback
+from schemas.errors import ConnectError, ScenarioError
 
 
 @pytest.fixture
@@ -29,3 +30,14 @@ def test_listeners_are_found(taken, monkeypatch):
         silent.bind(("127.0.0.1", 0))
         monkeypatch.setattr(endpoint, "PORTS", [taken, silent.getsockname()[1]])
         assert endpoint.listening_endpoints() == [f"tcp/127.0.0.1:{taken}"]
+
+
+@pytest.mark.parametrize("where", ["tcp/127.0.0.1:7447", "tcp/localhost:0", "tcp/[::1]:7447"])
+def test_a_hub_may_listen_on_loopback(where: str) -> None:
+    assert require_loopback(where) == where
+
+
+@pytest.mark.parametrize("where", ["tcp/0.0.0.0:7447", "tcp/192.168.1.2:7447", "tcp/[::]:7447", "udp/127.0.0.1:7447", "tcp/hub:7447", "nonsense"])
+def test_a_hub_does_not_listen_elsewhere(where: str) -> None:
+    with pytest.raises(ScenarioError, match="loopback only"):
+        require_loopback(where)
