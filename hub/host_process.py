@@ -68,6 +68,7 @@ class _JoinedHost:
     def __init__(self, session: zenoh.Session, keys: Keys, request: JoinRequest, reply: JoinReply, directory: Path) -> None:
         self._session, self._keys, self._request, self._run, self._directory = session, keys, request, reply.run, directory
         plan, host = reply.plan, request.host
+        self._step_ns = plan.step_ns
         mine = {name: member for name, member in plan.members.items() if member.host == host}
         made = {name: make(member.kind, name, reply.params[name], directory) for name, member in mine.items()}
         first = next(iter(mine.values()))
@@ -86,6 +87,7 @@ class _JoinedHost:
             )
             for member in self._host.members
         }
+        self._next_step = 0
         self._loops = [
             DeviceLoop(plan.members[name], plan, device, session, keys, self._drops, failed=self._device_failed)
             for name, device in made.items()
@@ -104,7 +106,7 @@ class _JoinedHost:
             raise
         ask(self._session, self._keys.control("join"), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
         grant = self._first_grant()
-        while grant.horizon_ns > grant.start_ns:
+        while True:
             try:
                 self._host.run(grant, self._done)
             except ParticipantError as error:
@@ -138,9 +140,12 @@ class _JoinedHost:
             grant = unpack_permission(sample.payload.to_bytes())
             if grant.run != self._run:
                 raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
+            if grant.step != self._next_step or grant.start_ns != grant.step * self._step_ns or grant.horizon_ns <= grant.start_ns:
+                raise MessageError(f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step {self._next_step} is next")
         except MessageError as error:
             self._drops.count(sample, error)
             return None
+        self._next_step = grant.horizon_ns // self._step_ns
         return grant
 
     def _done(self, member: Member, report: Report) -> None:

@@ -32,7 +32,8 @@ class _Watched:
     port: Port
     codec: PortCodec
     channel: int
-    newest: int = INITIAL - 1
+    newest: tuple[int, int] = (INITIAL - 1, 0)
+    """Step and place in its batch of the last value."""
 
 
 class Observers:
@@ -89,14 +90,14 @@ class Observers:
             tag = Tag.of(sample)
             if watched is None or tag.run != self._run:
                 raise MessageError("belongs to no port of this run")
-            if not tag.count or tag.step < watched.newest or (tag.step == watched.newest and tag.index == 0):
+            if not tag.count or (tag.step, tag.index) <= watched.newest:
                 return
             payload = sample.payload.to_bytes()
             value = watched.codec.decode(payload)
         except MessageError as error:
             self.drops.count(sample, error)
             return
-        watched.newest = tag.step
+        watched.newest = (tag.step, tag.index)
         if tag.step > INITIAL and not watched.codec.is_event:
             self.measures.take(watched.member.name, watched.port.name, value)
         if self._recorder is not None:

@@ -12,7 +12,7 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
-from hub.cells import RemoteCell
+from hub.cells import INITIAL, RemoteCell
 from hub.participant import Value
 from hub.plan import Member
 from schemas.codec import decode, encode, message_type
@@ -150,7 +150,8 @@ class PortReceiver:
         self._codec = PortCodec(port)
         self._run = run
         self._drops = drops
-        self._batch: list[Any] = []
+        self._newest = self._batch_step = INITIAL - 1
+        self._batch: tuple[Message, ...] = ()
         self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
 
     def receive(self) -> tuple[int, Any]:
@@ -173,16 +174,28 @@ class PortReceiver:
             tag = Tag.of(sample)
             if tag.run != self._run:
                 raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
-            if not self._codec.is_event:
-                return tag.step, self._codec.decode(sample.payload.to_bytes())
-            if tag.index == 0:
-                self._batch = []
-            if tag.count:
-                self._batch.append(self._codec.decode(sample.payload.to_bytes()))
+            if tag.step <= self._newest:
+                if tag.step == INITIAL:
+                    return None  # it is sent until every host has it
+                raise MessageError(f"the value of step {tag.step} has been here already")
+            payload = sample.payload.to_bytes()
+            value = self._batched(tag, payload) if self._codec.is_event else self._codec.decode(payload)
         except MessageError as error:
             self._drops.count(sample, error)
             return None
-        return (tag.step, tuple(self._batch)) if tag.index + 1 >= tag.count else None
+        if value is None:
+            return None
+        self._newest = tag.step
+        return tag.step, value
+
+    def _batched(self, tag: Tag, payload: bytes) -> tuple[Message, ...] | None:
+        """Put an event to those of the same step; return them once they are all here."""
+        batch = self._batch if tag.step == self._batch_step else ()
+        if tag.index != len(batch):
+            raise MessageError(f"event {tag.index} of step {tag.step} comes where event {len(batch)} is due")
+        events = (self._codec.decode(payload),) if payload or tag.count else ()
+        self._batch_step, self._batch = tag.step, (*batch, *events)
+        return self._batch if tag.index + 1 >= tag.count else None
 
     def close(self) -> None:
         """Stop receiving."""
