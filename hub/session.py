@@ -247,6 +247,7 @@ class Session:
 
     def _wait_while_paused(self) -> None:
         self._phase = "paused"
+        self._settle()
         self._tell_status()
         while not self.state.wait(0.2):
             self._check()
