@@ -131,12 +131,12 @@ class Host:
                 continue
             stride = self.plan.stride(member.name, port.name)
             depth = self._depth(member.name, port.name, here=True)
-            elsewhere = any((k.source, k.source_port) == (member.name, port.name) and self.plan.members[k.target].host != self.name for k in self.plan.links)
-            publisher = self._wire.publisher(member, port, always=elsewhere) if self._wire else None
+            readers = sorted({self.plan.members[k.target].host for k in self.plan.links if (k.source, k.source_port) == (member.name, port.name)} - {self.name})
+            publisher = self._wire.publisher(member, port, readers) if self._wire else None
             cell = Cell(member.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
             sink = _Sink(port, stride, vector, () if vector is None else vector.neutral.shape, cell, publisher)
-            slot.sinks.insert(0 if elsewhere else len(slot.sinks), sink)  # first what another host waits for
+            slot.sinks.insert(0 if readers else len(slot.sinks), sink)  # first what another host waits for
 
     def _lay_readers(self, slot: _Slot) -> None:
         for link in self.plan.links:

@@ -153,7 +153,7 @@ class Session:
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
         tap = self._observers.value if self._observers.watches_values else None
-        self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id, self._drops), tap=tap)
+        self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id, self._drops, "hub"), tap=tap)
         self._remote = [name for name in self.plan.order if self.plan.members[name].host != "hub"]
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
         scripted = {n: device for n, device in devices.items() if follows_clock(self.plan.members[n])}

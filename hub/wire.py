@@ -13,6 +13,7 @@ import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from hub.cells import INITIAL, RemoteCell
+from hub.lane import LaneReceiver, LaneSender, has_lane, lane_address
 from hub.participant import Value
 from hub.plan import Member
 from schemas.codec import decode, encode, message_type
@@ -205,8 +206,11 @@ class PortReceiver:
 class PortPublisher:
     """Publishes the values of one output port; without a reader it costs one flag test."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, key_role: str, participant: str, port: Port, run: int, *, always: bool) -> None:
+    def __init__(
+        self, session: zenoh.Session, keys: Keys, key_role: str, participant: str, port: Port, run: int, *, always: bool, lanes: Sequence[LaneSender] = ()
+    ) -> None:
         self.codec = PortCodec(port)
+        self._lanes = lanes
         self._run = run
         self._publisher = session.declare_publisher(
             keys.output(key_role, participant, port.name),
@@ -225,6 +229,8 @@ class PortPublisher:
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
+        for lane in self._lanes:
+            lane.send(step, value)
         if not self._wanted:
             return
         if not self.codec.is_event:
@@ -237,30 +243,40 @@ class PortPublisher:
 
     def close(self) -> None:
         """Stop publishing."""
+        for lane in self._lanes:
+            lane.close()
         self._publisher.undeclare()
 
 
 class Wire:
-    """A host's publishers and receivers on one Zenoh session."""
+    """A host's publishers and receivers on one Zenoh session, with the fast lanes beside it."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops) -> None:
+    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops, host: str) -> None:
+        """Take the session, and the name of the host whose values go over it."""
+        self.host = host
         self.session = session
         self.keys = keys
         self.run = run
         self.drops = drops
         self._publishers: list[PortPublisher] = []
-        self._receivers: list[PortReceiver] = []
+        self._receivers: list[PortReceiver | LaneReceiver] = []
         self._cells: list[RemoteCell] = []
 
-    def publisher(self, member: Member, port: Port, *, always: bool) -> PortPublisher:
-        """Return a publisher of an output of a participant here; `always` if another host needs every value."""
-        publisher = PortPublisher(self.session, self.keys, member.key_role, member.name, port, self.run, always=always)
+    def publisher(self, member: Member, port: Port, readers: Sequence[str]) -> PortPublisher:
+        """Return a publisher of an output of a participant here; the hosts `readers` need every value."""
+        fast = [host for host in readers if has_lane(port, self.host, host)]
+        lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
+        always = len(fast) < len(readers)
+        publisher = PortPublisher(self.session, self.keys, member.key_role, member.name, port, self.run, always=always, lanes=lanes)
         self._publishers.append(publisher)
         return publisher
 
     def cell(self, member: Member, port: Port, stride: int, depth: int) -> RemoteCell:
         """Return the cell of an output of a participant elsewhere."""
-        receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
+        if has_lane(port, member.host, self.host):
+            receiver = LaneReceiver(lane_address(self.run, member.name, port.name, self.host), port)
+        else:
+            receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
         self._receivers.append(receiver)
         cell = RemoteCell(member.period, stride, depth, receiver)
         self._cells.append(cell)
