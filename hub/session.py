@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import logging
+import math
 import secrets
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,7 +18,7 @@ from zenoh.handlers import Callback, FifoChannel
 from hub.clock import Clock
 from hub.control import ControlServer, RunState
 from hub.coupling import stable_step_problem
-from hub.devices import DeviceLoop, ScriptedDevices, follows_clock
+from hub.devices import DeviceLoop, ScriptedDevices
 from hub.endpoint import free_endpoint, require_loopback
 from hub.fleet import Fleet, Watchdog
 from hub.host import Host
@@ -46,6 +47,7 @@ log = logging.getLogger(__name__)
 
 _PROGRESS_S = 0.1
 _STATUS_S = 0.5
+_NO_STEPS: Mapping[str, int] = {}
 
 
 class Session:
@@ -87,6 +89,9 @@ class Session:
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
         self._drops = Drops()
+        self._away = {name for name in plan.order if plan.members[name].host != "hub"}
+        self._common_period = math.lcm(*(plan.members[name].period for name in plan.order))
+        self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
         self._reports: list[tuple[Member, Report, bytes | None]] = []
         self._interrupt = Interrupt()
         self._phase = "starting"
@@ -143,7 +148,7 @@ class Session:
             *(session.declare_subscriber(key, watch) for key in self._observers.subscriptions()),
         ]
         if self._grants is None:
-            sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets})
+            sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets if not self.plan.members[inlet.device].follows_clock})
             self._entities += [session.declare_subscriber(keys.output("device", *source), self._inlet_callback(*source)) for source in sources]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         self._fleet = Fleet()
@@ -154,9 +159,8 @@ class Session:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
         tap = self._observers.value if self._observers.watches_values else None
         self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id, self._drops, "hub"), tap=tap)
-        self._remote = [name for name in self.plan.order if self.plan.members[name].host != "hub"]
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
-        scripted = {n: device for n, device in devices.items() if follows_clock(self.plan.members[n])}
+        scripted = {n: device for n, device in devices.items() if self.plan.members[n].follows_clock}
         self._scripted = ScriptedDevices(scripted)
         self._loops = [
             DeviceLoop(self.plan.members[n], self.plan, device, session, self._keys, self._drops, failed=self._fail)
@@ -206,7 +210,7 @@ class Session:
                 log.warning("bond %s: %s", bond.name, problem)
 
     def _await_links(self) -> None:
-        waiting = list(self._remote)
+        waiting = [name for name in self.plan.order if name in self._away]
         self._watchdog.wait_for(waiting)
         while waiting or not self._host.linked():
             self._host.publish_initial()
@@ -271,18 +275,18 @@ class Session:
 
         The reports of the grant before are booked while the others are at work on this one.
         """
-        if self._remote:
+        if self._away:
             self._grant_publisher.put(pack_permission(grant))
         self._settle()
         if self._record is not None:
             self._observers.grant(grant, pack_permission(grant))
-        due = [name for name in self.plan.order if _steps_in(grant, self.plan.members[name], self.plan.step_ns)]
-        waiting = [name for name in due if self.plan.members[name].host != "hub"]
+        due, steps = self._schedule(grant)
+        waiting = [name for name in due if name in self._away]
         self._watchdog.wait_for(due)
         self._host.run(grant, lambda member, report: self._reports.append((member, report, None)))
         self._watchdog.wait_for(waiting)
         while waiting:
-            accepted = self._accept(self._acks.recv(), waiting, grant)
+            accepted = self._accept(self._acks.recv(), waiting, grant, steps)
             if accepted is not None:
                 waiting.remove(accepted[0].name)
                 self._reports.append(accepted)
@@ -291,16 +295,31 @@ class Session:
         self._clock.advance(count)
         self.state.spend(count)
 
-    def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None) -> tuple[Member, Report, bytes] | None:
-        """Return a valid report on this grant (None: on being ready); raise a failure; drop and count anything else."""
+    def _schedule(self, grant: Permission) -> tuple[list[str], dict[str, int]]:
+        """Return who steps in a grant, in step order, and how often; grants come in few patterns, so each is worked out once."""
+        begin, end = grant.step, grant.horizon_ns // self.plan.step_ns
+        key = begin % self._common_period, end - begin
+        if key not in self._schedules:
+            periods = {name: self.plan.members[name].period for name in self.plan.order}
+            steps = {name: (end - 1) // period - (begin - 1) // period for name, period in periods.items()}
+            self._schedules[key] = [name for name in self.plan.order if steps[name]], steps
+        return self._schedules[key]
+
+    def _accept(
+        self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None, steps: Mapping[str, int] = _NO_STEPS
+    ) -> tuple[Member, Report, bytes] | None:
+        """Return a valid report on this grant, in which participants take `steps` (None: on being ready).
+
+        Raises what it reports as a failure; drops and counts anything else.
+        """
         try:
             member = self._by_ack.get(str(sample.key_expr))
             if member is None:
                 self._check()
                 raise MessageError("belongs to no participant of this run")
             payload = sample.payload.to_bytes()
-            steps = 0 if grant is None else _steps_in(grant, member, self.plan.step_ns)
-            report = unpack_report(payload, steps, steps * len(member.bonds))
+            count = steps.get(member.name, 0)
+            report = unpack_report(payload, count, count * len(member.bonds))
             if report.run != self._run_id:
                 raise MessageError(f"belongs to run {report.run:x}, this is run {self._run_id:x}")
             if report.error:
@@ -458,8 +477,3 @@ class Session:
             energy_residual_j=self._observers.energy.residual_j,
             measures=self._observers.measures.results(),
         )
-
-
-def _steps_in(grant: Permission, member: Member, step_ns: int) -> int:
-    """Return how many steps a participant takes in a grant."""
-    return (grant.horizon_ns // step_ns - 1) // member.period - (grant.step - 1) // member.period
