@@ -76,6 +76,8 @@ class JoinReply(_Json):
     plan: Plan
     params: dict[str, dict[str, Any]]
     directory: str
+    watched: list[tuple[str, str]]
+    """Outputs, as participant and port, whose every value the hub wants: for a recording or a measure."""
 
 
 class RunState:

@@ -19,15 +19,9 @@ from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
 
-__all__ = ["DeviceLoop", "ScriptedDevices", "follows_clock"]
+__all__ = ["DeviceLoop", "ScriptedDevices"]
 
 log = logging.getLogger(__name__)
-
-
-def follows_clock(member: Member) -> bool:
-    """Say whether a device plays in simulated time: all its outputs are stamped with it."""
-    outputs = [port for port in member.ports if port.causality == "output"]
-    return bool(outputs) and all(port.clock == "simulated" for port in outputs)
 
 
 class ScriptedDevices:

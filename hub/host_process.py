@@ -75,7 +75,7 @@ class _JoinedHost:
         refused = session.declare_publisher(keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
         self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
-        self._wire = Wire(session, keys, reply.run, self._drops, host)
+        self._wire = Wire(session, keys, reply.run, self._drops, host, reply.watched)
         self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
         self._acks = {
             member.name: session.declare_publisher(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from hub.control import Empty, JoinReply, JoinRequest
@@ -41,8 +41,11 @@ class Failures:
 class Membership:
     """The hosts of a session other than the hub's own."""
 
-    def __init__(self, scenario: Scenario, plan: Plan, directory: Path, run: int, failed: Callable[[str, str], None]) -> None:
-        """`failed` is told the participant and the cause that a host reports."""
+    def __init__(
+        self, scenario: Scenario, plan: Plan, directory: Path, run: int, watched: Sequence[tuple[str, str]], failed: Callable[[str, str], None]
+    ) -> None:
+        """`watched`: outputs that the hub listens to; `failed` is told the participant and the cause that a host reports."""
+        self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
         self._directory = directory
@@ -69,7 +72,7 @@ class Membership:
         if request.ready or request.failed:
             return Empty()
         params = {name: self._scenario.participants[name].params for name in names}
-        return JoinReply(run=self._run, plan=self._plan, params=params, directory=str(self._directory))
+        return JoinReply(run=self._run, plan=self._plan, params=params, directory=str(self._directory), watched=self._watched)
 
     def lose(self, host: str) -> None:
         """Forget a host, so that it may join again."""

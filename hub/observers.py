@@ -67,12 +67,16 @@ class Observers:
         """Say whether output values matter here at all."""
         return self._recorder is not None or bool(self.measures.by_port)
 
-    def subscriptions(self) -> list[str]:
-        """Return the keys on which values of other processes are to be watched."""
-        away = [w for w in self._watched.values() if w.member.host != "hub" and w.member.role != "device"]
+    @property
+    def away(self) -> dict[str, tuple[str, str]]:
+        """Participant and port of every output of another process that is to be watched, by key."""
+        away = {key: w for key, w in self._watched.items() if w.member.host != "hub" and w.member.role != "device"}
         measured = set(self.measures.ports)
-        wanted = [w for w in away if self._recorder is not None or (w.member.name, w.port.name) in measured]
-        return [self._keys.output(w.member.key_role, w.member.name, w.port.name) for w in wanted]
+        return {key: (w.member.name, w.port.name) for key, w in away.items() if self._recorder is not None or (w.member.name, w.port.name) in measured}
+
+    def linked(self) -> bool:
+        """Say whether the value at time 0 of every watched output of another process has been heard."""
+        return all(self._watched[key].newest >= (INITIAL, 0) for key in self.away)
 
     def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
         """Take an output value of a participant in this process."""
@@ -90,7 +94,10 @@ class Observers:
             tag = Tag.of(sample)
             if watched is None or tag.run != self._run:
                 raise MessageError("belongs to no port of this run")
-            if not tag.count or (tag.step, tag.index) <= watched.newest:
+            if (tag.step, tag.index) <= watched.newest:
+                return
+            if not tag.count:
+                watched.newest = (tag.step, 0)
                 return
             payload = sample.payload.to_bytes()
             value = watched.codec.decode(payload)

@@ -43,6 +43,12 @@ class Member(_Part):
         return next(port for port in self.ports if port.name == name)
 
     @property
+    def follows_clock(self) -> bool:
+        """Whether this is a device that plays in simulated time: all its outputs are stamped with it."""
+        outputs = [port for port in self.ports if port.causality == "output"]
+        return self.role == "device" and bool(outputs) and all(port.clock == "simulated" for port in outputs)
+
+    @property
     def key_role(self) -> str:
         """The role as it stands in keys: all that is stepped is an engine there."""
         return "device" if self.role == "device" else "engine"
@@ -155,7 +161,7 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
             plans[planned.motion.name] = motion
         if planned.bond.force.participant == name:
             plans[planned.force.name] = force
-    return Member(
+    member = Member(
         name=name,
         kind=spec.kind,
         role=role,  # pyright: ignore[reportArgumentType]
@@ -165,6 +171,9 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
         bonds=tuple(side for _, side in sides),
         bond_plans=plans,
     )
+    if member.follows_clock and member.host != "hub":
+        raise ScenarioError(f"device '{name}' plays in simulated time, which only the hub's process has: leave out its host", path=(*path, "host"))
+    return member
 
 
 def _planned_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], index: int) -> PlannedBond:
@@ -285,8 +294,9 @@ class _Wiring:
                     raise ScenarioError(f"input '{name}.{port.name}' ({port.type}) is not connected and has no start value", path=("participants", name))
 
     def step_order(self) -> tuple[str, ...]:
-        """Return the stepped participants such that every fresh link goes forward; ties in the scenario's order."""
-        waiting = {name: {k.source for k in self.links if k.fresh and k.target == name} for name, m in self._members.items() if m.role != "device"}
+        """Return the stepped participants such that every fresh link goes forward; ties as `order` has them, then in the scenario's order."""
+        stepped = sorted((name for name, m in self._members.items() if m.role != "device"), key=lambda name: self._rank.get(name, len(self._rank)))
+        waiting = {name: {k.source for k in self.links if k.fresh and k.target == name} for name in stepped}
         order: list[str] = []
         while waiting:
             free = next((name for name in waiting if not waiting[name] & waiting.keys()), None)
@@ -307,7 +317,7 @@ def _check_fit(one: Endpoint, source: Port, other: Endpoint, target: Port, path:
     if source.type != target.type:
         raise ScenarioError(f"'{one}' gives {source.type}, '{other}' takes {target.type}", path=path)
     if source.variability != target.variability:
-        raise ScenarioError(f"'{one}' is a {source.variability}, '{other}' takes a {target.variability}", path=path)
+        raise ScenarioError(f"'{one}' is of variability {source.variability}, '{other}' of variability {target.variability}", path=path)
     if not same_unit(source.unit, target.unit):
         raise ScenarioError(f"'{one}' is in '{source.unit}', '{other}' takes '{target.unit}'", path=path)
     if source.frame and target.frame and source.frame != target.frame:

@@ -134,7 +134,7 @@ class Session:
         self._by_ack = {keys.ack(name): self.plan.members[name] for name in self.plan.order}
         self._acks = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
         self._failures = Failures(wake=lambda: self._wake(session))
-        self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, self._fail)
+        self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, list(self._observers.away.values()), self._fail)
         block, real_time, cdr = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME, zenoh.Encoding.APPLICATION_CDR
         self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
         self._status_publisher = session.declare_publisher(keys.status, encoding=cdr)
@@ -145,7 +145,7 @@ class Session:
             session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._lost)),
             ControlServer(session, keys, self.state, self._inlets, self._membership, self._drops),
             session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
-            *(session.declare_subscriber(key, watch) for key in self._observers.subscriptions()),
+            *(session.declare_subscriber(key, watch) for key in self._observers.away),
         ]
         if self._grants is None:
             sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets if not self.plan.members[inlet.device].follows_clock})
@@ -212,7 +212,7 @@ class Session:
     def _await_links(self) -> None:
         waiting = [name for name in self.plan.order if name in self._away]
         self._watchdog.wait_for(waiting)
-        while waiting or not self._host.linked():
+        while waiting or not self._host.linked() or not self._observers.linked():
             self._host.publish_initial()
             self._check()
             sample = self._acks.try_recv()

@@ -251,9 +251,10 @@ class PortPublisher:
 class Wire:
     """A host's publishers and receivers on one Zenoh session, with the fast lanes beside it."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops, host: str) -> None:
-        """Take the session, and the name of the host whose values go over it."""
+    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops, host: str, watched: Sequence[tuple[str, str]] = ()) -> None:
+        """Take the session, the name of the host whose values go over it, and which of its outputs the hub wants in full."""
         self.host = host
+        self._watched = set(watched)
         self.session = session
         self.keys = keys
         self.run = run
@@ -266,7 +267,7 @@ class Wire:
         """Return a publisher of an output of a participant here; the hosts `readers` need every value."""
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
-        always = len(fast) < len(readers)
+        always = len(fast) < len(readers) or (member.name, port.name) in self._watched
         publisher = PortPublisher(self.session, self.keys, member.key_role, member.name, port, self.run, always=always, lanes=lanes)
         self._publishers.append(publisher)
         return publisher
