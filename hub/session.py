@@ -192,6 +192,8 @@ class Session:
         told: list[str] = []
         while missing := self._membership.missing(hosts):
             self._check()
+            if self.state.ending:
+                raise SessionError(f"shut down while waiting for {', '.join(missing)} to join")
             if missing != told:
                 log.info("waiting for %s to join at %s", ", ".join(missing), self.endpoint)
             told = missing

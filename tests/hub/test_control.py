@@ -9,7 +9,7 @@ import pytest
 from hub.control import Empty, JoinReply, JoinRequest, RunState, SetRequest, StepRequest, ask
 from hub.live import live_sessions
 from hub.wire import open_session
-from schemas.errors import ConnectError, MessageError
+from schemas.errors import ConnectError, MessageError, SessionError
 from schemas.keys import Keys
 
 SCENARIO = """\
@@ -144,6 +144,13 @@ def test_status_says_who_lives_where(steer):
 def test_nobody_answers_for_a_session_that_is_not_there(steer):
     with steer() as (console, _), pytest.raises(ConnectError, match="is the hub running"):
         ask(console._client, Keys("other").control("pause"), Empty(), Empty, timeout_s=0.5)
+
+
+def test_shutdown_while_a_host_has_not_joined(prepare):
+    session = prepare(SCENARIO, "participants.there.host=remote")
+    session.state.shutdown()
+    with pytest.raises(SessionError, match="shut down while waiting for remote/there to join"):
+        session.run()
 
 
 def test_the_budget_of_steps():

@@ -153,10 +153,31 @@ class Follower(Chain):
         return {"pressed": self.pressed, "stale_steps": self.stale_steps}
 
 
+class Deaf(Bare):
+    """Listens to a device and does nothing with what it says; counts what comes."""
+
+    ports = (
+        Port(name="hand", causality="input", type=POSE),
+        Port(name="buttons", causality="input", type=JOY, variability="event"),
+        Port(name="fresh_steps", causality="output", type="std_msgs/msg/Float64"),
+        Port(name="pressed", causality="output", type="std_msgs/msg/Float64"),
+    )
+
+    def configure(self, setup):
+        self.fresh_steps, self.pressed = np.zeros(1), np.zeros(1)
+        return {"fresh_steps": self.fresh_steps, "pressed": self.pressed}
+
+    def step(self, t, h, inputs):
+        self.fresh_steps[0] += not inputs.stale("hand")
+        self.pressed[0] += len(inputs.events("buttons"))
+        return {"fresh_steps": self.fresh_steps, "pressed": self.pressed}
+
+
 class PlayerParams(Params):
     clock: Literal["simulated", "wall"] = "simulated"
     silent_after_ms: int = 10**9
     max_age_ms: int = 0
+    fails: Literal["", "open", "read"] = ""
 
 
 class Player(Device):
@@ -173,9 +194,13 @@ class Player(Device):
         )
 
     def open(self, directory):
+        if self.params.fails == "open":
+            raise OSError("the cable is out")
         self.next = {"hand": 0, "buttons": 0}
 
     def read(self, t):
+        if self.params.fails == "read" and t > 50_000_000:
+            raise OSError("the cable is out")
         made = []
         while (ms := self.next["hand"]) <= min(t // 1_000_000, self.params.silent_after_ms):
             pose = Pose(position=Point(x=ms / 7.0))

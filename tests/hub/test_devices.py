@@ -1,0 +1,89 @@
+"""Devices of the wall clock, in the hub's process, in another one, and lost on the way."""
+
+import subprocess
+import sys
+import threading
+from time import sleep
+
+import pytest
+
+from hub.live import live_sessions
+from schemas.errors import ParticipantError
+
+SCENARIO = """\
+name: hand
+step: 1 ms
+pace: realtime
+duration: 300 ms
+participants:
+  player: {kind: "toys:Player", clock: wall, max_age_ms: 60, period: 2 ms}
+  deaf: {kind: "toys:Deaf"}
+connections:
+  - player.hand -> deaf.hand
+  - player.buttons -> deaf.buttons
+measure:
+  fresh_steps: {kind: final, of: deaf.fresh_steps}
+  pressed: {kind: final, of: deaf.pressed}
+"""
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_samples_enter_as_they_come(prepare, host):
+    summary = prepare(SCENARIO, f"participants.player.host={host}").run()
+    assert summary.dropped_messages == 0
+    assert summary.measures["fresh_steps"] > 100
+    assert summary.measures["pressed"] > 50
+
+
+def test_a_device_that_falls_silent_is_marked_stale(prepare):
+    summary = prepare(SCENARIO, "participants.player.silent_after_ms=100").run()
+    assert 0 < summary.measures["fresh_steps"] < 250
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+@pytest.mark.parametrize("when", ["open", "read"])
+def test_a_device_that_fails_ends_the_run(prepare, host, when):
+    with pytest.raises(ParticipantError, match=r"'player' failed.*the cable is out") as raised:
+        prepare(SCENARIO, f"participants.player.host={host}", f"participants.player.fails={when}").run()
+    assert raised.value.participant == "player"
+
+
+def test_a_remote_device_may_go_and_come_back(prepare):
+    session = prepare(SCENARIO, "participants.player.host=remote", "duration=60 s")
+    outcome, hosts = [], []
+
+    def join():
+        command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", session.endpoint, "--session", "hand"]
+        hosts.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+
+    def until(true):
+        for _ in range(300):
+            if any(true(status) for status in live_sessions([session.endpoint])):
+                return
+            sleep(0.02)
+        raise TimeoutError
+
+    def go_and_come_back():
+        try:
+            until(lambda status: status.state == "starting")
+            join()
+            until(lambda status: status.step > 50)
+            hosts[0].kill()
+            until(lambda status: status.participants[0].pid == 0)
+            join()
+            until(lambda status: status.participants[0].pid == hosts[1].pid)
+            sleep(0.2)
+        except TimeoutError as error:
+            outcome.append(error)
+        finally:
+            session.state.shutdown()
+
+    console = threading.Thread(target=go_and_come_back)
+    console.start()
+    summary = session.run()
+    console.join()
+    codes = [host.wait(10) for host in hosts]
+    assert outcome == []
+    assert codes == [-9, 0]
+    assert summary.state == "done"
+    assert 0 < summary.measures["fresh_steps"] < summary.steps - 60

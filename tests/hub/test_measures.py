@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hub.measures import Measures
+from schemas.scenario import Scenario
+from tests.hub.parts import Part, out, plan_of
+from tests.strategies import vectors
+
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+KINDS = ("peak", "peak-norm", "mean", "final")
+
+
+def measures(of, part):
+    measure = {kind.replace("-", "_"): {"kind": kind, "of": of, "live": kind == "final", "unit": "N"} for kind in KINDS}
+    scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
+    return Measures(scenario, plan_of(part, measure=measure))
+
+
+@given(st.lists(vectors(6).map(np.tanh), min_size=1, max_size=8))
+def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
+    found = measures("a.out.force", Part("a", out(type=WRENCH)))
+    for value in values:
+        found.take("a", "out", value)
+    norms = [np.linalg.norm(value[:3]) for value in values]
+    assert found.results() == pytest.approx({"peak": max(norms), "peak_norm": max(norms), "mean": np.mean(norms), "final": norms[-1]})
+    assert found.live() == {"final": (pytest.approx(norms[-1]), "N")}
+
+
+@given(st.lists(vectors(1).map(np.tanh), min_size=1, max_size=8))
+def test_a_single_number_keeps_its_sign_unless_the_norm_is_asked_for(values):
+    found = measures("a.out", Part("a", out()))
+    for value in values:
+        found.take("a", "out", value)
+    numbers = np.concatenate(values)
+    expected = {"peak": numbers.max(), "peak_norm": np.abs(numbers).max(), "mean": numbers.mean(), "final": numbers[-1]}
+    assert found.results() == pytest.approx(expected)
+
+
+def test_a_port_that_never_spoke_has_no_measure():
+    assert set(measures("a.out", Part("a", out())).results().values()) == {None}
