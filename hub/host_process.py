@@ -170,7 +170,7 @@ def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
 
     def gone(sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE and not over.is_set():
-            log.info("the hub is gone")
+            log.debug("the hub is gone")
             interrupt()
             threading.Thread(target=force, daemon=True).start()
 

@@ -14,21 +14,22 @@ __all__ = ["connect", "disconnect", "quiet"]
 
 
 @contextmanager
-def quiet() -> Generator[None]:
-    """Keep what Bullet prints while it connects and loads off stdout, which may carry JSON; stderr stays as it is.
+def quiet(descriptor: int = 1) -> Generator[None]:
+    """Keep what Bullet prints while it connects and loads off a file descriptor: stdout, which may carry JSON, or stderr (2).
 
-    Bullet prints through C's buffer, which therefore is flushed before stdout is put back.
+    Bullet prints through C's buffers, which therefore are flushed before the descriptor is put back.
     """
     sys.stdout.flush()
+    sys.stderr.flush()
     libc = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
-    saved = os.dup(1)
+    saved = os.dup(descriptor)
     try:
         with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  a device, not a file
-            os.dup2(nowhere.fileno(), 1)
+            os.dup2(nowhere.fileno(), descriptor)
         yield
     finally:
         libc.fflush(None)
-        os.dup2(saved, 1)
+        os.dup2(saved, descriptor)
         os.close(saved)
 
 
@@ -37,11 +38,12 @@ def connect(part: str, timestep: float, gravity: float) -> int:
 
     Raises MissingExtraError, naming `part`, where pybullet is not installed.
     """
-    with quiet():
-        try:
+    try:
+        with quiet(2):  # on import it tells its build time
             import pybullet as bullet
-        except ImportError as error:
-            raise MissingExtraError(part, "bullet", "pybullet") from error
+    except ImportError as error:
+        raise MissingExtraError(part, "bullet", "pybullet") from error
+    with quiet():
         client = bullet.connect(bullet.DIRECT)
         if client < 0:
             raise SessionError(f"{part}: Bullet gave no physics client; it allows a limited number in one process, so spread the engines over hosts")
