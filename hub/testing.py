@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import ValidationError
 
 from hub.endpoint import free_endpoint
 from hub.inputs import Inputs
@@ -107,7 +108,10 @@ def _check_declarations(participant: Stepped | Device) -> None:
             codec = PortCodec(port).vector
             fits = codec is not None and len(port.start) == codec.size
             _require(fits, f"the start value of input '{port.name}' has one number for each of the port, but it is {port.start}")
-    again = kind.params_model.model_validate_json(participant.params.model_dump_json())
+    try:
+        again = kind.params_model.model_validate_json(participant.params.model_dump_json())
+    except ValidationError as error:
+        raise AssertionError(f"the contract of hub.participant: parameters survive JSON, but {participant.params!r} do not: {error}") from error
     _require(again == participant.params, f"parameters survive JSON, but {participant.params!r} became {again!r}")
 
 
