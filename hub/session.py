@@ -115,18 +115,26 @@ class Session:
                 self._observers = Observers(self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder)
                 self._open(session)
                 try:
-                    self._start()
-                    self._loop(progress)
+                    self._start_and_step(progress)
                     self._phase = "done"
-                except KeyboardInterrupt:
-                    self._check()
-                    raise SessionError(f"interrupted at step {self._clock.step}") from None
+                except SessionError as error:
+                    self._detail = str(error)
+                    log.error("ending the session: %s", error)  # at once: it may take a while until all have closed
+                    raise
                 finally:
                     self._interrupt.disarm()
                     self._close()
         finally:
             recorded = recorder.close() if recorder is not None else None
         return self._summary(recorded)
+
+    def _start_and_step(self, progress: Callable[[Progress], None] | None) -> None:
+        try:
+            self._start()
+            self._loop(progress)
+        except KeyboardInterrupt:
+            self._check()
+            raise SessionError(f"interrupted at step {self._clock.step}") from None
 
     def _open(self, session: zenoh.Session) -> None:
         """Declare everything on `session`, and lay out what runs in this process."""
@@ -355,7 +363,6 @@ class Session:
         self._settle()
         if self._phase != "done":
             self._phase = "failed"
-            self._detail = "" if self._failures.first is None else str(self._failures.first)
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()

@@ -33,7 +33,7 @@ CAUSES = {
 
 
 @pytest.fixture
-def fail(prepare, tmp_path):
+def fail(prepare, tmp_path, caplog):
     """Run a session that must fail, recorded; return the error after a look at what is left."""
 
     def fail(text, *overrides, error=ParticipantError):
@@ -45,7 +45,11 @@ def fail(prepare, tmp_path):
         assert set(Path("/dev/shm").iterdir()) <= segments
         recording = Recording(tmp_path / "recording")
         assert recording.scenario().name == session.scenario.name
-        assert [status.state for _, status in recording.statuses()][-1] == "failed"
+        last = [status for _, status in recording.statuses()][-1]
+        assert last.state == "failed"
+        if isinstance(raised.value, SessionError):
+            assert last.detail == str(raised.value)
+            assert f"ending the session: {raised.value}" in caplog.text
         raised.value.grants = len(list(recording.grants()))
         return raised.value
 
