@@ -6,6 +6,7 @@ tag, never for "the newest", so that the result does not depend on timing or on 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -73,10 +74,11 @@ class Cell:
 class RemoteCell(Cell):
     """The values of an output port of a participant in another process; `get` waits for them to arrive."""
 
-    def __init__(self, period: int, stride: int, depth: int, receiver: Receiver) -> None:
-        """Take where the values come from."""
+    def __init__(self, period: int, stride: int, depth: int, receiver: Receiver, heard: Callable[[int, Any], None] | None = None) -> None:
+        """Take where the values come from; `heard` is shown each of them with its tag, once, in order."""
         super().__init__(period, stride, depth)
         self._receiver = receiver
+        self._heard = heard
         self._newest = INITIAL - 1
         self.waiting = False
         """Whether somebody waits in `get` now."""
@@ -91,6 +93,13 @@ class RemoteCell(Cell):
         if tag > self._newest:  # the value at time 0 is sent until every host has it; whatever else is old is a repetition
             self._newest = tag
             self.put(tag, value)
+            if self._heard is not None:
+                self._heard(tag, value)
+
+    def drain(self) -> None:
+        """Take what has arrived and nobody has asked for."""
+        while (arrived := self._receiver.poll()) is not None:
+            self._keep(*arrived)
 
     def get(self, tag: int) -> Any:
         """Return the value computed in step `tag`, as soon as it is here."""

@@ -155,8 +155,18 @@ class Host:
             if self._wire is None:
                 raise ValueError(f"'{source}' is in another process, and this host has no wire")
             member = self.plan.members[source]
-            self._remote[source, port] = self._wire.cell(member, member.port(port), self.plan.stride(source, port), self._depth(source, port))
+            declared = member.port(port)
+            self._remote[source, port] = self._wire.cell(
+                member, declared, self.plan.stride(source, port), self._depth(source, port), self._listener(member, declared)
+            )
         return self._remote[source, port]
+
+    def _listener(self, member: Member, port: Port) -> Callable[[int, Any], None] | None:
+        """Return what shows values of another host to the tap of this one."""
+        tap, step_ns = self._tap, self.plan.step_ns
+        if tap is None:
+            return None
+        return lambda tag, value: tap(member, port, tag, (tag + member.period) * step_ns if tag > INITIAL else 0, value)
 
     def _lay_inlets(self) -> None:
         for inlet in self.plan.inlets:
@@ -202,6 +212,11 @@ class Host:
         """Publish the outputs at time 0 once more, for hosts that were not yet listening."""
         for publisher, value in self._initial:
             publisher.put(INITIAL, 0, value)
+
+    def drain(self) -> None:
+        """Show the tap what has arrived from other hosts and nobody has asked for: at the end of a run."""
+        if self._wire is not None:
+            self._wire.drain()
 
     def linked(self) -> bool:
         """Say whether the values at time 0 of all other hosts that this one needs are here."""

@@ -9,6 +9,7 @@ import zenoh
 
 from hub.cells import INITIAL
 from hub.energy import EnergyBooks
+from hub.lane import has_lane
 from hub.measures import Measures
 from hub.plan import Member, Plan
 from hub.recorder import Recorder
@@ -44,6 +45,7 @@ class Observers:
         self.energy = EnergyBooks(plan)
         self.drops = Drops()
         self._run = run
+        self._plan = plan
         self._keys = keys
         self._recorder = recorder
         self._watched: dict[str, _Watched] = {}
@@ -70,16 +72,22 @@ class Observers:
     @property
     def away(self) -> dict[str, tuple[str, str]]:
         """Participant and port of every output of another process that is to be watched, by key."""
-        away = {key: w for key, w in self._watched.items() if w.member.host != "hub" and w.member.role != "device"}
+        away = {key: w for key, w in self._watched.items() if w.member.host != "hub" and w.member.role != "device" and not self._comes_by_lane(w)}
         measured = set(self.measures.ports)
         return {key: (w.member.name, w.port.name) for key, w in away.items() if self._recorder is not None or (w.member.name, w.port.name) in measured}
+
+    def _comes_by_lane(self, watched: _Watched) -> bool:
+        """Say whether the hub's own host reads the value anyway, past Zenoh, and shows it to `value`."""
+        name, port = watched.member.name, watched.port
+        readers = {self._plan.members[link.target].host for link in self._plan.links if (link.source, link.source_port) == (name, port.name)}
+        return "hub" in readers and has_lane(port, watched.member.host, "hub")
 
     def linked(self) -> bool:
         """Say whether the value at time 0 of every watched output of another process has been heard."""
         return all(self._watched[key].newest >= (INITIAL, 0) for key in self.away)
 
     def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
-        """Take an output value of a participant in this process."""
+        """Take an output value of a participant in this process, or one that came here by a lane."""
         if (member.name, port.name) in self.measures.by_port and step > INITIAL:
             self.measures.take(member.name, port.name, value)
         if self._recorder is not None:

@@ -255,6 +255,7 @@ class Session:
                 told = now
                 self._tell_status()
         self._wall_ns = monotonic_ns() - self._started_ns
+        self._host.drain()
         self._settle()
         if progress is not None:
             progress(self._progress())

@@ -272,20 +272,26 @@ class Wire:
         self._publishers.append(publisher)
         return publisher
 
-    def cell(self, member: Member, port: Port, stride: int, depth: int) -> RemoteCell:
-        """Return the cell of an output of a participant elsewhere."""
+    def cell(self, member: Member, port: Port, stride: int, depth: int, heard: Callable[[int, Any], None] | None = None) -> RemoteCell:
+        """Return the cell of an output of a participant elsewhere; `heard` is shown each value that comes by a lane."""
         if has_lane(port, member.host, self.host):
             receiver = LaneReceiver(lane_address(self.run, member.name, port.name, self.host), port)
         else:
             receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
+            heard = None  # whoever watches it subscribes to it
         self._receivers.append(receiver)
-        cell = RemoteCell(member.period, stride, depth, receiver)
+        cell = RemoteCell(member.period, stride, depth, receiver, heard)
         self._cells.append(cell)
         return cell
 
     def linked(self) -> bool:
         """Say whether the initial value of every remote cell has arrived, that is, whether every link works."""
         return all(cell.primed() for cell in self._cells)
+
+    def drain(self) -> None:
+        """Take the values that have arrived and nobody has asked for."""
+        for cell in self._cells:
+            cell.drain()
 
     def close(self) -> None:
         """Stop publishing and receiving; the session stays open."""
