@@ -23,6 +23,7 @@ from hub.control import Empty, JoinReply, JoinRequest, ask
 from hub.devices import DeviceLoop
 from hub.host import Host
 from hub.interrupt import Interrupt
+from hub.lane import may_spin
 from hub.participant import Device, Stepped
 from hub.plan import Member
 from hub.registry import make
@@ -75,7 +76,7 @@ class _JoinedHost:
         refused = session.declare_publisher(keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
         self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
-        self._wire = Wire(session, keys, reply.run, self._drops, host, reply.watched)
+        self._wire = Wire(session, keys, reply.run, self._drops, host, spin=may_spin(len(plan.hosts())), watched=reply.watched)
         self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
         self._acks = {
             member.name: session.declare_publisher(

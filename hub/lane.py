@@ -12,7 +12,7 @@ import os
 import socket
 import struct
 from contextlib import suppress
-from time import sleep
+from time import perf_counter_ns, sleep
 from typing import Any
 
 import numpy as np
@@ -22,12 +22,20 @@ from schemas.errors import MessageError
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec, has_vector
 
-__all__ = ["LaneReceiver", "LaneSender", "has_lane", "lane_address"]
+__all__ = ["LaneReceiver", "LaneSender", "has_lane", "lane_address", "may_spin"]
 
 _HEAD = struct.Struct("<q")
 _CREDENTIALS = struct.Struct("3i")
 _MOST_BYTES = 64 * 2**10
 """A packet must fit into a socket's buffer several times."""
+
+_SPIN_NS = 2_000_000
+"""Longer than a neighbour's step takes where steps are short enough for waking up to matter."""
+
+
+def may_spin(hosts: int) -> bool:
+    """Say whether a host may keep its core busy while it waits: only if each of `hosts` processes has a core of its own."""
+    return hasattr(os, "sched_getaffinity") and hosts <= len(os.sched_getaffinity(0))
 
 
 def has_lane(port: Port, one_host: str, other_host: str) -> bool:
@@ -85,7 +93,9 @@ class LaneSender:
 class LaneReceiver:
     """The reading end; it listens from the start."""
 
-    def __init__(self, address: str, port: Port) -> None:
+    def __init__(self, address: str, port: Port, *, spin: bool) -> None:
+        """`spin`: look again and again for a while before going to sleep."""
+        self._spin_ns = _SPIN_NS if spin else 0
         self._codec = VectorCodec(port)
         self._connection: socket.socket | None = None
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -107,6 +117,10 @@ class LaneReceiver:
         """Wait for the next value and return it with its tag's step."""
         if self._connection is None:
             raise MessageError(f"port '{self._codec.port.name}': nobody has connected to this lane yet")
+        until_ns = perf_counter_ns() + self._spin_ns
+        while perf_counter_ns() < until_ns:
+            with suppress(BlockingIOError):
+                return self._parse(self._connection.recv(self._length + 1, socket.MSG_DONTWAIT))
         return self._parse(self._connection.recv(self._length + 1))
 
     def _accept(self) -> bool:

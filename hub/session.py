@@ -24,6 +24,7 @@ from hub.fleet import Fleet, Watchdog
 from hub.host import Host
 from hub.inlets import Inlets
 from hub.interrupt import Interrupt
+from hub.lane import may_spin
 from hub.measures import Measures
 from hub.membership import Failures, Membership
 from hub.observers import Observers
@@ -166,7 +167,8 @@ class Session:
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
         tap = self._observers.value if self._observers.watches_values else None
-        self._host = Host("hub", self.plan, stepped, wire=Wire(session, self._keys, self._run_id, self._drops, "hub"), tap=tap)
+        wire = Wire(session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts())))
+        self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
         scripted = {n: device for n, device in devices.items() if self.plan.members[n].follows_clock}
         self._scripted = ScriptedDevices(scripted)

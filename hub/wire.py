@@ -251,8 +251,12 @@ class PortPublisher:
 class Wire:
     """A host's publishers and receivers on one Zenoh session, with the fast lanes beside it."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops, host: str, watched: Sequence[tuple[str, str]] = ()) -> None:
-        """Take the session, the name of the host whose values go over it, and which of its outputs the hub wants in full."""
+    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops, host: str, *, spin: bool, watched: Sequence[tuple[str, str]] = ()) -> None:
+        """Take the session and the name of the host whose values go over it.
+
+        `spin`: its lanes may keep a core busy while they wait; `watched`: the outputs that the hub wants in full.
+        """
+        self._spin = spin
         self.host = host
         self._watched = set(watched)
         self.session = session
@@ -275,7 +279,7 @@ class Wire:
     def cell(self, member: Member, port: Port, stride: int, depth: int, heard: Callable[[int, Any], None] | None = None) -> RemoteCell:
         """Return the cell of an output of a participant elsewhere; `heard` is shown each value that comes by a lane."""
         if has_lane(port, member.host, self.host):
-            receiver = LaneReceiver(lane_address(self.run, member.name, port.name, self.host), port)
+            receiver = LaneReceiver(lane_address(self.run, member.name, port.name, self.host), port, spin=self._spin)
         else:
             receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
             heard = None  # whoever watches it subscribes to it
