@@ -48,7 +48,7 @@ PREFIX = "trocar/target"
 HEARD = [
     f"{PREFIX}/hub/grant",
     *(f"{PREFIX}/engine/{name}/ack" for name in ("away", "talker", "far_listener", "follower", "nobody", "hub")),
-    *(f"{PREFIX}/engine/{port}" for port in ("away/out/out", "talker/out/words", "far_listener/out/heard")),
+    *(f"{PREFIX}/engine/{port}" for port in ("talker/out/words", "far_listener/out/heard")),
     *(f"{PREFIX}/device/idle_player/out/{port}" for port in ("hand", "buttons")),
 ]
 """Keys of this session to which somebody listens."""
@@ -60,6 +60,7 @@ UNHEARD = [
     f"{PREFIX}/engine/pace/out",
     f"{PREFIX}/alive/hub/hub",
     f"{PREFIX}/control/shutdown",
+    f"{PREFIX}/engine/away/out/out",  # the hub gets it on a lane
     f"{PREFIX}/engine/pace/out/out",  # another host on this machine gets it on a lane of its own
     "trocar/other/hub/grant",
 ]
