@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Sequence
 from time import monotonic, monotonic_ns
 
+from hub.blas import pin_blas
 from hub.plan import Plan
 
 __all__ = ["Fleet", "Watchdog"]
@@ -33,7 +34,8 @@ class Fleet:
     def start(self, host: str, endpoint: str, session: str) -> None:
         """Start host `host`. It joins over `endpoint`; what it prints goes to stderr."""
         command = [sys.executable, "-P", "-m", "hub.host_process", "--connect", endpoint, "--session", session, "--host", host]
-        environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **os.environ}  # idle BLAS threads spin, and take the cores of other hosts
+        environment = dict(os.environ)
+        pin_blas(environment)
         self._processes[host] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env=environment, start_new_session=True)
 
     def dead(self) -> dict[str, str]:
