@@ -111,18 +111,13 @@ class MotionSide:
         if self._correction is not None:
             self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
-    @property
-    def implicit_damping(self) -> float:
-        """Damping (N s/m) of the correction, for an engine that integrates it implicitly; it is then left out of `force`."""
-        return 0.0 if self._correction is None else self._correction.gain * self._correction.damping
-
-    def force(self, tau: float, position: Vector, velocity: Vector, *, implicit: bool = False) -> Vector:
+    def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
         """Return the force (N, N m; shape (dof,)) on this side in a sub-step around `tau`, given where it is now."""
         if self._correction is None:
             return self._reaction
         c, force = self._correction, self._reaction.copy()
-        v = self._v if implicit else self._v - velocity[: self._linear]
-        force[: self._linear] += c.gain * (c.stiffness * (self._x + tau * self._v - position[: self._linear]) + c.damping * v)
+        behind = self._x + tau * self._v - position[: self._linear]
+        force[: self._linear] += c.gain * (c.stiffness * behind + c.damping * (self._v - velocity[: self._linear]))
         return force
 
     def add(self, force: Vector, displacement: Vector) -> None:
