@@ -92,7 +92,7 @@ class Stranger:
         self._newest[str(sample.key_expr)] = sample
 
     def _run(self):
-        while not self._newest and not self._ending.is_set():
+        while not self._tags() and not self._ending.is_set():
             sleep(0.01)
         while not self._ending.is_set():
             self._send_garbage()
@@ -101,11 +101,14 @@ class Stranger:
                 sleep(0.01)
             self.rounds += 1
 
+    def _tags(self) -> list[zenoh.ZBytes]:
+        return [sample.attachment for sample in list(self._newest.values()) if sample.attachment is not None]
+
     def _send_garbage(self):
-        tags = [sample.attachment for sample in self._newest.values() if sample.attachment is not None]
+        tags = self._tags()
         for key in (*HEARD, *UNHEARD, *ALL_AT_ONCE):
             for payload in GARBAGE:
-                for attachment in (None, b"short", *tags[:1]):
+                for attachment in (None, b"short", tags[0]):
                     self._session.put(key, payload, attachment=attachment)
         for key in HEARD if self.rounds == 0 else ():
             self._session.put(key, OVERSIZED, attachment=tags[0])
