@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import first_sensor, probe_body
-from engines.mujoco.params import ArmParams
+from engines.mujoco.params import PsmParams
 from hub.bond import MotionSide
 from hub.inputs import Inputs
 from robots.dvrk import psm
@@ -25,7 +25,7 @@ _W_FIRST = [6, 3, 4, 5]
 class RunningArm:
     """Views of the model's data that belong to one arm; nothing is allocated in a step."""
 
-    def __init__(self, name: str, params: ArmParams, model: mujoco.MjModel, data: mujoco.MjData, period: float) -> None:
+    def __init__(self, name: str, params: PsmParams, model: mujoco.MjModel, data: mujoco.MjData, period: float) -> None:
         """Bind the arm called `name`, which is stepped every `period` seconds, and put it where it starts."""
         self.name, self._model, self._data = name, model, data
         self._lower, self._upper = params.chain.lower, params.chain.upper

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from engines.mujoco.params import ArmParams, MujocoParams
+from engines.mujoco.params import MujocoParams, PsmParams
 from hub.bond import MotionSide
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
@@ -48,7 +48,7 @@ class MujocoEngine(Stepped):
         """Per arm, with CRTK's names: `servo_jp` in; `measured_js`, `setpoint_js` and `measured_cp` out."""
         return tuple(port for name, arm in self.params.arms.items() for port in self._arm_ports(name, arm))
 
-    def _arm_ports(self, arm: str, params: ArmParams) -> tuple[Port, ...]:
+    def _arm_ports(self, arm: str, params: PsmParams) -> tuple[Port, ...]:
         names, start, slow = psm.JOINT_NAMES, params.start, self.params.publish_period
         return (
             Port(name=f"{arm}/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=start, description="goal of the joint servos"),
