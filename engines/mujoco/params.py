@@ -15,7 +15,7 @@ from typing_extensions import TypedDict  # pydantic's wish before Python 3.12
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
 from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS, Instrument
+from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.parameters import PsmPositions, UnitQuaternion
 from robots.serial_chain import SerialChain
 from schemas.keys import valid_name
@@ -48,7 +48,7 @@ class PsmParams(ArmParams):
     @property
     def tool(self) -> Instrument:
         """The instrument's numbers."""
-        return INSTRUMENTS[self.instrument]
+        return instrument(self.instrument)
 
     @cached_property
     def chain(self) -> SerialChain:

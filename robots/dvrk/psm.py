@@ -12,26 +12,37 @@ from dataclasses import dataclass
 from math import pi, radians
 
 from robots.dvrk.instruments import Instrument
+from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 
-__all__ = ["ARM_JOINTS", "HOME", "INSERTION_MASS", "JOINT_NAMES", "SERVO", "YAW_INERTIA_GROWTH", "Servo", "chain"]
+__all__ = ["ARM_JOINTS", "CANNULA_DEPTH", "HOME", "INSERTION_MASS", "JOINT_NAMES", "SAFE_DISTANCE", "SERVO", "YAW_INERTIA_GROWTH", "Servo", "chain"]
 
 _RCM_TO_CARRIAGE = 0.4318
 """Distance (m) of the instrument carriage from the RCM at insertion 0 (SAW share/kinematic/PSM.json, offset of joint 3)."""
 
+_TURN, _SLIDE = radians(90.0), 0.2
+"""Of the trajectories (SAW core/components/code/mtsIntuitiveResearchKitPSM.cpp, v_max and a_max): rad/s and rad/s^2; m/s and m/s^2."""
+
 ARM_JOINTS = (
-    Joint("yaw", "revolute", pi / 2, 0.0, 0.0, pi / 2, -1.588, 1.588, radians(90.0), 3.316101),
-    Joint("pitch", "revolute", -pi / 2, 0.0, 0.0, -pi / 2, -0.925025, 0.925025, radians(90.0), 3.316101),
-    Joint("insertion", "prismatic", pi / 2, 0.0, -_RCM_TO_CARRIAGE, 0.0, 0.0, 0.240, 0.2, 9.877926),
+    Joint("yaw", "revolute", pi / 2, 0.0, 0.0, pi / 2, -1.588, 1.588, _TURN, 3.316101, _TURN, jerk(_TURN)),
+    Joint("pitch", "revolute", -pi / 2, 0.0, 0.0, -pi / 2, -0.925025, 0.925025, _TURN, 3.316101, _TURN, jerk(_TURN)),
+    Joint("insertion", "prismatic", pi / 2, 0.0, -_RCM_TO_CARRIAGE, 0.0, 0.0, 0.240, _SLIDE, 9.877926, _SLIDE, jerk(_SLIDE)),
 )
-"""The joints of the arm itself: modified DH, range and effort limit from SAW share/kinematic/PSM.json (1.5708 taken as
-pi/2), velocity limit from SAW core/components/code/mtsIntuitiveResearchKitPSM.cpp (trajectory v_max)."""
+"""The joints of the arm itself: modified DH, range and effort limit from SAW share/kinematic/PSM.json (1.5708 taken as pi/2)."""
 
 JOINT_NAMES = ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
 """As SAW names them in share/kinematic/PSM.json and share/tool/*.json."""
 
 HOME = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Where the real controller homes a simulated arm (SAW mtsIntuitiveResearchKitPSM.cpp): straight, insertion 0.12 m."""
+
+
+CANNULA_DEPTH = 0.025
+"""Insertion (m) at which an instrument is engaged in the cannula (SAW mtsIntuitiveResearchKit.h)."""
+
+SAFE_DISTANCE = 0.045 + 0.002
+"""From the RCM to the wrist pitch axis (m), beyond which the real controller lets the wrist and Cartesian motion go (same file: distance
+and buffer)."""
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 
 from robots import rotation
 from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS
+from robots.dvrk.instruments import instrument
 
-CHAIN = psm.chain(INSTRUMENTS["palpation-probe"])
+CHAIN = psm.chain(instrument("palpation-probe"))
 
 # Poses of the tip in the RCM frame, computed in double precision from the numbers of jhu-dvrk/sawIntuitiveResearchKit
 # (share/kinematic/PSM.json, share/tool/LARGE_NEEDLE_DRIVER_400006.json) with 1.5708 taken as pi/2.
