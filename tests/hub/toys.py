@@ -128,6 +128,26 @@ class Listener(Chain):
         return {"heard": self.heard}
 
 
+class Ledger(Chain):
+    """Writes down every message that two signals have made; `entries` counts them."""
+
+    ports = (
+        *(Port(name=name, causality="input", variability="event") for name in "ab"),
+        Port(name="entries", causality="output", type="std_msgs/msg/Float64"),
+    )
+
+    def configure(self, setup):
+        super().configure(setup)
+        self.entries = np.zeros(1)
+        return {"entries": self.entries}
+
+    def step(self, t, h, inputs):
+        messages = [*inputs.events("a"), *inputs.events("b")]
+        self.entries[0] += len(messages)
+        self.fold(t.to_bytes(8, "little"), *(message.data for message in messages))
+        return {"entries": self.entries}
+
+
 class Follower(Chain):
     """Listens to a device: a pose, the staleness of it, and buttons of which none may be lost."""
 
