@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from schemas import ros, trocar_msgs
+from schemas import crtk, ros, trocar_msgs
 from schemas.errors import MessageError, did_you_mean
 from schemas.message import Message, msg_text
 
@@ -28,7 +28,7 @@ M = TypeVar("M", bound=Message)
 @cache
 def message_types() -> dict[str, type[Message]]:
     """Return every message model by its ROS type name."""
-    models = (value for module in (ros, trocar_msgs) for value in vars(module).values())
+    models = (value for module in (ros, crtk, trocar_msgs) for value in vars(module).values())
     return {m.ros_type: m for m in models if isinstance(m, type) and issubclass(m, Message) and m is not Message}
 
 
@@ -42,7 +42,7 @@ def message_type(name: str) -> type[Message]:
 
 @cache
 def typestore() -> Typestore:
-    """Return the type store: ROS 2 Jazzy and our own types."""
+    """Return the type store: ROS 2 Jazzy, CRTK and our own types."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, model in message_types().items():
         if name not in store.types:
@@ -89,5 +89,5 @@ def ros2msg_definition(name: str) -> str:
 
 
 def custom_types() -> Iterator[str]:
-    """Yield the names of our own types."""
-    return (name for name in message_types() if name.startswith("trocar_msgs/"))
+    """Yield the names of the types that ROS 2 does not bring: CRTK's and our own."""
+    return (name for name in message_types() if name.startswith(("crtk_msgs/", "trocar_msgs/")))

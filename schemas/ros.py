@@ -19,6 +19,7 @@ __all__ = [
     "BoolMessage",
     "CameraInfo",
     "CompressedImage",
+    "EmptyMessage",
     "Float64Message",
     "Float64MultiArray",
     "Header",
@@ -81,6 +82,13 @@ class BoolMessage(Message):
 
     ros_type: ClassVar[str] = "std_msgs/msg/Bool"
     data: Bool = False
+
+
+class EmptyMessage(Message):
+    """A signal that something is to be done or has happened."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/Empty"
+    structure_needs_at_least_one_member: UInt8 = 0
 
 
 class Float64Message(Message):

@@ -137,3 +137,12 @@ def test_definitions_are_complete(name: str) -> None:
 def test_every_model_has_its_own_ros_type() -> None:
     assert all(model.ros_type == name for name, model in message_types().items())
     assert message_type("std_msgs/msg/Bool") is BoolMessage
+
+
+def test_crtk_types_are_those_that_crtk_publishes() -> None:
+    """collaborative-robotics/crtk_msgs, msg/OperatingState.msg and msg/StringStamped.msg."""
+    published = {
+        "crtk_msgs/msg/OperatingState": "std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n",
+        "crtk_msgs/msg/StringStamped": "std_msgs/Header header\nstring string\n",
+    }
+    assert {name: msg_text(message_type(name)) for name in published} == published
