@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = ["Joint", "SerialChain"]
@@ -36,6 +37,11 @@ class Joint:
     effort: float = inf
     acceleration: float = inf
     jerk: float = inf
+
+    @property
+    def unit(self) -> str:
+        """Of a position: rad or m."""
+        return "rad" if self.kind == "revolute" else "m"
 
     def transform(self, q: float) -> Vector:
         """Return the pose of this link in the link before it, shape (4, 4), at joint position `q`."""
@@ -125,6 +131,24 @@ class SerialChain:
             poses[..., i, :, :] = poses[..., i - 1, :, :] @ links[..., i, :, :]
         poses[..., n, :, :] = poses[..., n - 1, :, :] @ self.tip
         return poses
+
+    def out_of_range(self, q: Vector, *, slack: float = 0.0) -> list[str]:
+        """Return what is wrong with the positions `q`, shape (n,): a sentence for each joint outside its range by more than `slack`."""
+        return [
+            f"joint {joint.name} at {value:.6g} {joint.unit}, allowed are {joint.lower:g} .. {joint.upper:g}"
+            for joint, value in zip(self.joints, q.tolist(), strict=True)
+            if not joint.lower - slack <= value <= joint.upper + slack
+        ]
+
+    def check(self, q: Vector) -> None:
+        """Raise MotionError if `q` is not n finite numbers, each inside the range of its joint."""
+        names = ", ".join(joint.name for joint in self.joints)
+        if q.shape != (len(self.joints),):
+            raise MotionError(f"positions of shape {q.shape}, expected {len(self.joints)}: {names}")
+        if not np.isfinite(q).all():
+            raise MotionError(f"not all positions are finite: {q.tolist()} of {names}")
+        if wrong := self.out_of_range(q):
+            raise MotionError("; ".join(wrong))
 
     def forward(self, q: Vector) -> Vector:
         """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n)."""

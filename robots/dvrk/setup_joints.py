@@ -13,8 +13,6 @@ from functools import cache
 from math import inf, pi
 from typing import Literal
 
-import numpy as np
-
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
@@ -33,9 +31,10 @@ SIMULATED: Mapping[CartArm, tuple[float, ...]] = {
 }
 """Positions that the dVRK's simulation gives them (SAW, simulated_position): three arms about the endoscope's view."""
 
-_LIFT: Mapping[CartArm, tuple[float, float]] = {"PSM1": (-0.3798, 0.8425), "PSM2": (-0.3798, 0.8425), "PSM3": (0.0, 1.2223), "ECM": (-0.3798, 0.8425)}
-"""Ranges (m) of the lift (dvrk_model). The other joints turn without end there. PSM3's simulated position lies below its range; see
-docs/decisions/0007."""
+_LIFT = (-0.3798, 0.8425)
+"""Range (m) of the lift of PSM1, PSM2 and ECM (dvrk_model). The other joints turn without end there."""
+_LIFT_PSM3 = (-0.2858, 0.9365)
+"""PSM3's, as high above the floor: the range 0 .. 1.2223 of dvrk_model, counted from SAW's zero (see docs/decisions/0007)."""
 
 _COLUMN: Mapping[CartArm, tuple[float, float, float, float]] = {
     "PSM1": (-0.1016, -0.1016, 0.4300, pi),
@@ -57,7 +56,7 @@ _LENGTHS: Mapping[CartArm, tuple[float, float, float]] = {
 def _joints(arm: CartArm) -> tuple[Joint, ...]:
     height, upper_arm, drop = _LENGTHS[arm]
     vertical = (
-        Joint("lift", "prismatic", 0.0, 0.0896, 0.0, 0.0, *_LIFT[arm]),
+        Joint("lift", "prismatic", 0.0, 0.0896, 0.0, 0.0, *(_LIFT_PSM3 if arm == "PSM3" else _LIFT)),
         Joint("shoulder", "revolute", 0.0, 0.0, height, 0.0, -inf, inf),
         Joint("elbow", "revolute", 0.0, upper_arm, 0.1429, 0.0, -inf, inf),
         Joint("wrist", "revolute", 0.0, 0.4318, drop, pi / 2, -inf, inf),
