@@ -91,6 +91,12 @@ class _Element:
     qposadr: NDArray[np.int32]
 
 class MjModel:
+    @staticmethod
+    def from_xml_string(xml: str) -> MjModel: ...
+    nq: int
+    ngeom: int
+    stat: MjStatistic
+    vis: MjVisual
     nv: int
     actuator_ctrladr: NDArray[np.int32]
     def actuator(self, name: str) -> _Element: ...
@@ -102,6 +108,8 @@ class _Warnings:
     number: NDArray[np.int32]
 
 class MjData:
+    xpos: _Array
+    xmat: _Array
     ctrl: _Array
     qpos: _Array
     sensordata: _Array
@@ -109,6 +117,9 @@ class MjData:
     xfrc_applied: _Array
     def __init__(self, model: MjModel) -> None: ...
 
+def mj_camlight(m: MjModel, d: MjData) -> None: ...
+def mj_comPos(m: MjModel, d: MjData) -> None: ...
+def mj_kinematics(m: MjModel, d: MjData) -> None: ...
 def mj_forward(m: MjModel, d: MjData) -> None: ...
 def mj_fullM(m: MjModel, d: MjData, dst: _Array) -> None: ...
 def mj_getState(m: MjModel, d: MjData, state: _Array, sig: int) -> None: ...
@@ -121,3 +132,75 @@ def mj_step2(m: MjModel, d: MjData) -> None: ...
 def mju_rotVecQuat(res: _Array, vec: _Array, quat: _Array) -> None: ...
 def mju_subQuat(res: _Array, qa: _Array, qb: _Array) -> None: ...
 def set_mju_user_warning(handler: Callable[[str], None]) -> None: ...
+
+class mjtStereo(IntEnum):
+    mjSTEREO_SIDEBYSIDE = ...
+
+class mjtRndFlag(IntEnum):
+    mjRND_SHADOW = ...
+    mjRND_REFLECTION = ...
+
+class mjtFramebuffer(IntEnum):
+    mjFB_OFFSCREEN = ...
+
+class mjtFontScale(IntEnum):
+    mjFONTSCALE_50 = ...
+
+class mjtCatBit(IntEnum):
+    mjCAT_STATIC = ...
+    mjCAT_DYNAMIC = ...
+
+class _VisualGlobal:
+    offwidth: int
+    offheight: int
+
+class _VisualQuality:
+    offsamples: int
+    shadowsize: int
+
+class MjVisual:
+    global_: _VisualGlobal
+    quality: _VisualQuality
+
+class MjStatistic:
+    center: _Array
+    extent: float
+
+class MjvOption:
+    sitegroup: NDArray[np.uint8]
+
+class MjvCamera:
+    lookat: _Array
+    distance: float
+    azimuth: float
+    elevation: float
+
+class MjvGLCamera:
+    pos: _Numbers
+    forward: _Numbers
+    up: _Numbers
+    frustum_center: float
+    frustum_bottom: float
+    frustum_top: float
+    frustum_near: float
+    frustum_far: float
+    orthographic: int
+
+class MjvScene:
+    stereo: int
+    flags: NDArray[np.uint8]
+    camera: tuple[MjvGLCamera, MjvGLCamera]
+    def __init__(self, model: MjModel, maxgeom: int) -> None: ...
+
+class MjrContext:
+    def __init__(self, model: MjModel, fontscale: mjtFontScale) -> None: ...
+    def free(self) -> None: ...
+
+class MjrRect:
+    def __init__(self, left: int, bottom: int, width: int, height: int) -> None: ...
+
+def mjr_readPixels(rgb: NDArray[np.uint8] | None, depth: NDArray[np.float32] | None, viewport: MjrRect, con: MjrContext) -> None: ...
+def mjr_render(viewport: MjrRect, scn: MjvScene, con: MjrContext) -> None: ...
+def mjr_setBuffer(framebuffer: int, con: MjrContext) -> None: ...
+def mjv_defaultFreeCamera(m: MjModel, cam: MjvCamera) -> None: ...
+def mjv_updateScene(m: MjModel, d: MjData, opt: MjvOption, pert: None, cam: MjvCamera, catmask: int, scn: MjvScene) -> None: ...
