@@ -163,14 +163,13 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 
 def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
-    """Return revolute positions by whole turns nearest to `near`, inside the range if any turn is."""
+    """Return revolute positions as many whole turns away as is nearest to `near`, or to the middle of the range if that is outside."""
     revolute = [i for i, joint in enumerate(chain.joints) if joint.kind == "revolute"]
     q, lower, upper = branches[..., revolute], chain.lower[revolute], chain.upper[revolute]
-    q += _TURN * np.round((near[:, revolute] - q) / (_TURN))
-    q -= _TURN * np.ceil(np.maximum(q - upper - _SLACK, 0.0) / (_TURN))
-    q += _TURN * np.ceil(np.maximum(lower - q - _SLACK, 0.0) / (_TURN))
+    nearest = q + _TURN * np.round((near[:, revolute] - q) / _TURN)
+    central = q + _TURN * np.round(((lower + upper) / 2 - q) / _TURN)
     unwound = branches.copy()
-    unwound[..., revolute] = q
+    unwound[..., revolute] = np.where((nearest >= lower - _SLACK) & (nearest <= upper + _SLACK), nearest, central)
     return unwound
 
 
