@@ -11,6 +11,7 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.cells import INITIAL
 from hub.inlets import Inlets
 from hub.participant import Device
 from hub.plan import Member, Plan
@@ -85,9 +86,15 @@ class DeviceLoop:
         member = plan.members[source]
         codec = PortCodec(member.port(source_port).model_copy(update={"variability": port.variability}))
 
+        newest = (INITIAL - 1, 0)
+
         def write(sample: zenoh.Sample) -> None:
+            nonlocal newest
             try:
-                Tag.of(sample)
+                tag = Tag.of(sample)
+                if not tag.count or (tag.step, tag.index) <= newest:  # no events, or the value at time 0 again
+                    return
+                newest = tag.step, tag.index
                 self._device.write(port.name, codec.decode(sample.payload.to_bytes()))
             except MessageError as error:
                 self._drops.count(sample, error)

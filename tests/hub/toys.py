@@ -236,6 +236,33 @@ class Player(Device):
         pass
 
 
+class PadParams(Params):
+    file: str
+
+
+class Pad(Device):
+    """Writes down, a line each, what it is told: words, and messages made of a signal."""
+
+    params_model = PadParams
+    ports = (
+        Port(name="words", causality="input", type=TEXT, variability="event"),
+        Port(name="numbers", causality="input", variability="event"),
+    )
+
+    def open(self, directory):
+        Path(self.params.file).touch()
+
+    def read(self, t):
+        return ()
+
+    def write(self, port, value):
+        with Path(self.params.file).open("a") as file:
+            file.write(f"{port} {value.data if port == 'words' else value.data.tolist()}\n")
+
+    def close(self):
+        pass
+
+
 class FaultParams(Params):
     at: int = 5
     how: Literal["configure", "raise", "nan", "shape", "hang", "exit", "kill"] = "raise"
