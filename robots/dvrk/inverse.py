@@ -32,7 +32,7 @@ __all__ = ["ORIENTATION_TOLERANCE", "inverse"]
 
 ORIENTATION_TOLERANCE = radians(20.0)
 """Between the ECM's goal and the nearest orientation at its position, rad. The real controller (jhu-dvrk/sawIntuitiveResearchKit,
-mtsIntuitiveResearchKitECM.cpp) has no bound. Below the 30 degrees by which endoscopes differ, so that a goal meant for another one is
+robManipulatorECM.cpp) has no bound. Below the 30 degrees by which endoscopes differ, so that a goal meant for another one is
 refused; above the 11 degrees that 20 mm sideways at a depth of 100 mm need, a step for which nobody should have to work out the orientation."""
 
 _SLACK = 1e-9
