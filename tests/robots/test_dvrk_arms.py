@@ -82,3 +82,15 @@ def test_the_pose_goes_through_json_unchanged():
     assert json.loads(json.dumps(pose)) == pose
     assert pose["frame"] == "cart"
     assert list(pose["q"]) == ["lift", "shoulder", "elbow", "wrist", "tilt", "mount"]
+
+
+def test_a_snake_wrist_is_straight_at_zero_and_bends_by_the_sum_of_its_joints():
+    straight = np.array(fk("PSM1", "400117", [0, 0, 0.12, 0, 0, 0, 0, 0])["R"])
+    bent = np.array(fk("PSM1", "400117", [0, 0, 0.12, 0, 0.3, 0, 0, 0.2])["R"])
+    assert np.allclose(straight[:, 2], [0, 0, -1], atol=1e-15)
+    assert np.arccos(straight[:, 2] @ bent[:, 2]) == pytest.approx(0.5)
+
+
+def test_the_elbow_of_a_master_hangs_on_its_shoulder():
+    joints = mtm.ACTUATOR_TO_JOINT @ [0.1, 0.2, 0.5, 0.3, 0.4, 0.5, 0.6]
+    assert np.allclose(joints, [0.1, 0.2, 0.5 - 0.2, 0.3 + 0.6697 * (0.2 - 0.5), 0.4, 0.5, 0.6], atol=1e-15)
