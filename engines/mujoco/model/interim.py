@@ -1,10 +1,12 @@
 from dataclasses import dataclass
 from math import pi
+
 import numpy as np
-from robots.dvrk import psm
-from robots.dvrk.instruments import STEEL_DENSITY, SHAFT_RADIUS
+
 from engines.mujoco.model.tree import links
 from engines.mujoco.params import PsmParams
+from robots.dvrk import psm
+from robots.dvrk.instruments import SHAFT_RADIUS, STEEL_DENSITY
 
 
 @dataclass

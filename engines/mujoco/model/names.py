@@ -5,7 +5,7 @@ from __future__ import annotations
 __all__ = ["FINGERS", "finger", "first_sensor", "probe_body"]
 
 FINGERS = ("jaw_left", "jaw_right")
-"""Both turn about the wrist yaw axis by half the jaw's angle: the left one, seen with the tip's z axis ahead, towards the tip's +y, the right one towards -y."""
+"""Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right one towards -y."""
 
 
 def probe_body(arm: str) -> str:
