@@ -9,7 +9,7 @@ from robots.dvrk.instruments import Instrument, instrument
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError, did_you_mean
 
-__all__ = ["ARMS", "base_frame", "chain"]
+__all__ = ["ARMS", "DEFAULT_INSTRUMENT", "base_frame", "chain"]
 
 _CART = ("PSM1", "PSM2", "PSM3", "ECM")
 ARMS = (*_CART, "MTML", "MTMR", *(f"SUJ/{arm}" for arm in _CART))
