@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.mujoco.endoscope_params import EndoscopeParams, ViewParams
-from engines.mujoco.model import build
+from engines.mujoco.model import spec
 from engines.mujoco.params import EcmParams
 from engines.mujoco.stereo import StereoRenderer
 from robots.dvrk.endoscope import FAR, optical_in_roll
@@ -15,15 +15,20 @@ from schemas.vectors import Vector
 
 __all__ = ["EndoscopeScene", "look_at"]
 
+_SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
+"""Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
+
 
 class EndoscopeScene:
     """The model of the scene, its state, and the cameras in it."""
 
     def __init__(self, params: EndoscopeParams, gl: str) -> None:
         """Build the scene, and prepare to draw it with the OpenGL that MUJOCO_GL calls `gl`."""
-        self._model = build(params)
+        scene, ecm = spec(params), params.arms.get("ECM")
+        if params.view is not None or ecm is None:
+            _add_sky(scene)
+        self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
-        ecm = params.arms.get("ECM")
         self._carrier = -1
         far = params.far
         if params.view is not None:
@@ -80,3 +85,7 @@ def _overview(model: mujoco.MjModel) -> ViewParams:
     ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     x, y, z = camera.lookat - camera.distance * ahead
     return ViewParams(position=(x, y, z), target=tuple(camera.lookat))
+
+
+def _add_sky(scene: mujoco.MjSpec) -> None:
+    scene.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, rgb1=_SKY, rgb2=_GROUND, width=64, height=6 * 64)
