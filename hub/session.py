@@ -263,8 +263,8 @@ class Session:
             progress(self._progress())
 
     def _wait_while_paused(self) -> None:
-        self._phase = "paused"
         self._settle()
+        self._phase = "paused"  # after the reports are booked: a status that says so tells the steps taken
         self._tell_status()
         while not self.state.wait(0.2):
             self._check()

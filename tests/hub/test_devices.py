@@ -14,7 +14,7 @@ SCENARIO = """\
 name: hand
 step: 1 ms
 pace: realtime
-duration: 300 ms
+duration: 60 s
 participants:
   player: {kind: "toys:Player", clock: wall, max_age_ms: 60, period: 2 ms}
   deaf: {kind: "toys:Deaf"}
@@ -22,22 +22,33 @@ connections:
   - player.hand -> deaf.hand
   - player.buttons -> deaf.buttons
 measure:
-  fresh_steps: {kind: final, of: deaf.fresh_steps}
-  pressed: {kind: final, of: deaf.pressed}
+  fresh_steps: {kind: final, of: deaf.fresh_steps, live: true}
+  pressed: {kind: final, of: deaf.pressed, live: true}
 """
+
+
+def until(session, enough):
+    """Return what shuts `session` down once enough has happened: of the steps, the fresh ones, the presses."""
+
+    def look(progress):
+        if enough(progress.step, *(progress.live[name][0] for name in ("fresh_steps", "pressed"))):
+            session.state.shutdown()
+
+    return look
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])
 def test_samples_enter_as_they_come(prepare, host):
-    summary = prepare(SCENARIO, f"participants.player.host={host}").run()
+    session = prepare(SCENARIO, f"participants.player.host={host}")
+    summary = session.run(until(session, lambda steps, fresh, pressed: fresh > 100 and pressed > 50))
     assert summary.dropped_messages == 0
-    assert summary.measures["fresh_steps"] > 100
-    assert summary.measures["pressed"] > 50
+    assert summary.sim_time_s < 60
 
 
 def test_a_device_that_falls_silent_is_marked_stale(prepare):
-    summary = prepare(SCENARIO, "participants.player.silent_after_ms=100").run()
-    assert 0 < summary.measures["fresh_steps"] < 250
+    session = prepare(SCENARIO, "participants.player.silent_after_ms=1000")
+    summary = session.run(until(session, lambda steps, fresh, _: 0 < fresh < steps - 200))
+    assert summary.sim_time_s < 60
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])
@@ -49,14 +60,14 @@ def test_a_device_that_fails_ends_the_run(prepare, host, when):
 
 
 def test_a_remote_device_may_go_and_come_back(prepare):
-    session = prepare(SCENARIO, "participants.player.host=remote", "duration=60 s")
-    outcome, hosts = [], []
+    session = prepare(SCENARIO, "participants.player.host=remote")
+    outcome, hosts, fresh_steps = [], [], [0.0]
 
     def join():
         command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", session.endpoint, "--session", "hand"]
         hosts.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
 
-    def until(true):
+    def wait_until(true):
         for _ in range(300):
             if any(true(status) for status in live_sessions([session.endpoint])):
                 return
@@ -65,14 +76,15 @@ def test_a_remote_device_may_go_and_come_back(prepare):
 
     def go_and_come_back():
         try:
-            until(lambda status: status.state == "starting")
+            wait_until(lambda status: status.state == "starting")
             join()
-            until(lambda status: status.step > 50)
+            wait_until(lambda status: status.step > 50)
             hosts[0].kill()
-            until(lambda status: status.participants[0].pid == 0)
+            wait_until(lambda status: status.participants[0].pid == 0)
             join()
-            until(lambda status: status.participants[0].pid == hosts[1].pid)
-            sleep(0.2)
+            wait_until(lambda status: status.participants[0].pid == hosts[1].pid)
+            before = fresh_steps[-1]
+            wait_until(lambda status: fresh_steps[-1] > before + 20)
         except TimeoutError as error:
             outcome.append(error)
         finally:
@@ -80,7 +92,7 @@ def test_a_remote_device_may_go_and_come_back(prepare):
 
     console = threading.Thread(target=go_and_come_back)
     console.start()
-    summary = session.run()
+    summary = session.run(lambda progress: fresh_steps.append(progress.live["fresh_steps"][0]))
     console.join()
     codes = [host.wait(10) for host in hosts]
     assert outcome == []

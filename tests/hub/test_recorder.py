@@ -255,7 +255,7 @@ recorder = Recorder(Path(sys.argv[1]), attachments={"scenario.yaml": b"name: x"}
 channel = recorder.channel("/joy", "sensor_msgs/msg/Joy")
 for t in range(2000):
     recorder.write(channel, t, bytes(100))
-while recorder._file.size < 1000 or recorder._queue:
+while recorder._file.statistics.message_count < 2000:
     pass
 print("recorded", flush=True)
 while True:

@@ -142,13 +142,20 @@ def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, caplog
     undisturbed = prepare(SCENARIO).run()
     assert undisturbed.dropped_messages == 0
     session = prepare(SCENARIO, record=tmp_path / "recording")  # so that the hub listens to all outputs
+    session.state.step(390)  # the last steps wait until the stranger has said all
     strangers = []
 
     def attack():
-        with open_session("client", connect=[session.endpoint]) as client:
-            strangers.append(Stranger(client))
-            with strangers[0].at_work():
-                over.wait()
+        try:
+            with open_session("client", connect=[session.endpoint]) as client:
+                strangers.append(Stranger(client))
+                with strangers[0].at_work():
+                    while strangers[0].rounds < 2 and not over.wait(0.01):
+                        pass
+                    session.state.resume()
+                    over.wait()
+        finally:
+            session.state.resume()
 
     over = threading.Event()
     attacker = threading.Thread(target=attack)
