@@ -7,14 +7,13 @@ import numpy as np
 
 from engines.mujoco.model import interim, transform
 from engines.mujoco.model.names import FINGERS
+from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
 from engines.mujoco.params import EcmParams, PsmParams
+from robots.dvrk.cart import inverse_pose
 from schemas.vectors import Vector
 
-__all__ = ["Bodies", "add"]
-
-Bodies = dict[str, tuple[mujoco.MjsBody, Vector]]
-"""Per link: its body, and its pose in the base frame with every joint at 0, shape (4, 4)."""
+__all__ = ["add"]
 
 _HIDDEN = 4
 """A group that MuJoCo's viewer does not show unless asked."""
@@ -29,10 +28,10 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     """Add the arm called `name`, its base frame at `base_pose`, shape (4, 4), in the world; return its bodies by link."""
     base = spec.worldbody.add_body(name=f"{name}/{BASE}", **transform.placed(base_pose))
     base.add_site(name=f"{name}/base", group=_HIDDEN)
-    bodies: Bodies = {BASE: (base, np.eye(4))}
+    bodies = {BASE: (base, np.eye(4))}
     for link in links(name, params):
         above, above_pose = bodies[link.parent]
-        body = above.add_body(name=f"{name}/{link.name}", gravcomp=1.0, **transform.placed(transform.inverse(above_pose) @ link.pose))
+        body = above.add_body(name=f"{name}/{link.name}", gravcomp=1.0, **transform.placed(inverse_pose(above_pose) @ link.pose))
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)
     _add_servos(spec, name, params)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from robots import rotation
 from schemas.vectors import Vector
 
-__all__ = ["inverse", "placed", "wxyz"]
+__all__ = ["placed", "wxyz"]
 
 
 def wxyz(q: Vector) -> list[float]:
@@ -19,11 +17,3 @@ def wxyz(q: Vector) -> list[float]:
 def placed(pose: Vector) -> dict[str, list[float]]:
     """Return `pos` and `quat` of an element from its pose in its parent, shape (4, 4)."""
     return {"pos": pose[:3, 3].tolist(), "quat": wxyz(rotation.from_matrix(pose))}
-
-
-def inverse(pose: Vector) -> Vector:
-    """Return the inverse of a rigid transform, shape (4, 4)."""
-    result = np.eye(4)
-    result[:3, :3] = pose[:3, :3].T
-    result[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-    return result
