@@ -7,17 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, with_config
+from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, field_validator, model_validator, with_config
 from typing_extensions import TypedDict  # pydantic's wish before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
-from robots.dvrk import psm
+from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import PsmPositions, UnitQuaternion
+from robots.dvrk.parameters import UnitQuaternion
 from robots.serial_chain import SerialChain
+from schemas.errors import MotionError
 from schemas.keys import valid_name
 from schemas.quantity import Angle, Duration, Length
 
@@ -28,6 +29,12 @@ SceneArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
 
 SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
 """Of the setup joints that carry one arm: the lift (m), then five angles."""
+
+
+def _check_range(q: tuple[float, ...], chain: SerialChain) -> None:
+    for joint, value in zip(chain.joints, q, strict=True):
+        if not joint.lower <= value <= joint.upper:
+            raise ValueError(f"{joint.name} {value:g} is out of its range {joint.lower:g} .. {joint.upper:g}")
 
 
 class ArmParams(Params):
@@ -42,10 +49,10 @@ class PsmParams(ArmParams):
 
     instrument: str = Field(default="palpation-probe", description="name or number, such as 400006")
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
-    start: PsmPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
+    start: tuple[Angle, Angle, Length, Angle, Angle, Angle] = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
 
-    @property
+    @cached_property
     def tool(self) -> Instrument:
         """The instrument's numbers."""
         return instrument(self.instrument)
@@ -55,12 +62,41 @@ class PsmParams(ArmParams):
         """The arm's kinematics, from `<arm>_base` to the tip."""
         return psm.chain(self.tool)
 
+    @field_validator("instrument")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        try:
+            snake = instrument(name).has_snake_wrist
+        except MotionError as error:
+            raise ValueError(str(error)) from error
+        if snake:
+            raise ValueError(f"'{name}' has a snake wrist, which the model cannot bend; take an 8 mm instrument such as 400006")
+        return name
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        _check_range(self.start, self.chain)
+        jaw = self.tool.jaw
+        if jaw is not None and not jaw.lower <= self.jaw <= jaw.upper:
+            raise ValueError(f"jaw {self.jaw:g} is out of its range {jaw.lower:g} .. {jaw.upper:g}")
+        return self
+
 
 class EcmParams(ArmParams):
     """The endoscope camera manipulator: which endoscope it holds and where it starts."""
 
     endoscope: Literal["straight", "up", "down"] = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    start: tuple[Angle, Angle, Length, Angle] = Field(default=(0.0, 0.0, 0.0, 0.0), description="joint positions at time 0: yaw, pitch, insertion, roll")
+    start: tuple[Angle, Angle, Length, Angle] = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        _check_range(self.start, self.chain)
+        return self
+
+    @cached_property
+    def chain(self) -> SerialChain:
+        """The arm's kinematics, from `ECM_base` to the camera frame."""
+        return ecm.chain(self.endoscope)
 
 
 @with_config(ConfigDict(extra="forbid"))

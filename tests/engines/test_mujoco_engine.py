@@ -29,7 +29,8 @@ class Run:
         bonds = {} if plan is None else {"PSM1/probe": plan}
         self.outputs = self.engine.configure(Setup(period_ns=period, directory=Path(), bonds=bonds))
         self.command, self.wrench = np.array(START), np.zeros(6)
-        self.inputs = Inputs({"PSM1/servo_jp": self.command, "PSM1/probe/wrench": self.wrench})
+        starts = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
+        self.inputs = Inputs({**starts, "PSM1/servo_jp": self.command, "PSM1/probe/wrench": self.wrench})
         self.period, self.t = period, 0
 
     def steps(self, count):
@@ -192,7 +193,7 @@ def test_the_step_is_that_of_mj_step():
     run = Run(plan=None, timestep="1 ms")
     model = run.engine._model
     data = mujoco.MjData(model)
-    data.qpos[:], data.ctrl[::2] = START, START
+    data.qpos[:], data.ctrl[::3] = run.engine._data.qpos, START
     mujoco.mj_forward(model, data)
     run.command += 0.01
     run.steps(1)
