@@ -7,7 +7,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 from pydantic import ValidationError
@@ -152,7 +152,7 @@ def _scene(arms: list[SceneArm], instruments: list[str], mounting: str) -> Scene
 def _cart_arm(arm: str) -> SceneArm:
     if arm not in _CART:
         raise typer.BadParameter(f"no arm '{arm}' in the model.{did_you_mean(arm, _CART)}", param_hint="ARM")
-    return cast("SceneArm", arm)
+    return arm
 
 
 @contextmanager

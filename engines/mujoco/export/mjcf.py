@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.export.assets import FOLDER, file_of, numbers
+from schemas.vectors import Vector
 
 __all__ = ["mjcf"]
 
@@ -42,10 +43,10 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
 def _restore(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
     """Give the numbers of `element` all the digits that they have in `source`, where some are called otherwise."""
     for attribute, text in element.attrib.items():
-        value = getattr(source, names.get(attribute, attribute), None)
+        value: Any = getattr(source, names.get(attribute, attribute), None)
         if not isinstance(value, float | np.ndarray):
             continue
         written = np.array(text.split(), float)
-        exact = np.ravel(value)[: len(written)]
+        exact: Vector = np.asarray(value, float).ravel()[: len(written)]
         if np.abs(exact - written).max() <= _DIGITS * np.abs(written).max():
             element.set(attribute, numbers(exact))

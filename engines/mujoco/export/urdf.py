@@ -32,7 +32,7 @@ def urdf(spec: mujoco.MjSpec) -> Element:
     for body in spec.bodies[1:]:
         if any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints):
             continue
-        _add_link(robot, model, body)
+        _add_link(robot, spec, model, body)
         _add_joint(robot, spec, model, body)
         for site in body.sites:
             _add_frame(robot, model, body, site)
@@ -41,7 +41,7 @@ def urdf(spec: mujoco.MjSpec) -> Element:
     return robot
 
 
-def _add_link(robot: Element, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:
+def _add_link(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:
     link = SubElement(robot, "link", name=_link(body.name))
     compiled = model.body(body.name)
     if mass := float(compiled.mass[0]):
@@ -54,8 +54,10 @@ def _add_link(robot: Element, model: mujoco.MjModel, body: mujoco.MjsBody) -> No
         shape = SubElement(link, "collision" if geom.contype or geom.conaffinity else "visual")
         _add_shape(shape, geom)
         if shape.tag == "visual":
-            material = SubElement(shape, "material", name="_".join(f"{round(255 * channel)}" for channel in geom.rgba))
-            SubElement(material, "color", rgba=numbers(geom.rgba))
+            surface = spec.material(geom.material)
+            rgba = geom.rgba if surface is None else surface.rgba
+            material = SubElement(shape, "material", name="_".join(f"{round(255 * channel)}" for channel in rgba))
+            SubElement(material, "color", rgba=numbers(rgba))
 
 
 def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:

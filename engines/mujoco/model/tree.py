@@ -57,8 +57,8 @@ def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
         leader = tree[passive.follows]
         pose = leader.pose.copy()
         pose[:3, 3] = passive.pivot
-        ends = sorted((passive.ratio * leader.lower, passive.ratio * leader.upper))
-        tree[passive.name] = Link(passive.name, passive.parent, leader.kind, pose, *ends, Follow(passive.follows, passive.ratio))
+        lower, upper = sorted((passive.ratio * leader.lower, passive.ratio * leader.upper))
+        tree[passive.name] = Link(passive.name, passive.parent, leader.kind, pose, lower, upper, Follow(passive.follows, passive.ratio))
     if isinstance(params, PsmParams) and (jaw := params.tool.jaw) is not None:
         wrist = tree[chain.joints[-1].name]
         for name, turn in zip(FINGERS, (np.eye(4), _HALF_TURN), strict=True):
