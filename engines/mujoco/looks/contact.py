@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from manifold3d import Manifold
 
 from engines.mujoco.looks import ecm as ecm_look
 from engines.mujoco.looks import fingers, instruments
 from engines.mujoco.looks import psm as psm_look
 from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
-from engines.mujoco.looks.solids import part
+from engines.mujoco.looks.solids import hull, part
 from robots.dvrk import psm as psm_arm
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
 
@@ -52,7 +51,7 @@ def instrument(tool: Instrument) -> Collisions:
 
 def _hull(name: str, shown: tuple[Part, ...]) -> Part:
     points = np.concatenate([p.vertices for p in shown if p.name not in _THIN])
-    return part(f"{name}_hull", Manifold.hull_points(points).simplify(2e-3), shown[0].material)
+    return part(f"{name}_hull", hull(points).simplify(2e-3), shown[0].material)
 
 
 def _upright(name: str, radius: float, low: float, high: float) -> Primitive:

@@ -8,7 +8,7 @@ them are ours, after photographs.
 from __future__ import annotations
 
 from engines.mujoco.looks.part import BLACK, BLUE, DARK, GREY, IVORY, SLATE, STEEL, Looks, Part
-from engines.mujoco.looks.solids import block, outline, part, plate, ring, rod, taper, turned, union
+from engines.mujoco.looks.solids import block, cannula, cheeks, circle, outline, part, plate, rod, taper, turned, union
 from robots.dvrk.linkage import ECM
 
 __all__ = ["parts"]
@@ -38,46 +38,33 @@ def parts() -> Looks:
 def _base() -> tuple[Part, ...]:
     """Drum of the yaw motor on the mount, 0.6126 m behind the remote centre and 0.1016 m below it."""
     drum = turned([(0.0, 0.0), (0.046, 0.0), (0.0586, 0.014), (0.0586, 0.142), (0.0, 0.142)], (0.0, -0.695, 0.0), (0.0, 1.0, 0.0))
-    stand = plate(
-        "y", outline([(-0.094, -0.0786), (-0.03, -0.0786), (0.03, -0.055), (0.03, 0.055), (-0.03, 0.0786), (-0.094, 0.0786)], 0.01), -0.685, -0.553, 0.006
-    )
+    section = outline([(-0.094, -0.0786), (-0.03, -0.0786), (0.03, -0.055), (0.03, 0.055), (-0.03, 0.0786), (-0.094, 0.0786)])
     foot = rod((0.0, -0.6126, -0.1016), (0.0, -0.6126, -0.090), 0.055)
     bearing = rod((0.0, -0.5535, 0.0), (0.0, -0.5394, 0.0), 0.052)
-    return part("base", union(drum, stand), IVORY), part("base_bearing", union(foot, bearing), DARK)
+    return part("base", union(drum, plate("y", section, -0.685, -0.553, 0.006)), IVORY), part("base_bearing", union(foot, bearing), DARK)
 
 
 def _yaw() -> tuple[Part, ...]:
     """Fork that swings about the yaw axis; the motors' link stands between its cheeks."""
-    back = plate(
-        "y", outline([(-0.095, -0.070), (0.045, -0.070), (0.062, -0.045), (0.062, 0.045), (0.045, 0.070), (-0.095, 0.070)], 0.02), -0.5384, -0.455, 0.010
-    )
-    cheek = outline([(-0.47, -0.101), (-0.30, -0.085), (-0.2715, -0.04), (-0.2715, 0.025), (-0.315, 0.069), (-0.40, 0.069), (-0.47, 0.040)], 0.015)
-    cheeks = [plate("x", cheek, *sorted((side * 0.060, side * 0.088)), 0.006) for side in (-1.0, 1.0)]
+    section = outline([(-0.095, -0.070), (0.045, -0.070), (0.062, -0.045), (0.062, 0.045), (0.045, 0.070), (-0.095, 0.070)])
+    cheek = outline([(-0.47, -0.101), (-0.30, -0.085), (-0.2715, -0.04), (-0.2715, 0.025), (-0.315, 0.069), (-0.40, 0.069), (-0.47, 0.040)])
     floor = block((-0.075, -0.50, -0.100), (0.075, -0.31, -0.086))
-    pivots = [rod((side * 0.080, *_FRONT), (side * 0.0905, *_FRONT), 0.026) for side in (-1.0, 1.0)]
-    return part("yaw", union(back, *cheeks, floor), IVORY), part("yaw_pivots", union(*pivots), DARK)
+    pivots = cheeks(circle(_FRONT, 0.026), 0.080, 0.0905)
+    fork = union(plate("y", section, -0.5384, -0.455, 0.010), cheeks(cheek, 0.060, 0.088, 0.006), floor)
+    return part("yaw", fork, IVORY), part("yaw_pivots", pivots, DARK)
 
 
 def _pitch_front() -> tuple[Part, ...]:
     """Link with the motors at its foot; its two cheeks carry the bars."""
-    low, top = _PIVOT["pitch_bottom"], _PIVOT["pitch_top"]
-    y = _FRONT[0]
-    motors = plate(
-        "x", outline([(y - 0.05, -0.030), (y + 0.06, -0.030), (y + 0.090, 0.0), (y + 0.090, 0.085), (y + 0.050, 0.125), (y - 0.03, 0.125), (y - 0.07, 0.06)], 0.012),
-        -0.0505, 0.0505, 0.007,
-    )  # fmt: skip
-    cover = plate(
-        "x",
-        outline([(low[0] - 0.0596, 0.20), (low[0] - 0.01, 0.185), (low[0] + 0.012, 0.25), (low[0] - 0.02, 0.26), (low[0] - 0.0596, 0.25)], 0.01),
-        -0.030,
-        0.030,
-    )
-    strap = taper(((y - 0.02, 0.08), 0.040), (low, 0.018), (top, 0.0107))
-    cheeks = [plate("x", strap, *sorted((side * 0.0300, side * 0.0505))) for side in (-1.0, 1.0)]
+    low, top, y = _PIVOT["pitch_bottom"], _PIVOT["pitch_top"], _FRONT[0]
+    foot = [(y - 0.05, -0.030), (y + 0.06, -0.030), (y + 0.090, 0.0), (y + 0.090, 0.085), (y + 0.050, 0.125), (y - 0.03, 0.125), (y - 0.07, 0.06)]
+    back = [(low[0] - 0.0596, 0.20), (low[0] - 0.01, 0.185), (low[0] + 0.012, 0.25), (low[0] - 0.02, 0.26), (low[0] - 0.0596, 0.25)]
+    motors, cover = plate("x", outline(foot), -0.0505, 0.0505, 0.007), plate("x", outline(back), -0.030, 0.030)
+    straps = cheeks(taper(((y - 0.02, 0.08), 0.040), (low, 0.018), (top, 0.0107)), 0.0300, 0.0505)
     cooler = [block((-0.044, y + 0.005 + step, 0.115), (0.044, y + 0.010 + step, 0.140)) for step in (-0.03, -0.015, 0.0, 0.015, 0.03)]
     axle = rod((-0.079, *_FRONT), (0.079, *_FRONT), 0.022)
     pins = [rod((-0.0515, *pivot), (0.0515, *pivot), radius) for pivot, radius in ((low, 0.010), (top, 0.0065))]
-    return part("pitch_front", union(motors, cover, *cheeks), IVORY), part("pitch_front_motors", union(*cooler, axle, *pins), DARK)
+    return part("pitch_front", union(motors, cover, straps), IVORY), part("pitch_front_motors", union(*cooler, axle, *pins), DARK)
 
 
 def _pitch_back() -> tuple[Part, ...]:
@@ -91,15 +78,10 @@ def _pitch_back() -> tuple[Part, ...]:
 def _pitch_bottom() -> tuple[Part, ...]:
     """Lower bar."""
     (back, low), front = _PIVOT["pitch_bottom"], _LOWER[0]
-    shape = [(back - 0.055, low - 0.018), (front - 0.05, low - 0.0188), (front + 0.0125, low - 0.012), (front + 0.0125, low + 0.012)]
-    beam = plate("x", outline([*shape, (front - 0.05, low + 0.017), (back - 0.03, low + 0.017), (back - 0.055, low + 0.005)], 0.006), -0.0248, 0.0248, 0.004)
-    boss = plate(
-        "x",
-        outline([(back - 0.045, low), (back + 0.02, low), (back + 0.02, low + 0.024), (back - 0.02, low + 0.055), (back - 0.045, low + 0.055)], 0.006),
-        0.012,
-        0.0248,
-    )
-    return (part("pitch_bottom", union(beam, boss), DARK),)
+    below = [(back - 0.055, low - 0.018), (front - 0.05, low - 0.0188), (front + 0.0125, low - 0.012), (front + 0.0125, low + 0.012)]
+    beam = outline([*below, (front - 0.05, low + 0.017), (back - 0.03, low + 0.017), (back - 0.055, low + 0.005)])
+    boss = outline([(back - 0.045, low), (back + 0.02, low), (back + 0.02, low + 0.024), (back - 0.02, low + 0.055), (back - 0.045, low + 0.055)])
+    return (part("pitch_bottom", union(plate("x", beam, -0.0248, 0.0248, 0.004), plate("x", boss, 0.012, 0.0248)), DARK),)
 
 
 def _pitch_top() -> tuple[Part, ...]:
@@ -112,26 +94,23 @@ def _pitch_top() -> tuple[Part, ...]:
 def _column() -> tuple[Part, ...]:
     """Column behind the endoscope, with the rail of the carriage and the cannula."""
     shape = [(-0.116, 0.10), (-0.095, 0.0), (-0.066, 0.0), (-0.062, 0.04), (-0.062, 0.555), (-0.075, 0.570), (-0.100, 0.570), (-0.116, 0.54)]
-    cover = plate("x", outline(shape, 0.004), -0.0255, 0.0255, 0.006)
+    cover = plate("x", outline(shape), -0.0255, 0.0255, 0.006)
     rails = [block((x - 0.004, -0.0640, 0.10), (x + 0.004, -0.0590, 0.545)) for x in (-0.014, 0.014)]
-    bosses = [rod((-0.0262, *pin), (0.0262, *pin), 0.0115) for pin in (_LOWER, _UPPER)]
-    holder = plate("x", outline([(-0.085, 0.004), (-0.066, 0.004), (0.004, 0.046), (0.004, 0.062), (-0.064, 0.062), (-0.085, 0.05)], 0.003), -0.011, 0.011)
+    bosses = [cheeks(circle(pin, 0.0115), 0.0250, 0.0262) for pin in (_LOWER, _UPPER)]
+    holder = plate("x", outline([(-0.085, 0.004), (-0.066, 0.004), (0.004, 0.046), (0.004, 0.062), (-0.064, 0.062), (-0.085, 0.05)]), -0.011, 0.011)
     clamp = rod((0.0, 0.0, 0.044), (0.0, 0.0, 0.064), 0.0127)
-    bore = rod((0.0, 0.0, -0.1), (0.0, 0.0, 0.1), 0.0065)
-    profile = [(0.0065, -0.006), (0.0075, -0.006), (0.0075, 0.0400), (0.0120, 0.0480), (0.0120, 0.080), (0.0095, 0.080), (0.0065, 0.0480)]
-    mark = ring((0.0, 0.0, -0.004), (0.0, 0.0, 1.0), 0.0079, 0.0070, 0.008)
     stripe = block((-0.0258, -0.108, 0.50), (0.0258, -0.092, 0.508))
     return (
         part("column", cover, IVORY),
-        part("column_rail", union(*rails, *bosses, (holder + clamp) - bore), DARK),
+        part("column_rail", union(*rails, *bosses, holder, clamp), DARK),
         part("column_stripe", stripe, BLUE),
-        part("cannula", union(turned(profile), mark), STEEL),
+        part("cannula", cannula(0.0075, 0.0120, -0.006, 0.080), STEEL),
     )
 
 
 def _carriage() -> tuple[Part, ...]:
     """Carriage at the upper end of its way."""
-    body = plate("z", outline([(-0.028, -0.061), (0.026, -0.061), (0.026, -0.034), (-0.028, -0.034)], 0.003), 0.3729, 0.4909)
+    body = plate("z", outline([(-0.028, -0.061), (0.026, -0.061), (0.026, -0.034), (-0.028, -0.034)]), 0.3729, 0.4909)
     return (part("carriage", union(body, rod((0.0, -0.036, 0.43), (0.0, -0.028, 0.43), 0.020)), GREY),)
 
 

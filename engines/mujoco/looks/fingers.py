@@ -68,24 +68,12 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
     profile = [(_ROOT, 0.0), (length, 0.0), (length, 0.6 * form.tip_thickness), (length - 0.0006, form.tip_thickness), (0.45 * length, back), (_ROOT, back)]
     blade = plate("y", outline(profile), -0.01, 0.01) ^ plate("x", outline(_top_view(form), 0.0004), -0.01, 0.01)
     low, high = sorted((-side * _HUB_WIDTH, 0.0))
-    hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS, segments=14)
+    hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
     arm = block((0.0, low, 0.0), (back, high, _ROOT + 0.0012))
     pad = plate("x", outline([(y * 0.8, z) for y, z in _top_view(form, start=0.42, end=0.97)]), 0.0, 0.0002)
     if form.window:
-        hole = plate(
-            "x",
-            outline(
-                [
-                    (-0.45 * form.width, 0.50 * length),
-                    (0.45 * form.width, 0.50 * length),
-                    (0.45 * form.width, 0.86 * length),
-                    (-0.45 * form.width, 0.86 * length),
-                ],
-                0.0004,
-            ),
-            -0.01,
-            0.01,
-        )
+        half, low_end, high_end = 0.45 * form.width, 0.50 * length, 0.86 * length
+        hole = plate("x", outline([(-half, low_end), (half, low_end), (half, high_end), (-half, high_end)], 0.0004), -0.01, 0.01)
         blade, pad = blade - hole, pad - hole
     finished = [(name, union(hub, arm, blade - pad), STEEL), (f"{name}_pad", pad, DARK)]
     solids = [(label, solid if side > 0 else solid.mirror((1.0, 0.0, 0.0)), material) for label, solid, material in finished]

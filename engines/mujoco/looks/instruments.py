@@ -52,19 +52,18 @@ def finger_frame(tool: Instrument) -> Vector:
 
 def _housing() -> tuple[Part, ...]:
     """Housing before the sterile adapter, with the two levers that release it."""
-    shell = plate(
-        "y", outline([(0.430, -0.034), (0.5010, -0.030), (0.5010, 0.030), (0.430, 0.034), (0.418, 0.027), (0.418, -0.027)], 0.005), -0.0150, 0.0158, 0.005
-    )
+    face = outline([(0.430, -0.034), (0.5010, -0.030), (0.5010, 0.030), (0.430, 0.034), (0.418, 0.027), (0.418, -0.027)])
+    shell = plate("y", face, -0.0150, 0.0158, 0.005)
     neck = rod((0.0, 0.0, _HOUSING_END), (0.0, 0.0, 0.425), 0.0085, 0.0145)
-    levers = [block((x - 0.0025, -0.0080, 0.448), (x + 0.0025, 0.0060, 0.482), 0.001) for x in (-0.0335, 0.0335)]
+    levers = [block((x - 0.0025, -0.0080, 0.448), (x + 0.0025, 0.0060, 0.482)) for x in (-0.0335, 0.0335)]
     return part("housing", union(shell, neck), SLATE), part("levers", union(*levers), BLUE)
 
 
 def _shaft(pitch: Vector) -> tuple[Part, ...]:
     """Shaft down to the clevis about the wrist pitch axis, which is z of `pitch`, shape (4, 4)."""
     height = pitch[2, 3]
-    tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS)
-    core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5)
+    tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=14)
+    core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=14)
     slot = placed(block((-0.01, -0.01, -0.01), (0.01, 0.01, 0.0028)) ^ block((-0.0021, -1.0, -1.0), (0.0021, 1.0, 1.0)), _drawing(pitch), pitch[:3, 3])
     flats = [block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0), 0.0) for side in (-1.0, 1.0)]
     ears = core - slot - placed(union(*flats), _drawing(pitch), pitch[:3, 3])

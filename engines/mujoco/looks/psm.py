@@ -8,12 +8,12 @@ the CAD meshes in WPI-AIM/dvrk_env and med-air/SurRoL (the same CAD) and of the 
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, degrees, hypot, sin
 
 from manifold3d import Manifold
 
 from engines.mujoco.looks.part import BLUE, DARK, GREY, IVORY, STEEL, Looks, Part
-from engines.mujoco.looks.solids import block, outline, part, plate, ring, rod, taper, turned, union
+from engines.mujoco.looks.solids import block, cannula, cheeks, circle, outline, part, plate, rod, taper, turned, union
 from robots.dvrk.linkage import PSM
 
 __all__ = ["parts"]
@@ -64,38 +64,28 @@ def _yaw() -> tuple[Part, ...]:
     sweep = plate("x", outline([(-0.70, 0.05), (-0.70, -0.045), (-0.60, -0.045), (-0.55, 0.05)], 0.015), -0.1, 0.1)
     chest = plate("x", outline([(-0.37, 0.05), (-0.405, 0.05), (-0.36, -0.02)]), -0.1, 0.1)
     bearings = [rod((0.0, -0.684, 0.0), (0.0, -0.655, 0.0), 0.050), rod((0.0, -0.383, 0.0), (0.0, -0.379, 0.0), 0.034)]
-    bosses = [rod((side * 0.066, *pivot), (side * 0.0813, *pivot), radius) for side in (-1.0, 1.0) for pivot, radius in ((_BACK, 0.0115), (_FRONT, 0.0095))]
+    bosses = [cheeks(circle(pivot, radius), 0.0800, 0.0813) for pivot, radius in ((_BACK, 0.0115), (_FRONT, 0.0095))]
     return part("yaw", trough - sweep - chest, IVORY), part("yaw_bearings", union(*bearings, *bosses), DARK)
 
 
 def _pitch_back() -> tuple[Part, ...]:
-    """Motor block below, and the fork that carries the bars; drawn with u along the link (up) and w across it (towards the patient)."""
+    """Motor block below, and the fork that carries the bars; drawn upright with (y, z) about the pivot, then leant back."""
     lean_y, lean_z = _PIVOT["pitch_bottom"][0] - _BACK[0], _PIVOT["pitch_bottom"][1] - _BACK[1]
     length, lean = hypot(lean_y, lean_z), atan2(-lean_y, lean_z)
     top_y, top_z = _PIVOT["pitch_top"][0] - _BACK[0], _PIVOT["pitch_top"][1] - _BACK[1]
     top = (cos(lean) * top_y + sin(lean) * top_z, -sin(lean) * top_y + cos(lean) * top_z)
 
-    def stand(solid: Manifold) -> Manifold:
-        """Carry what is drawn with (w, u) as (y, z) about the pivot to where the link stands."""
-        return solid.rotate((lean * 57.29577951308232, 0.0, 0.0)).translate((0.0, *_BACK))
+    def leant(solid: Manifold) -> Manifold:
+        return solid.rotate((degrees(lean), 0.0, 0.0)).translate((0.0, *_BACK))
 
-    cover = plate(
-        "x",
-        outline([(-0.075, -0.095), (0.035, -0.095), (0.0504, -0.06), (0.0504, 0.03), (0.02, 0.075), (-0.03, 0.075), (-0.075, 0.02)], 0.012),
-        -0.0515,
-        0.0515,
-        0.007,
-    )
-    strap = taper(((-0.005, 0.05), 0.026), ((0.0, length), 0.016), (top, 0.0095))
-    cheeks = [plate("x", strap, *sorted((side * _BAR_WIDTH, side * 0.0515))) for side in (-1.0, 1.0)]
-    motors = [rod((x, -0.040 - 0.0598, u), (x, -0.06, u), 0.017) for x in (-0.029, 0.029) for u in (-0.088, -0.050, -0.012)]
-    below = [rod((x, w, -0.110), (x, w, -0.09), 0.019) for x in (-0.025, 0.025) for w in (-0.035, 0.015)]
-    pins = [rod((-0.0515, w, u), (0.0515, w, u), radius) for (w, u), radius in (((0.0, length), 0.007), (top, 0.0055))]
+    section = outline([(-0.075, -0.095), (0.035, -0.095), (0.0504, -0.06), (0.0504, 0.03), (0.02, 0.075), (-0.03, 0.075), (-0.075, 0.02)])
+    cover = plate("x", section, -0.0515, 0.0515, 0.007)
+    fork = cheeks(taper(((-0.005, 0.05), 0.026), ((0.0, length), 0.016), (top, 0.0095)), _BAR_WIDTH, 0.0515)
+    motors = [rod((x, -0.0998, z), (x, -0.06, z), 0.017) for x in (-0.029, 0.029) for z in (-0.078, -0.032)]
+    below = [rod((x, -0.012, -0.110), (x, -0.012, -0.09), 0.019) for x in (-0.025, 0.025)]
+    pins = [rod((-0.0515, *pivot), (0.0515, *pivot), radius) for pivot, radius in (((0.0, length), 0.007), (top, 0.0055))]
     axle = rod((-0.066, 0.0, 0.0), (0.066, 0.0, 0.0), 0.010)
-    return (
-        part("pitch_back", stand(union(cover, *cheeks)), IVORY),
-        part("pitch_back_motors", stand(union(*motors, *below, axle, *pins)), DARK),
-    )
+    return part("pitch_back", leant(union(cover, fork)), IVORY), part("pitch_back_motors", leant(union(*motors, *below, axle, *pins)), DARK)
 
 
 def _pitch_front() -> tuple[Part, ...]:
@@ -110,60 +100,48 @@ def _pitch_front() -> tuple[Part, ...]:
 def _pitch_bottom() -> tuple[Part, ...]:
     """Channel of the lower bars: a floor between two walls, high behind, that fork about the column in front."""
     (back, low), front = _PIVOT["pitch_bottom"], _LOWER[0]
-    wall = outline(
-        [(back - 0.008, low - 0.008), (front + 0.006, low - 0.008), (front + 0.006, low + 0.009), (front - 0.09, low + 0.013)]
-        + [(front - 0.24, low + 0.030), (back + 0.12, low + 0.050), (back + 0.03, low + 0.050), (back - 0.008, low + 0.012)],
-        0.005,
-    )
-    walls = [plate("x", wall, *sorted((side * 0.0440, side * _BAR_WIDTH))) for side in (-1.0, 1.0)]
-    tines = [plate("x", taper(((front, low), 0.0078), ((front - 0.10, low), 0.0085)), *sorted((side * 0.0396, side * 0.0470))) for side in (-1.0, 1.0)]
-    floor = block((-0.0470, back + 0.012, low - 0.0078), (0.0470, front - 0.085, low - 0.003))
-    pins = [rod((side * 0.0380, front, low), (side * 0.0490, front, low), 0.0075) for side in (-1.0, 1.0)]
-    return part("pitch_bottom", union(*walls, *tines, floor), IVORY), part("pitch_bottom_pins", union(*pins), DARK)
+    below = [(back - 0.008, low - 0.004), (back - 0.004, low - 0.008), (front + 0.002, low - 0.008), (front + 0.006, low - 0.004)]
+    above = [(front + 0.006, low + 0.006), (front + 0.002, low + 0.009), (front - 0.09, low + 0.013), (front - 0.24, low + 0.030)]
+    behind = [(back + 0.12, low + 0.050), (back + 0.03, low + 0.050), (back - 0.008, low + 0.012)]
+    walls = cheeks(outline([*below, *above, *behind]), 0.0396, _BAR_WIDTH)
+    floor = block((-0.0420, back + 0.012, low - 0.0080), (0.0420, front - 0.085, low - 0.003))
+    pins = cheeks(circle((front, low), 0.0075), 0.0475, 0.0490)
+    return part("pitch_bottom", union(walls, floor), IVORY), part("pitch_bottom_pins", pins, DARK)
 
 
 def _pitch_top() -> tuple[Part, ...]:
     """Plate of the upper bars between the walls of the lower ones, forked about the column in front."""
     (back, level), front = _PIVOT["pitch_top"], _UPPER[0]
-    wide = outline([(-0.043, back - 0.008), (0.043, back - 0.008), (0.043, front + 0.006), (-0.043, front + 0.006)], 0.006)
-    slot = outline([(-0.0393, front - 0.065), (0.0393, front - 0.065), (0.0393, front + 0.1), (-0.0393, front + 0.1)])
-    beam = plate("z", wide - slot, level - 0.0065, level + 0.0065)
-    rib = block((-0.030, back + 0.04, level + 0.006), (0.030, front - 0.09, level + 0.010), 0.001)
-    pins = [rod((side * 0.0380, front, level), (side * 0.0460, front, level), 0.0060) for side in (-1.0, 1.0)]
-    return part("pitch_top", union(beam, rib), GREY), part("pitch_top_pins", union(*pins), DARK)
+    fork = [(0.043, front - 0.090), (0.043, front + 0.006), (0.0393, front + 0.006), (0.0393, front - 0.065)]
+    left, right = [(-x, y) for x, y in reversed(fork)], [(-0.0393, back - 0.008), (0.0393, back - 0.008)]
+    beam = plate("z", outline([*right, *fork, *left]), level - 0.0065, level + 0.0065)
+    rib = block((-0.030, back + 0.04, level + 0.006), (0.030, front - 0.09, level + 0.010))
+    pins = cheeks(circle((front, level), 0.0060), 0.0430, 0.0455)
+    return part("pitch_top", union(beam, rib), GREY), part("pitch_top_pins", pins, DARK)
 
 
 def _column() -> tuple[Part, ...]:
     """Column behind the instrument: the rail of the carriage, and the cannula that holds the remote centre in the patient's wall."""
     shape = [(-0.068, 0.07), (-0.050, 0.012), (-0.036, 0.012), (-0.032, 0.05), (-0.032, 0.525), (-0.042, 0.539), (-0.058, 0.539), (-0.068, 0.51)]
-    cover = plate("x", outline(shape, 0.004), -_COLUMN_WIDTH, _COLUMN_WIDTH, 0.008)
-    recess = block((-0.021, -0.0335, 0.13), (0.021, -0.02, 0.530))
+    cover = plate("x", outline(shape), -_COLUMN_WIDTH, _COLUMN_WIDTH, 0.008)
     rails = [block((x - 0.004, -0.0365, 0.13), (x + 0.004, -0.0300, 0.530)) for x in (-0.014, 0.014)]
-    holder = plate("x", outline([(-0.050, 0.014), (-0.036, 0.014), (0.006, 0.050), (0.006, 0.066), (-0.034, 0.070), (-0.050, 0.060)], 0.003), -0.011, 0.011)
+    holder = plate("x", outline([(-0.050, 0.014), (-0.036, 0.014), (0.002, 0.050), (0.002, 0.066), (-0.034, 0.070), (-0.050, 0.060)]), -0.011, 0.011)
     clamp = rod((0.0, 0.0, 0.048), (0.0, 0.0, 0.068), 0.0115)
-    bore = rod((0.0, 0.0, -0.1), (0.0, 0.0, 0.1), 0.0048)
-    bosses = [rod((-0.0393, *pin), (0.0393, *pin), 0.0130) for pin in (_LOWER, _UPPER)]
+    bosses = [cheeks(circle(pin, 0.0130), 0.0388, 0.0393) for pin in (_LOWER, _UPPER)]
     stripe = block((-0.0391, -0.060, 0.478), (0.0391, -0.046, 0.486))
     return (
-        part("column", cover - recess, IVORY),
-        part("column_rail", union(*rails, *bosses, (holder + clamp) - bore), DARK),
+        part("column", cover, IVORY),
+        part("column_rail", union(*rails, *bosses, holder, clamp), DARK),
         part("column_stripe", stripe, BLUE),
-        _cannula(),
+        part("cannula", cannula(0.0056, 0.0105, -0.0366, 0.0860), STEEL),
     )
-
-
-def _cannula() -> Part:
-    """Tube of an 8 mm cannula, its bowl in the column's clamp, down to the column's lowest extent; a ring marks the remote centre."""
-    profile = [(0.0048, -0.0366), (0.0056, -0.0366), (0.0056, 0.0400), (0.0105, 0.0480), (0.0105, 0.0860), (0.0080, 0.0860), (0.0048, 0.0480)]
-    mark = ring((0.0, 0.0, -0.004), (0.0, 0.0, 1.0), 0.0062, 0.0050, 0.008)
-    return part("cannula", union(turned(profile), mark), STEEL)
 
 
 def _carriage() -> tuple[Part, ...]:
     """Carriage at the upper end of its way: slider, plate, and the sterile adapter that the instrument sits on."""
-    slider = block((-0.0200, -0.0360, 0.420), (0.0200, -0.0280, 0.492), 0.002)
+    slider = block((-0.0200, -0.0360, 0.420), (0.0200, -0.0280, 0.492))
     body = plate("y", outline([(0.4055, -0.038), (0.4975, -0.038), (0.4975, 0.038), (0.4055, 0.038)], 0.008), -0.0286, -0.0216)
-    adapter = plate("y", outline([(0.408, -0.034), (0.501, -0.034), (0.501, 0.034), (0.408, 0.034)], 0.006), -0.0216, -0.0150)
+    adapter = block((-0.034, -0.0216, 0.408), (0.034, -0.0150, 0.501))
     return part("carriage", union(slider, body), GREY), part("sterile_adapter", adapter, IVORY)
 
 

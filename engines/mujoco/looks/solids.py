@@ -12,7 +12,7 @@ from manifold3d import CrossSection, JoinType, Manifold, OpType
 from engines.mujoco.looks.part import Material, Part
 from schemas.vectors import Vector
 
-__all__ = ["Axis", "block", "circle", "outline", "part", "placed", "plate", "ring", "rod", "taper", "turned", "union"]
+__all__ = ["Axis", "block", "cannula", "cheeks", "circle", "hull", "outline", "part", "placed", "plate", "rod", "symmetric", "taper", "turned", "union"]
 
 Axis = Literal["x", "y", "z"]
 Point2 = tuple[float, float]
@@ -22,8 +22,8 @@ _SHARP = 40.0
 """Degrees between two faces above which their edge is drawn sharp: below the 45 degrees of a bevel, above the steps of a round."""
 _CORNER = 8
 """Segments of a full turn of a rounded corner: two in a right angle."""
-_DEVIATION = 1.2e-3
-"""How far a round of the arms may lie from its circle, m; half a pixel of an image of the whole cart."""
+_DEVIATION = 2.0e-3
+"""How far a round of the arms may lie from its circle, m: under a pixel in an image of the whole cart."""
 _TURNS = {
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "y": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -39,6 +39,11 @@ def outline(points: Sequence[Point2], radius: float = 0.0) -> CrossSection:
         return polygon
     inner = polygon.offset(-radius, JoinType.Miter, 4.0)
     return inner.offset(radius, JoinType.Round, circular_segments=_CORNER)
+
+
+def symmetric(half: Sequence[Point2], radius: float = 0.0) -> CrossSection:
+    """Return the outline whose right half is the open polygon `half`, counter-clockwise, and whose left half mirrors it."""
+    return outline([*half, *((-u, v) for u, v in reversed(half))], radius)
 
 
 def circle(centre: Point2, radius: float, segments: int = 0) -> CrossSection:
@@ -63,12 +68,18 @@ def plate(axis: Axis, shape: CrossSection, low: float, high: float, bevel: float
     return placed(solid, _TURNS[axis])
 
 
+def cheeks(shape: CrossSection, inner: float, outer: float, bevel: float = 0.0) -> Manifold:
+    """Return two plates, drawn in the plane (y, z), at either side of x = 0 between two distances from it."""
+    one = plate("x", shape, inner, outer, bevel)
+    return one + one.mirror((1.0, 0.0, 0.0))
+
+
 def block(low: Point3, high: Point3, bevel: float = 0.0) -> Manifold:
     """Return the box between two corners, its edges cut by `bevel`."""
     lower, upper = np.array(low), np.array(high)
     if bevel == 0.0:
-        return Manifold.cube(tuple(upper - lower)).translate(low)
-    slabs = [Manifold.cube(tuple(upper - lower - 2.0 * cut)).translate(tuple(lower + cut)) for cut in bevel * (1.0 - np.eye(3))]
+        return Manifold.cube(upper - lower).translate(low)
+    slabs = [Manifold.cube(upper - lower - 2.0 * cut).translate(lower + cut) for cut in bevel * (1.0 - np.eye(3))]
     return Manifold.batch_hull(slabs)
 
 
@@ -86,14 +97,20 @@ def turned(profile: Sequence[Point2], origin: Point3 = (0.0, 0.0, 0.0), axis: Po
     return placed(Manifold.revolve(CrossSection([np.array(profile)]), segments or _segments(max(r for r, _ in profile))), _turn_to(direction), origin)
 
 
-def ring(centre: Point3, axis: Point3, radius: float, inner: float, height: float, segments: int = 0) -> Manifold:
-    """Return a ring that stands on `centre` and rises by `height` along `axis`."""
-    return turned([(inner, 0.0), (radius, 0.0), (radius, height), (inner, height)], centre, axis, segments)
+def cannula(radius: float, bowl: float, low: float, high: float) -> Manifold:
+    """Return a tube about the z axis from `low` up to a bowl that ends at `high`, with a thick ring about the remote centre, z = 0."""
+    profile = [(0.0, low), (radius, low), (radius, -0.004), (1.12 * radius, -0.004), (1.12 * radius, 0.004), (radius, 0.004)]
+    return turned([*profile, (radius, 0.040), (bowl, 0.048), (bowl, high), (0.0, high)])
 
 
 def union(*solids: Manifold) -> Manifold:
     """Join solids into one."""
     return Manifold.batch_boolean(solids, OpType.Add)
+
+
+def hull(points: Vector) -> Manifold:
+    """Return the convex hull of points, shape (n, 3)."""
+    return Manifold.hull_points(points)
 
 
 def placed(solid: Manifold, rotation: Vector, translation: Sequence[float] | Vector = (0.0, 0.0, 0.0)) -> Manifold:
@@ -108,8 +125,8 @@ def part(name: str, solid: Manifold, material: Material) -> Part:
 
 
 def _segments(radius: float) -> int:
-    """Return into how many straight pieces a circle is cut: an even number, 8 to 18."""
-    return int(np.clip(2 * round(pi / (2.0 * sqrt(2.0 * _DEVIATION / radius))), 8, 18))
+    """Return into how many straight pieces a circle is cut: an even number, 10 to 14."""
+    return int(np.clip(2 * round(pi / (2.0 * sqrt(2.0 * _DEVIATION / radius))), 10, 14))
 
 
 def _turn_to(direction: Vector) -> Vector:
