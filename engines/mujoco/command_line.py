@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
+import numpy as np
 import typer
 from pydantic import ValidationError
 from typer.core import TyperCommand
@@ -32,13 +34,14 @@ class _NumbersInARow(TyperCommand):
     """Takes `--q 0.1 -0.2 0.3` like `--q 0.1,-0.2,0.3`: all numbers that follow belong to the option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if "--q" in args:
-            start = args.index("--q") + 1
-            end = start
-            while end < len(args) and _numbers(args[end]) is not None:
-                end += 1
-            if end > start:
-                args = [*args[: start - 1], f"--q={','.join(args[start:end])}", *args[end:]]
+        for option in ("--q", "--dq"):
+            if option in args:
+                start = args.index(option) + 1
+                end = start
+                while end < len(args) and _numbers(args[end]) is not None:
+                    end += 1
+                if end > start:
+                    args = [*args[: start - 1], f"{option}={','.join(args[start:end])}", *args[end:]]
         return super().parse_args(ctx, args)
 
 
@@ -49,9 +52,9 @@ def _numbers(text: str) -> list[float] | None:
         return None
 
 
-def _positions(text: str) -> str:
-    if not _numbers(text):
-        raise typer.BadParameter(f"'{text}' holds no numbers; write joint positions in rad and m, separated by spaces or commas")
+def _checked(text: str | None) -> str | None:
+    if text is not None and not _numbers(text):
+        raise typer.BadParameter(f"'{text}' holds no numbers; write one per joint in SI units, separated by spaces or commas")
     return text
 
 
@@ -61,7 +64,10 @@ Tool = Annotated[
     str | None,
     typer.Option("--instrument", metavar="N", help="Of a PSM: its instrument, by name or number (400006 unless given); of the ECM: straight, up or down."),
 ]
-Positions = Annotated[str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_positions, help="Joint positions, rad and m.")]
+Positions = Annotated[str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_checked, help="Joint positions, rad and m.")]
+Velocities = Annotated[
+    str | None, typer.Option("--dq", metavar="V1 V2 ...", callback=_checked, help="Joint velocities for the friction, rad/s and m/s; 0 unless given.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 
@@ -74,41 +80,42 @@ def fk(arm: Arm, *, instrument: Tool = None, q: Positions, as_json: Json = False
 
 
 @app.command(cls=_NumbersInARow)
-def dynamics(arm: CartArm, *, instrument: Tool = None, q: Positions, as_json: Json = False) -> None:
+def dynamics(arm: CartArm, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False) -> None:
     """Print an arm's joint-space inertia, gravity, friction and elasticity, its base upright; SI units."""
     _need_mujoco("dynamics")
-    positions = _numbers(q) or []
-    name = _cart_arm(arm)
-    if instrument is None and name != "ECM":
-        instrument = DEFAULT_INSTRUMENT
+    name, positions = _cart_arm(arm), _numbers(q) or []
+    tool = instrument or ("straight" if name == "ECM" else DEFAULT_INSTRUMENT)
+    velocities = [0.0] * len(positions) if dq is None else _numbers(dq) or []
     with _refusing():
-        kinematics.fk(arm, instrument, positions)  # refuses what is out of range
+        kinematics.fk(arm, tool, positions)  # refuses what is out of range
+        if len(velocities) != len(positions):
+            raise MotionError(f"{arm}: {len(velocities)} joint velocities, expected {len(positions)}")
         from engines.mujoco.model.dynamics import dynamics as of
 
-        found = of(name, instrument, positions)
+        found = of(name, tool, positions, velocities)
     if as_json:
-        typer.echo(json.dumps({"arm": arm, "instrument": instrument, "q": dict(zip(found.joints, positions, strict=True)), **_plain(found)}, indent=2))
+        typer.echo(json.dumps({"arm": arm, "instrument": tool, "q": positions, "dq": velocities, **_plain(found)}, indent=2))
     else:
         _print(found)
 
 
 def _plain(found: JointDynamics) -> dict[str, Any]:
-    return {
-        "joints": list(found.joints),
-        "inertia": found.inertia.tolist(),
-        "gravity": found.gravity.tolist(),
-        "friction": {"viscous": found.viscous_friction.tolist(), "coulomb": found.coulomb_friction.tolist()},
-        "elastic": {"stiffness": found.elastic_stiffness.tolist(), "effort": found.elastic.tolist()},
-    }
+    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in asdict(found).items()}
 
 
 def _print(found: JointDynamics) -> None:
+    columns = {
+        "gravity": found.gravity,
+        "elastic": found.elastic,
+        "viscous": found.viscous_friction,
+        "coulomb": found.coulomb_friction,
+        "friction": found.friction,
+    }
     width = max(map(len, found.joints))
-    typer.echo(f"{'':{width}}  {'gravity':>10} {'viscous':>10} {'coulomb':>10} {'elastic':>10}   inertia matrix")
-    columns = (found.gravity, found.viscous_friction, found.coulomb_friction, found.elastic)
+    typer.echo(f"{'':{width}}{''.join(f'{title:>11}' for title in columns)}   inertia matrix")
     for i, name in enumerate(found.joints):
-        loads = " ".join(f"{column[i]:10.5f}" for column in columns)
-        typer.echo(f"{name:{width}}  {loads}   {' '.join(f'{cell:10.6f}' for cell in found.inertia[i])}")
+        row = "".join(f"{column[i]:11.5f}" for column in columns.values())
+        typer.echo(f"{name:{width}}{row}   {''.join(f'{cell:11.6f}' for cell in found.inertia[i])}")
 
 
 @app.command()

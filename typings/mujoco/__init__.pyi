@@ -93,6 +93,9 @@ class MjsEquality(MjsElement):
 
 class MjsSite(MjsElement): ...
 
+class MjsTendon(MjsElement):
+    def wrap_joint(self, name: str, coef: float) -> None: ...
+
 class MjsMaterial(MjsElement):
     rgba: _Array
 
@@ -142,6 +145,7 @@ class MjSpec:
     def add_material(self, **fields: Any) -> MjsMaterial: ...
     def add_mesh(self, **fields: Any) -> MjsMesh: ...
     def add_sensor(self, **fields: Any) -> None: ...
+    def add_tendon(self, **fields: Any) -> MjsTendon: ...
     def add_texture(self, **fields: Any) -> None: ...
     def body(self, name: str) -> MjsBody: ...
     def compile(self) -> MjModel: ...
@@ -275,7 +279,13 @@ class MjvGLCamera:
     frustum_far: float
     orthographic: int
 
+class MjvLight:
+    pos: _Numbers
+    dir: _Numbers
+    headlight: int
+
 class MjvScene:
+    lights: tuple[MjvLight, ...]
     stereo: int
     flags: NDArray[np.uint8]
     camera: tuple[MjvGLCamera, MjvGLCamera]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from engines.mujoco.model import interim, transform
+from engines.mujoco.model import transform
 from engines.mujoco.model.names import FINGERS
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
 from engines.mujoco.params import EcmParams, PsmParams
+from robots.dvrk import drives, inertia
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.drives import Drive
 from schemas.vectors import Vector
 
 __all__ = ["add"]
@@ -34,7 +36,7 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
         body = above.add_body(name=f"{name}/{link.name}", gravcomp=1.0, **transform.placed(inverse_pose(above_pose) @ link.pose))
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)
-    _add_servos(spec, name, params)
+    _add_drives(spec, name, params)
     _set_inertias(bodies, params)
     chain = params.chain
     bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip))
@@ -51,38 +53,48 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
         spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, **tie, **_TIE)
 
 
-def _add_servos(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
-    """Give each independent joint its drive: friction, elasticity and rotor inertia, and a servo with inputs position, velocity and feed-forward effort."""
-    for link in links(arm, params):
-        if link.follow is not None:
-            continue
-        name = f"{arm}/{link.name}"
-        drive = interim.drive(params, link.name)
-        joint = spec.joint(name)
-        joint.damping, joint.frictionloss, joint.armature = [drive.viscous_friction, 0.0, 0.0], drive.coulomb_friction, drive.armature
-        actuator = spec.add_actuator(
-            name=name,
-            target=name,
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            ctrllimited=True,
-            ctrlrange=[link.lower, link.upper],
-            velrange=[-drive.velocity, drive.velocity],
-            ffrange=[-drive.effort, drive.effort],
-            forcelimited=True,
-            forcerange=[-drive.effort, drive.effort],
-        )
-        inputs = mujoco.mjtCtrlInput
-        actuator.set_to_pid(kp=drive.stiffness, kv=drive.damping, ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF))
+def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
+    """Give each independent joint its drive, and an instrument's discs the friction that wrist and jaw share."""
+    is_psm = isinstance(params, PsmParams)
+    for name, drive in (drives.psm(params.tool) if is_psm else drives.ECM).items():
+        _add_drive(spec, f"{arm}/{name}", drive)
+    for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
+        tendon = spec.add_tendon(name=f"{arm}/disc_{i}", damping=[disc.viscous_friction, 0.0, 0.0], frictionloss=disc.coulomb_friction)
+        for name, share in disc.shares.items():
+            tendon.wrap_joint(f"{arm}/{name}", share)
+
+
+def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
+    """Add friction, elasticity and rotor inertia of a joint, and a servo with the inputs position, velocity and feed-forward effort."""
+    joint = spec.joint(name)
+    joint.damping, joint.frictionloss, joint.armature = [drive.viscous_friction, 0.0, 0.0], drive.coulomb_friction, drive.armature
+    if drive.elasticity:
+        joint.stiffness, joint.springref = [drive.elasticity, 0.0, 0.0], -drive.offset / drive.elasticity
+    lower, upper = joint.range
+    actuator = spec.add_actuator(
+        name=name,
+        target=name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrllimited=True,
+        ctrlrange=[lower, upper],
+        velrange=[-drive.velocity, drive.velocity],
+        ffrange=[-drive.effort, drive.effort],
+        forcelimited=True,
+        forcerange=[-drive.effort, drive.effort],
+    )
+    inputs = mujoco.mjtCtrlInput
+    actuator.set_to_pid(kp=drive.stiffness, kv=drive.damping, ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF))
 
 
 def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
     """Carry the inertia of each link, given in the base frame with every joint at 0, to its body."""
-    for link, inertia in interim.inertias(params).items():
+    masses = inertia.psm(params.tool, params.probe_radius) if isinstance(params, PsmParams) else inertia.ecm()
+    for link, given in masses.items():
         body, pose = bodies[link]
         turn = pose[:3, :3]
-        tensor = turn.T @ inertia.tensor @ turn
-        body.mass, body.explicitinertial = inertia.mass, True
-        body.ipos = (turn.T @ (inertia.centre - pose[:3, 3])).tolist()
+        tensor = turn.T @ given.tensor @ turn
+        body.mass, body.explicitinertial = given.mass, True
+        body.ipos = (turn.T @ (given.centre - pose[:3, 3])).tolist()
         body.fullinertia = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
 
 

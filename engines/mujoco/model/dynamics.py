@@ -14,7 +14,8 @@ import numpy as np
 
 from engines.mujoco.model.scene import build
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import SceneArm, SceneParams
+from engines.mujoco.params import PsmParams, SceneArm, SceneParams
+from robots.dvrk import drives
 from schemas.vectors import Vector
 
 __all__ = ["JointDynamics", "dynamics"]
@@ -30,24 +31,27 @@ class JointDynamics:
     gravity: Vector
     """Effort that holds the arm against gravity, its base upright, shape (n,)."""
     viscous_friction: Vector
-    """Effort per velocity, shape (n,)."""
+    """Effort per velocity of a joint that moves alone, shape (n,); the discs of an instrument couple wrist and jaw, see `friction`."""
     coulomb_friction: Vector
-    """Effort while moving, shape (n,)."""
+    """Effort of a joint that moves alone, shape (n,)."""
+    friction: Vector
+    """Effort against friction at the velocities asked for, shape (n,)."""
     elastic_stiffness: Vector
     """Shape (n,)."""
     elastic: Vector
     """Effort that holds the arm against its springs, shape (n,)."""
 
 
-def dynamics(arm: SceneArm, instrument: str | None, q: Sequence[float]) -> JointDynamics:
-    """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m).
+def dynamics(arm: SceneArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
+    """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m) and velocities `dq` (rad/s, m/s).
 
     Args:
         arm: PSM1, PSM2, PSM3 or ECM.
-        instrument: of a PSM, by name or number; endoscope of the ECM; None for the usual one.
+        tool: instrument of a PSM, by name or number; endoscope of the ECM.
         q: one number per joint, in range.
+        dq: the same.
     """
-    what = {} if instrument is None else {"endoscope" if arm == "ECM" else "instrument": instrument}
+    what = {"endoscope" if arm == "ECM" else "instrument": tool}
     scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False})
     params = scene.arms[arm]
     model = build(scene)
@@ -62,12 +66,20 @@ def dynamics(arm: SceneArm, instrument: str | None, q: Sequence[float]) -> Joint
     mujoco.mj_forward(model, data)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
+    driven, wrist = (drives.psm(params.tool), drives.discs(params.tool)) if isinstance(params, PsmParams) else (drives.ECM, ())
+    at_rest = dict.fromkeys(driven, 0.0)
+    moving = drives.friction(driven, {**at_rest, **dict(zip(joints, dq, strict=True))}, wrist)
+    alone = [
+        [getattr(driven[name], kind) + sum(getattr(disc, kind) * abs(disc.shares.get(name, 0.0)) ** power for disc in wrist) for name in joints]
+        for kind, power in (("viscous_friction", 2), ("coulomb_friction", 1))
+    ]
     return JointDynamics(
         joints=tuple(joints),
         inertia=to_all.T @ inertia @ to_all,
         gravity=to_all.T @ data.qfrc_bias,
-        viscous_friction=to_all.T @ model.dof_damping,
-        coulomb_friction=to_all.T @ model.dof_frictionloss,
+        viscous_friction=np.array(alone[0]),
+        coulomb_friction=np.array(alone[1]),
+        friction=np.array([moving[name] for name in joints]),
         elastic_stiffness=to_all.T @ model.jnt_stiffness,
         elastic=to_all.T @ (model.jnt_stiffness * (data.qpos - model.qpos_spring)),
     )
