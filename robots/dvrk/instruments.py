@@ -94,7 +94,7 @@ def instrument(name: str) -> Instrument:
     """Return the instrument of this name or number. Raises MotionError if there is none, saying which there are."""
     found = instruments().get(name) or _by_number().get(name)
     if found is None:
-        raise MotionError(f"no instrument '{name}'.{did_you_mean(name, [*instruments(), *_by_number()])}")
+        raise MotionError(f"no instrument '{name}'.{did_you_mean(name, _by_number() if name.isdigit() else instruments())}")
     return found
 
 

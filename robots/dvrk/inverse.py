@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.dvrk import ecm, psm
+from robots.dvrk.cart import inverse_pose
 from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.vectors import Vector
@@ -64,7 +65,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     start = np.broadcast_to(near, (*np.shape(pose)[:-2], n)).reshape(-1, n)
     if not (np.isfinite(poses).all() and np.isfinite(start).all()):
         raise MotionError("a pose or a joint position that is not finite cannot be reached")
-    ends = poses @ np.linalg.inv(chain.tip)
+    ends = poses @ inverse_pose(chain.tip)
     if n == len(ecm.JOINTS):
         _require(chain, ecm.JOINTS[3:])
         branches = _ecm_branches(chain, ends)
@@ -155,7 +156,8 @@ def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -
 
 
 def _dot(a: Vector, b: Vector) -> Vector:
-    return np.einsum("...i,...i->...", a, b)
+    product: Vector = np.vecdot(a, b)
+    return product
 
 
 def _cross(a: Vector, b: Vector) -> Vector:
