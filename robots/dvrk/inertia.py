@@ -43,10 +43,10 @@ class Inertia:
 
     @classmethod
     def of_rod(cls, mass: float, start: Vector, end: Vector, radius: float) -> Inertia:
-        """Return that of a thin tube from `start` to `end` (m), shape (3,)."""
+        """Return that of a thin tube from `start` to `end` (m), shape (3,); of a ring without direction where these are one point."""
         along = np.outer(end - start, end - start)
         length_squared = np.trace(along)
-        axis = along / length_squared
+        axis = along / (length_squared or 1.0)
         across = mass * (length_squared / 12.0 + radius**2 / 2.0)
         return cls(mass, (start + end) / 2.0, across * (np.eye(3) - axis) + mass * radius**2 * axis)
 
