@@ -64,10 +64,12 @@ class Servos:
         self.setpoint, self._previous, self._effort = np.split(self._inputs, 3)
         self._command, self._change, self._way = start.copy(), np.zeros(n), speed * period
         self._layout, self._measure = self._matrices(shares, n, period)
+        self._springs, self._rest = self._elasticity(shares, n)
         self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
         self._gravity_compensation = model.body_gravcomp.copy()
         self._modes = {arm: np.full(2, _POSITION).tobytes() for arm in arms}
         self._holding = True
+        np.multiply(self._springs, start - self._rest, out=self._effort)
         self._layout.dot(self._inputs, data.ctrl)
 
     def _add_group(self, arm: str, ports: str, joints: list[str], first: int, count: int) -> None:
@@ -89,6 +91,15 @@ class Servos:
             layout[at + 2, 2 * n + drive] = 1.0  # both fingers with the jaw's torque: their work is then that of the jaw
             measure[drive, model.jnt_qposadr[model.actuator_trnid[actuator, 0]]] = 1.0
         return layout, measure
+
+    def _elasticity(self, shares: list[tuple[int, int, float]], n: int) -> tuple[Vector, Vector]:
+        """Return stiffness of the joints' own springs and where these are at rest, both shape (n,)."""
+        model = self._model
+        stiffness, rest = np.zeros(n), np.zeros(n)
+        for actuator, drive, _share in shares:
+            joint = int(model.actuator_trnid[actuator, 0])
+            stiffness[drive], rest[drive] = np.ravel(model.jnt_stiffness[joint])[0], model.qpos_spring[model.jnt_qposadr[joint]]
+        return stiffness, rest
 
     def arm_setpoint(self, arm: str) -> Vector:
         """Return the view of `setpoint` that is the joints of `arm`."""
@@ -115,6 +126,7 @@ class Servos:
         else:
             np.maximum(change, -way, out=change)
             setpoint += np.minimum(change, way, out=change)
+        np.multiply(self._springs, np.subtract(setpoint, self._rest, out=self._effort), out=self._effort)  # what holds against the springs there
         if not self._holding:
             self._let_go(inputs)
         self._layout.dot(self._inputs, self._data.ctrl)
@@ -124,8 +136,8 @@ class Servos:
         measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)
         for group in self._groups:
             part = group.part
-            self._effort[part] = inputs[group.ports + "servo_jf"] if group.mode == _EFFORT else 0.0
             if group.mode != _POSITION:
+                self._effort[part] = inputs[group.ports + "servo_jf"] if group.mode == _EFFORT else 0.0
                 self.setpoint[part] = self._previous[part] = measured[part]
 
     def _set_modes(self, arm: str, modes: Vector) -> None:
@@ -136,7 +148,6 @@ class Servos:
             self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
             self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
             self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (mode != _OFF)
-            self._effort[group.part] = 0.0
             group.mode = mode
         self._modes[arm] = modes.tobytes()
         self._holding = all(group.mode == _POSITION for group in self._groups)
