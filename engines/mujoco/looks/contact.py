@@ -51,7 +51,7 @@ def instrument(tool: Instrument) -> Collisions:
 
 def _hull(name: str, shown: tuple[Part, ...]) -> Part:
     points = np.concatenate([p.vertices for p in shown if p.name not in _THIN])
-    return part(f"{name}_hull", hull(points).simplify(2e-3), shown[0].material)
+    return part(f"{name}_hull", hull(points), shown[0].material)
 
 
 def _upright(name: str, radius: float, low: float, high: float) -> Primitive:

@@ -29,8 +29,8 @@ def parts(tool: Instrument) -> Looks:
     """Return the meshes by body."""
     frames = psm.chain(tool).frames(np.zeros(3 + len(tool.joints)))[3:-1]
     looks = {"insertion": _housing(), "roll": _shaft(frames[1])}
-    for joint, above, frame, below in zip(tool.joints[1:-1], frames, frames[1:], frames[2:], strict=False):
-        looks[joint.name] = (_wrist_link(joint.name, frame, below, above),)
+    for joint, frame, below in zip(tool.joints[1:-1], frames[1:-1], frames[2:], strict=True):
+        looks[joint.name] = (_wrist_link(joint.name, frame, below),)
     looks[tool.joints[-1].name] = (_pin(tool.joints[-1].name, frames[-1]),)
     if tool.jaw is not None:
         pose = finger_frame(tool)
@@ -75,11 +75,11 @@ def _drawing(pitch: Vector) -> Vector:
     return np.column_stack([pitch[:3, 2], np.cross((0.0, 0.0, 1.0), pitch[:3, 2]), (0.0, 0.0, 1.0)])
 
 
-def _wrist_link(name: str, frame: Vector, below: Vector, above: Vector) -> Part:
+def _wrist_link(name: str, frame: Vector, below: Vector) -> Part:
     """Link from its joint, z of `frame`, to the next one, z of `below`: a hub in the clevis above, ears about what comes below."""
     length = float(np.linalg.norm(below[:3, 3] - frame[:3, 3]))
     if length < 1e-6:  # two crossed joints of a snake wrist
-        return part(name, rod((0.0, 0.0, -0.0015), (0.0, 0.0, 0.0015), 0.0019).transform(_affine(_drawing(above), frame)), STEEL)
+        return part(name, rod((0.0, 0.0, -0.0015), (0.0, 0.0, 0.0015), 0.0019).transform(_affine(_drawing(frame), frame)), STEEL)
     hub = rod((-0.0020, 0.0, 0.0), (0.0020, 0.0, 0.0), min(0.0024, 0.6 * length))
     body = rod((0.0, 0.0, -length - 0.0015), (0.0, 0.0, -0.2 * length), WRIST_RADIUS)
     waist = block((-0.0020, -0.0022, -0.6 * length), (0.0020, 0.0022, 0.0))
