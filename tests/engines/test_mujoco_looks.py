@@ -74,11 +74,16 @@ def test_the_whole_cart_has_about_ten_thousand_triangles() -> None:
         ("ecm", "pitch", (-0.026, -0.116, -0.006), (0.025, 0.013, 0.570)),
         ("ecm", "insertion", (-0.028, -0.061, 0.373), (0.026, -0.028, 0.491)),
         ("ecm", "roll", (-0.035, -0.040, 0.0), (0.035, 0.039, 0.612)),
+        ("suj/PSM2", "lift", (0.0775, -0.1741, 0.430), (0.2637, -0.0291, 0.7611)),
+        ("suj/PSM2", "shoulder", (0.1187, -0.1741, 0.7611), (0.6898, -0.0291, 1.0551)),
+        ("suj/PSM2", "elbow", (0.563, -0.1616, 0.9324), (1.1088, -0.0416, 1.1574)),
+        ("suj/PSM2", "wrist", (0.8928, -0.1555, 0.8116), (1.1168, -0.0477, 0.9324)),
+        ("suj/PSM2", "tilt", (1.1148, -0.1496, 0.6304), (1.5082, -0.0537, 0.9073)),
         ("cart", "cart", (-0.456, -0.568, -0.166), (0.456, 0.365, 1.801)),
     ],
 )
 def test_outer_dimensions_are_the_published_ones(what: str, body: str, low: tuple[float, ...], high: tuple[float, ...]) -> None:
-    """Bounding boxes of the CAD meshes in med-air/SurRoL (PSM) and jhu-dvrk/dvrk_model (ECM, cart), carried to the base frame."""
+    """Bounding boxes of the CAD meshes in med-air/SurRoL (PSM) and jhu-dvrk/dvrk_model (ECM, SUJ), carried to the frame of the look."""
     names = ("yaw",) if (what, body) == ("psm", "yaw") else ()
     np.testing.assert_allclose(bounds(what, body, names), [low, high], atol=TOLERANCE)
 
