@@ -66,11 +66,11 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
     """Return the meshes of the finger on the side +1 (left) or -1 (right), drawn in the frame `pose`, shape (4, 4)."""
     length, back = form.length, form.thickness
     profile = [(_ROOT, 0.0), (length, 0.0), (length, 0.6 * form.tip_thickness), (length - 0.0006, form.tip_thickness), (0.45 * length, back), (_ROOT, back)]
-    blade = plate("y", outline(profile), -0.01, 0.01) ^ plate("x", outline(_top_view(form), 0.0004), -0.01, 0.01)
+    blade = plate("y", outline(profile), -0.01, 0.01) ^ plate("x", outline(_top_view(form, _ROOT / length), 0.0004), -0.01, 0.01)
     low, high = sorted((-side * _HUB_WIDTH, 0.0))
     hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
     arm = block((0.0, low, 0.0), (back, high, _ROOT + 0.0012))
-    pad = plate("x", outline([(y * 0.8, z) for y, z in _top_view(form, start=0.42, end=0.97)]), 0.0, 0.0002)
+    pad = plate("x", outline(_top_view(form, 0.42, 0.97, share=0.8)), 0.0, 0.0002)
     if form.window:
         half, low_end, high_end = 0.45 * form.width, 0.50 * length, 0.86 * length
         hole = plate("x", outline([(-half, low_end), (half, low_end), (half, high_end), (-half, high_end)], 0.0004), -0.01, 0.01)
@@ -88,16 +88,16 @@ def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
     return Primitive(name, "box", (form.tip_thickness / 2.0, (form.width + form.tip_width) / 2.0, (form.length - _ROOT) / 2.0), box)
 
 
-def _top_view(form: Shape, start: float | None = None, end: float = 1.0) -> list[tuple[float, float]]:
-    """Return the outline (y, z) of the pad's face between two fractions of the length, counter-clockwise."""
-    first = _ROOT / form.length if start is None else start
-    steps = np.linspace(first, end, 5 if form.curve else 2)
-    width = [form.width + (form.tip_width - form.width) * (s - first) / (1.0 - first) for s in steps]
-    middle = [_curve(form, s) for s in steps]
-    right = [(m - w, s * form.length) for s, w, m in zip(steps, width, middle, strict=True)]
-    left = [(m + w, s * form.length) for s, w, m in zip(steps, width, middle, strict=True)]
+def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -> list[tuple[float, float]]:
+    """Return the outline (y, z) of the pad's face between two fractions of the length, counter-clockwise, and over a share of its width."""
+    root = _ROOT / form.length
+    right, left = list[tuple[float, float]](), list[tuple[float, float]]()
+    for s in np.linspace(start, end, 5 if form.curve else 2).tolist():
+        half = share * (form.width + (form.tip_width - form.width) * (s - root) / (1.0 - root))
+        right.append((_curve(form, s) - half, s * form.length))
+        left.append((_curve(form, s) + half, s * form.length))
     return [*left, *reversed(right)]
 
 
 def _curve(form: Shape, s: float) -> float:
-    return form.curve * float(s) ** 2
+    return form.curve * s**2

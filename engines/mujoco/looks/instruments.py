@@ -8,9 +8,8 @@ CAD meshes in med-air/SurRoL; forms of the fingers by the kind of instrument, ou
 from __future__ import annotations
 
 import numpy as np
-from manifold3d import Manifold
 
-from engines.mujoco.looks.fingers import Shape, finger, shape
+from engines.mujoco.looks.fingers import finger, shape
 from engines.mujoco.looks.part import BLACK, BLUE, SLATE, STEEL, Looks, Part
 from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
 from robots.dvrk import psm
@@ -23,6 +22,8 @@ FINGERS = ("jaw_left", "jaw_right")
 """The left one opens about z of the last wrist frame, the right one against it."""
 _HOUSING_END = 0.4080
 """Height of the housing's lower face over the remote centre, m."""
+_ELECTRODE_LENGTH = 0.0155
+"""Of what no public model states, as for jaws in `robots.dvrk.instruments`, m."""
 
 
 def parts(tool: Instrument) -> Looks:
@@ -37,7 +38,7 @@ def parts(tool: Instrument) -> Looks:
         for name, side in zip(FINGERS, (1, -1), strict=True):
             looks[name] = finger(name, shape(tool, tool.jaw), side, pose)
     elif tool.number:
-        looks[tool.joints[-1].name] += (_electrode(tool),)
+        looks[tool.joints[-1].name] += (_electrode(finger_frame(tool)),)
     return looks
 
 
@@ -65,7 +66,7 @@ def _shaft(pitch: Vector) -> tuple[Part, ...]:
     tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=14)
     core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=14)
     slot = placed(block((-0.01, -0.01, -0.01), (0.01, 0.01, 0.0028)) ^ block((-0.0021, -1.0, -1.0), (0.0021, 1.0, 1.0)), _drawing(pitch), pitch[:3, 3])
-    flats = [block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0), 0.0) for side in (-1.0, 1.0)]
+    flats = [block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0)) for side in (-1.0, 1.0)]
     ears = core - slot - placed(union(*flats), _drawing(pitch), pitch[:3, 3])
     return part("shaft", tube, BLACK), part("clevis", ears, STEEL)
 
@@ -84,7 +85,7 @@ def _wrist_link(name: str, frame: Vector, below: Vector) -> Part:
     body = rod((0.0, 0.0, -length - 0.0015), (0.0, 0.0, -0.2 * length), WRIST_RADIUS)
     waist = block((-0.0020, -0.0022, -0.6 * length), (0.0020, 0.0022, 0.0))
     slot = block((-1.0, -0.0020, -1.0), (1.0, 0.0020, -length + min(0.0032, 0.4 * length)))
-    return part(name, (union(hub, body - slot, waist)).transform(_affine(_drawing(frame), frame)), STEEL)
+    return part(name, union(hub, body - slot, waist).transform(_affine(_drawing(frame), frame)), STEEL)
 
 
 def _affine(rotation: Vector, frame: Vector) -> Vector:
@@ -97,10 +98,8 @@ def _pin(name: str, frame: Vector) -> Part:
     return part(name, placed(pin, frame[:3, :3], frame[:3, 3]), STEEL)
 
 
-def _electrode(tool: Instrument) -> Part:
-    """What cuts by current in place of jaws: a bent wire or a blade."""
-    form = Shape(length=0.0155, width=0.0008, tip_width=0.0006, thickness=0.0008, tip_thickness=0.0005)
-    pose = finger_frame(tool)
-    stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.8 * form.length), form.thickness, segments=10)
-    end: Manifold = block((-form.tip_width, -0.0018, 0.8 * form.length), (form.tip_width, form.width, form.length))
-    return part("electrode", placed(union(stem, end), pose[:3, :3], pose[:3, 3]), STEEL)
+def _electrode(pose: Vector) -> Part:
+    """What cuts by current in place of jaws: a stem with a hooked end, drawn in the frame `pose`, shape (4, 4)."""
+    stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
+    hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _ELECTRODE_LENGTH))
+    return part("electrode", placed(union(stem, hook), pose[:3, :3], pose[:3, 3]), STEEL)
