@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -17,14 +17,15 @@ from controllers.motion.ports import COMMANDS, JAW_COMMANDS
 from controllers.motion.telemetry import Telemetry
 from hub.inputs import Inputs
 from robots.dvrk.setup_joints import CartArm
+from schemas.crtk import StringStamped
 from schemas.errors import MotionError
 from schemas.message import Message
 from schemas.vectors import Vector
 
 __all__ = ["Arm"]
 
-_ANY_TIME = ("state_command", "trajectory_j/set_ratio")
-"""Commands that are heeded whatever the operating state."""
+_ANY_TIME = "trajectory_j/set_ratio"
+"""A command that is heeded whatever the operating state."""
 
 
 class Arm:
@@ -40,8 +41,9 @@ class Arm:
         self._telemetry = Telemetry(name, arm.chain)
         self._commands = Commands(name, self._drives, frames, camera, period)
         self._lifecycle = Lifecycle(self._drives, self._messages, np.array(arm.home), params.power_time * 1e-9, homed=params.initial_state == "homed")
-        heeding = {"state_command": self._lifecycle.command, **self._commands.handlers}
-        names = [*COMMANDS, *(JAW_COMMANDS if self._drives.jaw else ())]
+        heeding = self._commands.handlers
+        self._state_port = f"{name}/state_command"
+        names = [*(command for command in COMMANDS if command != "state_command"), *(JAW_COMMANDS if self._drives.jaw else ())]
         self._ports = [(command, f"{name}/{command}", heeding[command]) for command in names]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
         self.state = (self._started, self._commands.ratio, self._lifecycle.flags, self._messages.state, *self._drives.state)
@@ -105,14 +107,16 @@ class Arm:
     def _heed(self, inputs: Inputs) -> bool:
         """Carry out what has arrived; return whether there was a command after which clients wait for the operating state."""
         awaited = False
+        for message in inputs.events(self._state_port):
+            awaited |= self._lifecycle.command(cast("StringStamped", message))
         for command, port, heed in self._ports:
             for message in inputs.events(port):
                 done = self._heed_one(command, heed, message)
-                awaited = awaited or (done and (command == "state_command" or "move_" in command))
+                awaited |= done and "move_" in command
         return awaited
 
     def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> bool:
-        if command not in _ANY_TIME and (reason := self._lifecycle.not_ready()):
+        if command != _ANY_TIME and (reason := self._lifecycle.not_ready()):
             self._messages.refuse(command, reason, ready=False)
             return False
         try:

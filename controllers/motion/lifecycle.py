@@ -62,13 +62,14 @@ class Lifecycle:
             return "the arm is homing, allowed when it is homed"
         return "" if self._homed[0] else "the arm is not homed, send state_command home first"
 
-    def command(self, message: StringStamped) -> None:
-        """Heed a `state_command`."""
+    def command(self, message: StringStamped) -> bool:
+        """Heed a `state_command`; return whether the state takes it."""
         if reason := refusal(self.state, message.string):
             self._messages.warning(reason)
-            return
+            return False
         self._commands[message.string]()
         self._messages.status(f"state_command {message.string}")
+        return True
 
     def watch(self, h: float) -> None:
         """Notice what has ended or gone wrong in the last step, of `h` seconds."""

@@ -13,10 +13,6 @@ class Result(IntEnum):
     Finished = 1
     Error = -1
 
-class Bound:
-    min: float
-    max: float
-
 class InputParameter:
     def __init__(self, dofs: int) -> None: ...
     current_position: Sequence[float] | NDArray[np.float64]
@@ -31,8 +27,6 @@ class Trajectory:
     def __init__(self, dofs: int) -> None: ...
     @property
     def duration(self) -> float: ...
-    @property
-    def position_extrema(self) -> list[Bound]: ...
     def at_time(self, time: float) -> tuple[list[float], list[float], list[float]]: ...
 
 class Ruckig:
