@@ -6,6 +6,7 @@ also survives a driver that crashes. `MUJOCO_GL`, if it is set, is obeyed (https
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 import sys
@@ -65,6 +66,7 @@ def _try(name: str) -> tuple[bool, str]:
 
 def context(name: str, width: int, height: int) -> Any:
     """Return a `GLContext` of MuJoCo, with `make_current` and `free`, of the OpenGL that MUJOCO_GL calls `name`."""
+    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)  # it reports that an optional package is not there
     os.environ["MUJOCO_GL"] = name  # MuJoCo's library asks it where OpenGL's functions are
     return import_module(f"mujoco.{'glfw' if name in _SCREEN else name}").GLContext(width, height)
 

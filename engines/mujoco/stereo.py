@@ -78,6 +78,9 @@ class StereoRenderer:
             eye.pos, eye.forward, eye.up = middle + side * self._camera.baseline * right, ahead, -down
             eye.frustum_center, eye.frustum_bottom, eye.frustum_top = 0.0, -top, top
             eye.frustum_near, eye.frustum_far, eye.orthographic = near, far, 0
+        lamp = self._scene.lights[0]
+        if lamp.headlight:  # MuJoCo has put it where its own camera is
+            lamp.pos, lamp.dir = middle, ahead
 
     def close(self) -> None:
         """Give the OpenGL context back. May be called twice."""

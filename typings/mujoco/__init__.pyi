@@ -45,7 +45,11 @@ class mjtCtrlInput(IntEnum):
 class mjtEq(IntEnum):
     mjEQ_JOINT = ...
 
+class mjtCone(IntEnum):
+    mjCONE_ELLIPTIC = ...
+
 class mjtIntegrator(IntEnum):
+    mjINT_DISCRETE = ...
     mjINT_IMPLICITFAST = ...
 
 class mjtObj(IntEnum):
@@ -67,6 +71,8 @@ class MjsCompiler:
 class MjOption:
     timestep: float
     integrator: mjtIntegrator
+    cone: mjtCone
+    impratio: float
 
 class MjsElement:
     name: str
