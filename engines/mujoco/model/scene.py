@@ -26,7 +26,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result = mujoco.MjSpec()
     result.modelname = scene.model
     result.compiler.degree = False
-    result.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    _set_options(result.option, grasping=bool(scene.objects))
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
@@ -37,6 +37,14 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     for name, thing in scene.objects.items():
         objects.add(result, name, thing)
     return result
+
+
+def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
+    """Choose how the model is stepped; where there is something to hold, so that friction holds it (docs/decisions/0012)."""
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    if grasping:
+        option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 100.0
 
 
 def _free_pose(params: ArmParams) -> Vector:
