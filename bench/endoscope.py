@@ -27,7 +27,6 @@ sys.path.remove(str(Path(__file__).parent))  # else bench/engines.py is the pack
 from engines.mujoco import opengl
 from engines.mujoco.endoscope_params import EndoscopeParams
 from engines.mujoco.endoscope_scene import EndoscopeScene
-from engines.mujoco.model import build
 
 ROUNDS, PAIRS_A_ROUND = 15, 20
 ARMS: dict[str, Any] = {arm: {"instrument": "LARGE_NEEDLE_DRIVER_400006"} for arm in ("PSM1", "PSM2", "PSM3")} | {"ECM": {"start": [0, 0, "0.12 m", 0]}}
@@ -39,12 +38,10 @@ VIEWS: dict[str, dict[str, Any]] = {"endoscope": {}, "overview": {"view": {"posi
 class Twice:
     """The same two pictures by `mujoco.Renderer`, one after the other."""
 
-    def __init__(self, params: EndoscopeParams, eyes: Sequence[mujoco.MjvGLCamera]) -> None:
-        self.eyes = eyes
-        self.model = build(params)
-        self.model.vis.quality.offsamples, self.model.vis.quality.shadowsize = 0, 0
-        self.data = mujoco.MjData(self.model)
-        self.renderer = mujoco.Renderer(self.model, params.height, params.width)
+    def __init__(self, model: mujoco.MjModel, params: EndoscopeParams, eyes: Sequence[mujoco.MjvGLCamera]) -> None:
+        self.eyes, self.model = eyes, model
+        self.data = mujoco.MjData(model)
+        self.renderer = mujoco.Renderer(model, params.height, params.width)
 
     def draw(self) -> None:
         mujoco.mj_forward(self.model, self.data)
@@ -71,7 +68,7 @@ def measure(view: dict[str, Any], gl: str) -> dict[str, float]:
     scene = EndoscopeScene(params, gl)
     positions = scene._model.qpos0
     scene.draw(positions)
-    twice = Twice(params, scene._renderer._scene.camera)
+    twice = Twice(scene._model, params, scene._renderer._scene.camera)
     ours, theirs = [], []
     for _ in range(ROUNDS):
         ours.append(cpu_time(lambda: scene.draw(positions)))
