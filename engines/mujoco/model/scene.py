@@ -13,8 +13,11 @@ from schemas.vectors import Vector
 
 __all__ = ["build", "spec"]
 
+_TIMESTEP = 5e-4
+"""s, unless whoever steps the model sets another: what `MujocoParams` has."""
 
-def build(scene: SceneParams, timestep: float = 5e-4) -> mujoco.MjModel:
+
+def build(scene: SceneParams, timestep: float = _TIMESTEP) -> mujoco.MjModel:
     """Return the compiled model of `scene`, to be stepped by `timestep` seconds."""
     result = spec(scene)
     result.option.timestep = timestep
@@ -26,6 +29,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result = mujoco.MjSpec()
     result.modelname = scene.model
     result.compiler.degree = False
+    result.option.timestep = _TIMESTEP
     _set_options(result.option, grasping=bool(scene.objects))
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
