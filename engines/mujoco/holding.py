@@ -22,16 +22,25 @@ _FOUND_AND_POSITION = 1 << 0 | 1 << 4
 """Of a contact sensor: how many contacts there are, and where (mjtConDataField)."""
 _CENTROID = 3
 """Of a contact sensor: all contacts as one, where their forces are (mjtConReduce netforce)."""
-_RIGID = {"solref": [2e-3, 1.0], "solimp": [0.99, 0.999, 1e-4, 0.5, 2.0]}
+_RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 _BRAKED = "ECM"
 
 
 def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
-    """Add to the model of `scene` what this module needs: contact sensors between fingers and objects, welds and brakes (neither active yet)."""
+    """Add to the model of `scene` what this module needs.
+
+    That is the tie that makes two fingers one jaw (however hard it closes, they do not give way together to one side), contact sensors
+    between fingers and objects, and, not active yet, welds and brakes.
+    """
     if _BRAKED in scene.arms:
         for joint in scene.arms[_BRAKED].chain.joints:
             name = f"{_BRAKED}/{joint.name}"
             spec.add_equality(name=f"{name}/brake", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name, active=False, **_RIGID)
+    for arm in _jawed(scene):
+        left, right = (f"{arm}/{finger}" for finger in FINGERS)
+        spec.add_equality(
+            name=f"{arm}/jaw", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=left, name2=right, data=[0.0, 1.0, *[0.0] * 10], **_RIGID
+        )
     for thing in scene.objects:
         for arm in _jawed(scene):
             for finger in FINGERS:
@@ -87,7 +96,7 @@ class Holding:
         self._settled = max(1, round(_SETTLED / period))
         self._numbers = [int(arm[-1]) for arm in arms]
         self._bodies = [model.body(thing).id for thing in things]
-        self._tips = [model.site(f"{arm}/tip").id for arm in arms]
+        self._fingers = [model.body(f"{arm}/{FINGERS[0]}").id for arm in arms]
         self._wrists = [model.body(f"{arm}/wrist_yaw").id for arm in arms]
         first = int(model.sensor(f"{things[0]}/{arms[0]}/{FINGERS[0]}").adr[0]) if things and arms else 0
         shape = (len(things), len(arms))
@@ -95,7 +104,7 @@ class Holding:
         self._welds = [[model.equality(f"{thing}/{arm}/weld").id for arm in arms] for thing in things] if scene.grasp == "weld" else None
         self._touched = np.zeros(shape)  # how often in succession both fingers were seen to touch
         self._holder = np.full(len(things), -1.0)  # index of an arm
-        self._grip = np.zeros((*shape, 6))  # where the fingers took hold: in the object, and in the arm's tip frame
+        self._grip = np.zeros((*shape, 6))  # where the fingers took hold: in the object, and in the left finger
         self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 3))
         self._height = data.xpos[self._bodies, 2].copy()
         self.outputs: dict[str, Vector] = {}
@@ -136,10 +145,10 @@ class Holding:
             self._holder[i] = int(np.argmax(holding)) if holding.any() else -1
 
     def _take(self, i: int, j: int) -> None:
-        data, body, tip = self._data, self._bodies[i], self._tips[j]
+        data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = self._contacts[i, j, :, 1:].mean(axis=0)
         self._grip[i, j, :3] = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
-        self._grip[i, j, 3:] = data.site_xmat[tip].reshape(3, 3).T @ (point - data.site_xpos[tip])
+        self._grip[i, j, 3:] = data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger])
         if self._welds is not None:
             wrist, weld = self._wrists[j], self._welds[i][j]
             position, turn, back = np.zeros(3), np.zeros(4), np.zeros(4)
@@ -150,9 +159,9 @@ class Holding:
             data.eq_active[weld] = 1
 
     def _slip(self, i: int, j: int) -> float:
-        data, body, tip = self._data, self._bodies[i], self._tips[j]
+        data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self._grip[i, j, :3]
-        return float(np.linalg.norm(data.site_xmat[tip].reshape(3, 3).T @ (point - data.site_xpos[tip]) - self._grip[i, j, 3:]))
+        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:]))
 
     @property
     def state(self) -> Vector:
@@ -166,4 +175,4 @@ class Holding:
         touched, holder, grip, welds = np.split(state, sizes)
         self._touched.flat, self._holder[:], self._grip.flat = touched, holder, grip
         if self._welds is not None:
-            self._model.eq_data[self._welds] = welds.reshape(len(self._bodies), len(self._tips), -1)
+            self._model.eq_data[self._welds] = welds.reshape(len(self._bodies), len(self._fingers), -1)

@@ -18,8 +18,8 @@ from schemas.vectors import Vector
 
 __all__ = ["CONTACT", "add", "add_table", "wire_inertia"]
 
-CONTACT: dict[str, Any] = {"condim": 4, "friction": [1.0, 0.005, 0.0001], "solref": [0.005, 1.0], "solimp": [0.95, 0.99, 0.0003, 0.5, 2.0], "priority": 1}
-"""How objects touch: by sliding and twisting friction, and stiffer than MuJoCo's default, so that a thin wire does not sink
+CONTACT: dict[str, Any] = {"condim": 4, "friction": [1.0, 0.005, 0.0001], "solref": [0.001, 1.0], "solimp": [0.999, 0.9999, 0.0001, 0.5, 2.0], "priority": 1}
+"""How objects touch: by sliding and twisting friction, and stiffer than MuJoCo's default, so that a light thin wire does not sink
 into a jaw (docs/decisions/0012). The priority makes this hold for every pair that has an object in it. Friction coefficients are
 MuJoCo's defaults; 1 stands for the knurled jaws of a needle driver."""
 
