@@ -48,7 +48,7 @@ def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     if grasping:
         option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 100.0
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
 
 
 def _free_pose(params: ArmParams) -> Vector:
