@@ -117,17 +117,22 @@ class Session:
                     log.error("ending the session: %s", error)  # at once: it may take a while until all have closed
                     raise
                 finally:
-                    self._interrupt.disarm()
                     self._close()
         finally:
             recorded = recorder.close() if recorder is not None else None
         return self._account.summary(recorded)
 
     def _start_and_step(self, progress: Callable[[Progress], None] | None) -> None:
+        """Run, and let nothing interrupt what comes after: one failure brings others, which may be told at any moment."""
         try:
-            self._start()
-            self._loop(progress)
-        except KeyboardInterrupt:
+            try:
+                self._start()
+                self._loop(progress)
+            finally:
+                self._interrupt.disarm()
+        except KeyboardInterrupt as interrupt:
+            if isinstance(interrupt.__context__, SessionError | ScenarioError):  # it was on its way already
+                raise interrupt.__context__ from None
             self._check()
             raise SessionError(f"interrupted at step {self._clock.step}") from None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from typing import TypeVar
 
@@ -86,8 +85,3 @@ def ros2msg_definition(name: str) -> str:
     """Return the definition of `name` and of every type it holds, as MCAP's `ros2msg` schema encoding wants it."""
     text, _ = typestore().generate_msgdef(name, ros_version=2)
     return text
-
-
-def custom_types() -> Iterator[str]:
-    """Yield the names of the types that ROS 2 does not bring: CRTK's and our own."""
-    return (name for name in message_types() if name.startswith(("crtk_msgs/", "trocar_msgs/")))

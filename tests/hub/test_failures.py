@@ -5,6 +5,7 @@ from time import monotonic_ns
 
 import pytest
 
+from hub import session as session_module
 from hub.recording import Recording
 from schemas.errors import ParticipantError, ScenarioError, SessionError
 from tests.hub.processes import processes
@@ -67,6 +68,22 @@ def test_a_participant_that_goes_wrong_is_named_with_step_and_cause(fail, how, p
     error = fail(TRIO, f"participants.bad.how={how}", "participants.bad.at=7", "window=3", *PLACEMENTS[placement])
     assert (error.participant, error.step) == ("bad", 7)
     assert CAUSES[how] in str(error)
+
+
+@pytest.mark.parametrize("place", ["ending", "telling"])
+def test_a_second_failure_does_not_take_the_place_of_the_first(prepare, monkeypatch, place):
+    """A process that has told its error ends, which the watchdog sees at some moment."""
+    session = prepare(TRIO, "participants.bad.how=raise")
+    owner, name = (session._interrupt, "disarm") if place == "ending" else (session_module.log, "error")
+    go_on = getattr(owner, name)
+
+    def fail_again(*arguments):
+        session._fail("sink", "its process is gone")
+        go_on(*arguments)
+
+    monkeypatch.setattr(owner, name, fail_again)
+    with pytest.raises(ParticipantError, match="'bad' failed at step 5: ArithmeticError: the rope is torn"):
+        session.run()
 
 
 @pytest.mark.parametrize("placement", ["hub", "process"])
