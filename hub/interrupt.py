@@ -20,6 +20,7 @@ class Interrupt:
 
     def __init__(self) -> None:
         self._armed = False
+        self._sending = threading.Lock()
         self._before: Any = None
 
     def __enter__(self) -> Self:
@@ -29,17 +30,19 @@ class Interrupt:
         return self
 
     def disarm(self) -> None:
-        """Raise nothing any more: the main thread is closing what it has opened."""
-        self._armed = False
+        """Raise nothing any more: the main thread is closing what it has opened. No signal is on its way from other threads after that."""
+        with self._sending:
+            self._armed = False
 
     def __call__(self) -> None:
         """Interrupt the main thread, also out of a call that sleeps."""
-        if not self._armed:
-            return
-        if hasattr(signal, "pthread_kill"):
-            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
-        else:
-            interrupt_main(signal.SIGTERM)
+        with self._sending:
+            if not self._armed:
+                return
+            if hasattr(signal, "pthread_kill"):
+                signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
+            else:
+                interrupt_main(signal.SIGTERM)
 
     def _raise(self, _number: int, _frame: FrameType | None) -> None:
         """Runs in the main thread, between two of its instructions: after `disarm` nothing can come."""
@@ -49,5 +52,5 @@ class Interrupt:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if self._before is not None:
-            self._armed = False
+            self.disarm()
             signal.signal(signal.SIGTERM, self._before)
