@@ -29,7 +29,11 @@ __all__ = ["MujocoEngine"]
 class _Keeper(Protocol):
     """What remembers something between steps that MuJoCo's own state does not hold."""
 
-    state: Vector
+    @property
+    def state(self) -> Vector: ...
+
+    @state.setter
+    def state(self, state: Vector) -> None: ...
 
 
 class MujocoEngine(Stepped):

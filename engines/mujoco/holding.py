@@ -173,6 +173,6 @@ class Holding:
     def state(self, state: Vector) -> None:
         sizes = np.cumsum([self._touched.size, self._holder.size, self._grip.size])
         touched, holder, grip, welds = np.split(state, sizes)
-        self._touched.flat, self._holder[:], self._grip.flat = touched, holder, grip
+        self._touched[:], self._holder[:], self._grip[:] = touched.reshape(self._touched.shape), holder, grip.reshape(self._grip.shape)
         if self._welds is not None:
             self._model.eq_data[self._welds] = welds.reshape(len(self._bodies), len(self._fingers), -1)

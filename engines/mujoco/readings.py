@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.mujoco.model import FINGERS, first_sensor
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import EcmParams, PsmParams
+from engines.mujoco.params import EcmParams, PsmParams, SceneArm
 from engines.mujoco.ports import has_jaw
 from engines.mujoco.servos import Servos
 from schemas.vectors import Vector
@@ -22,7 +23,7 @@ _JAW = np.array([[1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0],
 """Position, velocity and effort of a jaw of those of its two fingers: opened by both, with the torque of either."""
 
 
-def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[str, PsmParams | EcmParams]) -> None:
+def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams]) -> None:
     """Put the joints of `arms`, with linkages and fingers, where they start."""
     for arm, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
@@ -39,12 +40,12 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[str, PsmPara
 class Readings:
     """Views of the model's sensors by output port; what is no view is copied when it is due."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[str, PsmParams | EcmParams], servos: Servos) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams], servos: Servos) -> None:
         """Report on `arms`."""
         self._sensors, self._qpos = data.sensordata, np.empty(model.nq)
         self._positions = data.qpos
         self._jaws: list[tuple[Vector, Vector]] = []
-        poses: list[Vector] = []
+        poses: list[NDArray[np.intp]] = []
         self._poses = np.empty(7 * len(arms))
         self.outputs: dict[str, Vector] = {"qpos": self._qpos}
         for i, (arm, params) in enumerate(arms.items()):

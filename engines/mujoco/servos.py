@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import FINGERS
-from engines.mujoco.params import EcmParams, PsmParams
+from engines.mujoco.params import EcmParams, PsmParams, SceneArm
 from hub.inputs import Inputs
 from schemas.errors import SessionError
 from schemas.vectors import Vector
@@ -43,7 +43,7 @@ class _Group:
 class Servos:
     """Takes commands and modes, and keeps the setpoints. While all drives hold positions, a step allocates nothing."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[str, PsmParams | EcmParams], period: float) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams], period: float) -> None:
         """Drive `arms`, which are stepped every `period` seconds, from where they start."""
         self._model, self._data = model, data
         self._groups: list[_Group] = []
