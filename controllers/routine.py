@@ -38,7 +38,7 @@ class MoveTip(_Order):
     orientation: UnitQuaternion = Field(description="quaternion x, y, z, w")
     frame: str | None = Field(default=None, description="frame_id of the pose; default: the arm's own base, `<arm>_base`")
 
-    def command(self) -> tuple[str, Message]:
+    def message(self) -> tuple[str, Message]:
         """Return port and message."""
         (x, y, z), (i, j, k, w) = self.position, self.orientation
         pose = Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=i, y=j, z=k, w=w))
@@ -51,7 +51,7 @@ class MoveJoints(_Order):
     do: Literal["move_jp"]
     positions: tuple[float, ...] = Field(description="of all joints of the arm, in rad and m")
 
-    def command(self) -> tuple[str, Message]:
+    def message(self) -> tuple[str, Message]:
         """Return port and message."""
         return f"{self.arm}/move_jp", JointState(position=np.array(self.positions))
 
@@ -62,7 +62,7 @@ class MoveJaw(_Order):
     do: Literal["jaw"]
     angle: Angle
 
-    def command(self) -> tuple[str, Message]:
+    def message(self) -> tuple[str, Message]:
         """Return port and message."""
         return f"{self.arm}/jaw/move_jp", JointState(position=np.array([self.angle]))
 
@@ -71,11 +71,11 @@ class ChangeState(_Order):
     """Change the operating state."""
 
     do: Literal["state"]
-    command_: Literal["enable", "disable", "home", "unhome", "pause", "resume"] = Field(alias="command")
+    command: Literal["enable", "disable", "home", "unhome", "pause", "resume"]
 
-    def command(self) -> tuple[str, Message]:
+    def message(self) -> tuple[str, Message]:
         """Return port and message."""
-        return f"{self.arm}/state_command", StringStamped(string=self.command_)
+        return f"{self.arm}/state_command", StringStamped(string=self.command)
 
 
 class Wait(Params):
@@ -115,7 +115,7 @@ class Routine(Stepped):
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._arms = sorted({order.arm for step in params.steps for order in _orders(step)})
-        self._commands = sorted({order.command()[0] for step in params.steps for order in _orders(step)})
+        self._commands = sorted({order.message()[0] for step in params.steps for order in _orders(step)})
         self._position, self._done = np.zeros(1), np.zeros(1)
         self._begun = np.full(1, -1.0)  # ns; -1: the step has not begun
         self._busy = np.zeros(len(self._arms))  # 0: nothing is awaited, 1: busy is awaited, 2: not busy is awaited
@@ -124,7 +124,7 @@ class Routine(Stepped):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Per arm its events in and the commands that the steps need out; progress."""
-        types = {order.command()[0]: order.command()[1].ros_type for step in self.params.steps for order in _orders(step)}
+        types = {order.message()[0]: order.message()[1].ros_type for step in self.params.steps for order in _orders(step)}
         events = (("operating_state", OperatingState.ros_type), ("error", StringMessage.ros_type), ("warning", StringMessage.ros_type))
         return (
             *(Port(name=f"{arm}/{name}", causality="input", type=type_, variability="event") for arm in self._arms for name, type_ in events),
@@ -156,7 +156,7 @@ class Routine(Stepped):
     def _begin(self, step: Step, t: int) -> None:
         self._begun[0] = t
         for order in _orders(step):
-            port, message = order.command()
+            port, message = order.message()
             self._outputs[port] += (message,)
             self._busy[self._arms.index(order.arm)] = 1.0
 
