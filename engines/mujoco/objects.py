@@ -23,6 +23,11 @@ CONTACT: dict[str, Any] = {"condim": 4, "friction": [1.0, 0.005, 0.0001], "solre
 into a jaw (docs/decisions/0012). The priority makes this hold for every pair that has an object in it. Friction coefficients are
 MuJoCo's defaults; 1 stands for the knurled jaws of a needle driver."""
 
+_THINGS, _TABLE, _WIRES = 1, 32, 64
+"""Collision bits beside those of the arms (engines.mujoco.model.shapes): of whatever is no wire, as is MuJoCo's default; of tables; of wires among each other.
+A wire lies on a table with a few balls, so that one at rest costs a few contacts and not two for each of its capsules."""
+_BALLS_APART = pi / 4.0
+"""Greatest angle between two of those balls, rad."""
 _RGBA = {"ring": [0.85, 0.2, 0.15, 1.0], "needle": [0.8, 0.8, 0.85, 1.0], "block": [0.9, 0.75, 0.2, 1.0], "table": [0.32, 0.45, 0.4, 1.0]}
 _ROUNDNESS = 0.1
 """Greatest distance of a wire's capsules from its centre line, as a share of its radius."""
@@ -32,7 +37,7 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
     """Add the table to the world."""
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
-    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[x, y, z - half[2]], size=half, rgba=_RGBA["table"])
+    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[x, y, z - half[2]], size=half, conaffinity=_TABLE, rgba=_RGBA["table"])
 
 
 def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
@@ -51,14 +56,23 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
 def _add_wire(body: mujoco.MjsBody, params: RingParams | NeedleParams) -> None:
     radius, thickness = params.radius, params.wire_radius
     most = 2.0 * acos(1.0 - min(1.0, _ROUNDNESS * thickness / radius))  # the angle whose chord strays that far from its arc
-    count = max(4, ceil(params.arc / most))
-    angles = np.linspace(-params.arc / 2.0, params.arc / 2.0, count + 1)
-    points = radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(count + 1)], axis=1)  # (count + 1, 3)
+    points = _on_arc(params, max(4, ceil(params.arc / most)))
+    rgba = _RGBA[params.kind]
     for start, end in pairwise(points):
-        ends = np.concatenate([start, end])
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[thickness, 0.0, 0.0], fromto=ends, mass=0.0, rgba=_RGBA[params.kind], **CONTACT)
+        size, ends = [thickness, 0.0, 0.0], np.concatenate([start, end])
+        bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=size, fromto=ends, mass=0.0, rgba=rgba, **bits, **CONTACT)
+    for point in _on_arc(params, ceil(params.arc / _BALLS_APART)):
+        size, bits = [thickness, 0.0, 0.0], {"contype": _TABLE, "conaffinity": 0}
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=point, mass=0.0, rgba=rgba, **bits, **CONTACT)
     mass, centre, inertia = wire_inertia(radius, thickness, params.arc, params.density)
     body.mass, body.ipos, body.inertia, body.explicitinertial = mass, [centre, 0.0, 0.0], inertia, True
+
+
+def _on_arc(params: RingParams | NeedleParams, count: int) -> Vector:
+    """Return the ends of `count` equal pieces of the centre line, shape (count + 1, 3)."""
+    angles = np.linspace(-params.arc / 2.0, params.arc / 2.0, count + 1)
+    return params.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(count + 1)], axis=1)
 
 
 def wire_inertia(radius: float, thickness: float, arc: float, density: float) -> tuple[float, float, Vector]:
