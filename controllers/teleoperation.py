@@ -16,7 +16,7 @@ from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
 from robots import rotation
 from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS
+from robots.dvrk.instruments import instrument
 from robots.dvrk.parameters import ArmName, PsmPositions, UnitQuaternion
 from robots.inverse_kinematics import approach
 from schemas.errors import StateError
@@ -58,7 +58,7 @@ class Teleoperation(Stepped):
     def __init__(self, name: str, params: TeleoperationParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._chain = psm.chain(INSTRUMENTS["palpation-probe"])
+        self._chain = psm.chain(instrument("palpation-probe"))
         self._registration = np.array(params.registration)
         self._to_base = rotation.matrix(self._registration)
         self._state = np.zeros(24)

@@ -19,7 +19,7 @@ class Clock:
         self.late_steps = 0
         self._window = window
         self._realtime = realtime
-        self._steps = steps
+        self.steps = steps
         self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets})
         self._wall_zero_ns = monotonic_ns()
 
@@ -31,7 +31,7 @@ class Clock:
     @property
     def done(self) -> bool:
         """Say whether the run has all its steps."""
-        return self._steps is not None and self.step >= self._steps
+        return self.steps is not None and self.step >= self.steps
 
     def horizon(self, most: int | None = None) -> int:
         """Return how many steps the next grant covers.
@@ -39,8 +39,8 @@ class Clock:
         No participant that listens to a device may start a step inside a grant, or it would miss the newest samples.
         """
         count = self._window if most is None else min(self._window, most)
-        if self._steps is not None:
-            count = min(count, self._steps - self.step)
+        if self.steps is not None:
+            count = min(count, self.steps - self.step)
         for period in self._periods:
             count = min(count, period - self.step % period)
         return count

@@ -114,11 +114,6 @@ class RunState:
             self._changed.notify_all()
 
     @property
-    def paused(self) -> bool:
-        """Say whether no step may be taken now."""
-        return self._budget == 0
-
-    @property
     def ending(self) -> bool:
         """Say whether the session is to end."""
         return self._ending

@@ -11,6 +11,7 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.cells import INITIAL
 from hub.inlets import Inlets
 from hub.participant import Device
 from hub.plan import Member, Plan
@@ -18,6 +19,7 @@ from hub.wire import Drops, PortCodec, Tag
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
+from schemas.ports import Port
 
 __all__ = ["DeviceLoop", "ScriptedDevices"]
 
@@ -69,7 +71,7 @@ class DeviceLoop:
             if port.causality == "output"
         }
         self._subscribers = [
-            self._subscribe(session, keys, plan, outlet.source, outlet.source_port, outlet.device_port)
+            self._subscribe(session, keys, plan, outlet.source, outlet.source_port, member.port(outlet.device_port))
             for outlet in plan.outlets
             if outlet.device == member.name
         ]
@@ -80,14 +82,20 @@ class DeviceLoop:
         _open(self._name, self._device, directory)
         self._thread.start()
 
-    def _subscribe(self, session: zenoh.Session, keys: Keys, plan: Plan, source: str, source_port: str, port: str) -> zenoh.Subscriber[None]:
+    def _subscribe(self, session: zenoh.Session, keys: Keys, plan: Plan, source: str, source_port: str, port: Port) -> zenoh.Subscriber[None]:
         member = plan.members[source]
-        codec = PortCodec(member.port(source_port))
+        codec = PortCodec(member.port(source_port).model_copy(update={"variability": port.variability}))
+
+        newest = (INITIAL - 1, 0)
 
         def write(sample: zenoh.Sample) -> None:
+            nonlocal newest
             try:
-                Tag.of(sample)
-                self._device.write(port, codec.decode(sample.payload.to_bytes()))
+                tag = Tag.of(sample)
+                if not tag.count or (tag.step, tag.index) <= newest:  # no events, or the value at time 0 again
+                    return
+                newest = tag.step, tag.index
+                self._device.write(port.name, codec.decode(sample.payload.to_bytes()))
             except MessageError as error:
                 self._drops.count(sample, error)
 

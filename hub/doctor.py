@@ -8,7 +8,7 @@ import platform
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import distribution
+from importlib.metadata import distribution, entry_points
 from importlib.util import find_spec
 
 from hub import registry
@@ -33,8 +33,6 @@ class Finding:
 
 
 _LIBRARIES = (
-    ("OpenGL", "EGL", ("EGL",), "rendering without a screen on a GPU or Mesa", "apt-get install libegl1"),
-    ("OpenGL", "OSMesa", ("OSMesa",), "rendering without a screen on the CPU", "apt-get install libosmesa6"),
     ("device", "OpenHaptics", ("HD",), "haptic styluses of 3D Systems", "install the OpenHaptics SDK and driver of 3D Systems"),
     ("device", "LibOVR", ("LibOVRRT64_1", "OVRRT64_1"), "Oculus headsets", "install the Oculus runtime (Windows)"),
     ("device", "OpenXR", ("openxr_loader",), "head-mounted displays", "apt-get install libopenxr-loader1"),
@@ -47,8 +45,8 @@ _ROS = (
 
 
 def examine() -> list[Finding]:
-    """Look at Python, Zenoh, the extras, the kinds of participants, OpenGL, device libraries and ROS. Starts no device."""
-    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _extras, _kinds, _libraries, _ros)
+    """Look at Python, Zenoh, the extras, the kinds of participants, device libraries, OpenGL and ROS. Starts no device."""
+    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _extras, _kinds, _libraries, _checks, _ros)
     return [finding for section in sections for finding in section()]
 
 
@@ -87,6 +85,15 @@ def _libraries() -> Iterator[Finding]:
     for area, name, stems, use, remedy in _LIBRARIES:
         found = next((path for stem in stems if (path := ctypes.util.find_library(stem))), None)
         yield Finding(area, name, found is not None, f"{found or 'not found'}: {use}", remedy)
+
+
+def _checks() -> Iterator[Finding]:
+    """Try what packages bring by the entry-point group `trocar.checks`."""
+    for entry in sorted(entry_points(group="trocar.checks"), key=lambda e: e.name):
+        try:
+            yield Finding("machine", entry.name, *entry.load()())
+        except Exception as error:  # noqa: BLE001 - whatever a package's check does, the others go on
+            yield Finding("machine", entry.name, False, f"{entry.value} failed: {type(error).__name__}: {error}", f"report it to the makers of {entry.value}")
 
 
 def _ros() -> Iterator[Finding]:

@@ -22,6 +22,7 @@ from hub.plan import Member, Plan
 from hub.wire import PortCodec, PortPublisher, Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.lockstep import Permission, Report
+from schemas.message import Message
 from schemas.ports import BondSide, Port
 from schemas.vectors import VectorCodec
 
@@ -36,6 +37,10 @@ Done = Callable[[Member, Report], None]
 """Gets the report of a participant that has done its part of a grant."""
 
 
+_Messages = Callable[[Any, int], tuple[Message, ...]]
+"""Takes a value and the time (ns) at which it is valid."""
+
+
 @dataclass(slots=True)
 class _Reader:
     """An input port, the cell that feeds it, and how it is read."""
@@ -44,7 +49,8 @@ class _Reader:
     cell: Cell
     fresh: bool
     linear: bool
-    event: bool
+    messages: _Messages | None
+    """For an event port: what makes its messages of a value of the source; None for a signal."""
     stride_s: float
     seen: int = INITIAL
 
@@ -142,11 +148,10 @@ class Host:
         for link in self.plan.links:
             if link.target != slot.member.name:
                 continue
-            stride = self.plan.stride(link.source, link.source_port)
-            event = slot.member.port(link.target_port).variability == "event"
-            slot.readers.append(
-                _Reader(link.target_port, self._cell(link.source, link.source_port), link.fresh, link.linear, event, stride * self.plan.step_ns / 1e9)
-            )
+            source, target = self.plan.members[link.source].port(link.source_port), slot.member.port(link.target_port)
+            cell, messages = self._cell(link.source, link.source_port), _messages(source, target)
+            stride_s = self.plan.stride(link.source, link.source_port) * self._step_s
+            slot.readers.append(_Reader(target.name, cell, link.fresh, link.linear, messages, stride_s))
 
     def _cell(self, source: str, port: str) -> Cell:
         if source in self._by_name:
@@ -280,11 +285,11 @@ class Host:
     def _read(self, slot: _Slot, reader: _Reader, step: int) -> None:
         cell = reader.cell
         tag = cell.tag(step, fresh=reader.fresh)
-        if reader.event:
+        if reader.messages is not None:
             arrived: list[Any] = []
             while reader.seen < tag:
                 reader.seen = cell.after(reader.seen)
-                arrived.extend(cell.get(reader.seen))
+                arrived.extend(reader.messages(cell.get(reader.seen), cell.valid_from(reader.seen) * self.plan.step_ns))
             if arrived:
                 slot.events[reader.port] = tuple(arrived)
             return
@@ -346,3 +351,14 @@ def _start_value(port: Port) -> Any:
     if codec.vector is None:
         return None
     return codec.vector.neutral.copy() if port.start is None else np.array(port.start, np.float64)
+
+
+def _messages(source: Port, target: Port) -> _Messages | None:
+    if target.variability == "signal":
+        return None
+    if source.variability == "event":
+        return lambda value, _: value
+    codec = PortCodec(source.filled_from(target)).vector
+    if codec is None:
+        return lambda value, _: (value,)
+    return lambda value, time_ns: (codec.to_message(value, time_ns),)

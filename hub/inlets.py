@@ -46,8 +46,7 @@ class Inlets:
         for inlet in plan.inlets:
             port = plan.members[inlet.target].port(inlet.target_port)
             source = plan.members[inlet.device].port(inlet.device_port)
-            fit = source.model_copy(update={"frame": source.frame or port.frame, "names": source.names or port.names})
-            new = _Inlet(inlet.device, inlet.device_port, PortCodec(fit), simulated=plan.members[inlet.device].follows_clock)
+            new = _Inlet(inlet.device, inlet.device_port, PortCodec(source.filled_from(port)), simulated=plan.members[inlet.device].follows_clock)
             known = self._inlets.setdefault((inlet.device, inlet.device_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
         fed = {(link.target, link.target_port) for link in plan.links} | {(i.target, i.target_port) for i in plan.inlets}

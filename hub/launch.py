@@ -9,11 +9,11 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from hub import registry
+from hub.files import file_hashes
 from hub.participant import Device, Params, Stepped
 from hub.plan import Plan, make_plan
 from hub.scenario_file import ScenarioFile
 from hub.session import Session
-from hub.source import Source
 from schemas.scenario import Scenario
 
 __all__ = ["in_one_host", "launch", "plan_of"]
@@ -38,18 +38,21 @@ def launch(loaded: ScenarioFile, *, endpoint: str | None = None, record: Path | 
     plan, participants = plan_of(scenario, loaded.params)
     here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
     directory = loaded.source.directory
-    attachments = {} if record is None else _attachments(scenario, plan, loaded.source)
+    attachments = {} if record is None else _attachments(scenario, plan, loaded)
     return Session(scenario, plan, here, directory, endpoint=endpoint, record=record, attachments=attachments)
 
 
-def _attachments(scenario: Scenario, plan: Plan, source: Source) -> dict[str, bytes]:
+def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:
     """Return what a recording needs to be understood and re-simulated elsewhere."""
+    source = loaded.source
     versions = {"python": platform.python_version(), "platform": platform.platform()}
     versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}
+    read_here = [params for name, params in loaded.params.items() if scenario.participants[name].host != "remote"]
     return {
         "scenario.yaml": source.file.read_bytes(),
         "scenario.json": scenario.model_dump_json(indent=2).encode(),
         "plan.json": plan.model_dump_json(indent=2).encode(),
         "origin.json": json.dumps({"directory": str(source.directory), "overrides": sorted(set(source.overrides.values()))}, indent=2).encode(),
+        "files.json": json.dumps(file_hashes(read_here, source.directory), indent=2).encode(),
         "versions.json": json.dumps(versions, indent=2).encode(),
     }

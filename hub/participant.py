@@ -145,7 +145,7 @@ class Device(_Participant):
         """Return what is new up to time `t` (ns since the session's start, wall or simulated), oldest first."""
 
     def write(self, port: str, value: Value) -> None:
-        """Take the newest value of an input port. A device without inputs is never written to."""
+        """Take the newest value of a signal, or the next message of an event port. A device without inputs is never written to."""
 
 
 def state_hash(*parts: bytes | Vector) -> int:

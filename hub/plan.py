@@ -9,10 +9,11 @@ from pydantic import BaseModel, ConfigDict
 
 from hub.coupling import bond_plans, is_fresh
 from hub.participant import BondPlan, Device, Stepped
+from hub.wildcard import spelt_out
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import BondSide, Port, bond_ports
 from schemas.quantity import same_unit
-from schemas.scenario import Bond, Endpoint, Scenario
+from schemas.scenario import Bond, Connection, Endpoint, Scenario
 from schemas.vectors import VectorCodec, has_vector
 
 __all__ = ["Inlet", "Link", "Member", "Plan", "PlannedBond", "make_plan"]
@@ -125,8 +126,10 @@ def make_plan(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
     bonds = [_planned_bond(scenario, participants, i) for i in range(len(scenario.bonds))]
     members = {name: _member(scenario, participants[name], roles[name], bonds) for name in scenario.participants}
     wiring = _Wiring(scenario, members)
-    for index in range(len(scenario.connections)):
-        wiring.connect(index)
+    ports = {name: member.ports for name, member in members.items()}
+    for index, connection in enumerate(scenario.connections):
+        for single in spelt_out(connection, ports, ("connections", index)):
+            wiring.connect(single, ("connections", index))
     for index, planned in enumerate(bonds):
         wiring.couple(index, planned)
     wiring.check_inputs()
@@ -227,15 +230,15 @@ class _Wiring:
                 stepped = [n for n, m in members.items() if m.role != "device"]
                 raise ScenarioError(f"unknown stepped participant '{name}'.{did_you_mean(name, stepped)}", path=("order", index))
 
-    def connect(self, index: int) -> None:
-        connection, path = self._scenario.connections[index], ("connections", index)
+    def connect(self, connection: Connection, path: Path) -> None:
         source = self._resolve(connection.source, "output", path)
         target = self._resolve(connection.target, "input", path)
         _check_fit(connection.source, source, connection.target, target, path)
         self._feed(connection.target, str(connection.source), path)
         one, other = connection.source, connection.target
-        if connection.extrapolation == "linear" and not has_vector(target.type):
-            raise ScenarioError(f"values of {target.type} cannot be extrapolated", path=path)
+        if connection.extrapolation == "linear" and (target.variability == "event" or not has_vector(target.type)):
+            values = f"values of {target.type}" if target.variability == "signal" else "events"
+            raise ScenarioError(f"{values} cannot be extrapolated, as '{connection.source} -> {connection.target}' would", path=path)
         from_device, to_device = (self._members[end.participant].role == "device" for end in (one, other))
         if from_device and to_device:
             raise ScenarioError("a device cannot feed a device: both live in wall time", path=path)
@@ -281,9 +284,9 @@ class _Wiring:
         return ports[end.port]
 
     def _feed(self, end: Endpoint, source: str, path: Path) -> None:
-        before = self._fed.setdefault((end.participant, end.port), source)
-        if before != source:
+        if (before := self._fed.get((end.participant, end.port))) is not None:
             raise ScenarioError(f"input '{end}' is fed twice, by '{before}' and by '{source}'", path=path)
+        self._fed[end.participant, end.port] = source
 
     def check_inputs(self) -> None:
         """Refuse an input that has neither a source nor a start value."""
@@ -316,15 +319,15 @@ def _end(side: Endpoint, port: Port) -> Endpoint:
 def _check_fit(one: Endpoint, source: Port, other: Endpoint, target: Port, path: Path) -> None:
     if source.type != target.type:
         raise ScenarioError(f"'{one}' gives {source.type}, '{other}' takes {target.type}", path=path)
-    if source.variability != target.variability:
-        raise ScenarioError(f"'{one}' is of variability {source.variability}, '{other}' of variability {target.variability}", path=path)
+    if (source.variability, target.variability) == ("event", "signal"):
+        raise ScenarioError(f"'{one}' gives events, '{other}' takes a signal, which has a value at all times", path=path)
     if not same_unit(source.unit, target.unit):
         raise ScenarioError(f"'{one}' is in '{source.unit}', '{other}' takes '{target.unit}'", path=path)
     if source.frame and target.frame and source.frame != target.frame:
         raise ScenarioError(f"'{one}' is in frame '{source.frame}', '{other}' takes frame '{target.frame}'", path=path)
     if has_vector(source.type) and source.variability == "signal":
         sizes = VectorCodec(source).size, VectorCodec(target).size
-        if sizes[0] != sizes[1]:
+        if sizes[0] != sizes[1] and target.variability == "signal":
             raise ScenarioError(f"'{one}' has {sizes[0]} numbers, '{other}' takes {sizes[1]}", path=path)
         if source.names and target.names and source.names != target.names:
             raise ScenarioError(f"'{one}' names {', '.join(source.names)}; '{other}' takes {', '.join(target.names)}", path=path)

@@ -45,11 +45,18 @@ class Recording(Bag):
 
     def versions(self) -> dict[str, str]:
         """Return the versions of the packages that recorded; empty if they are not stated."""
+        return self._table("versions.json")
+
+    def files(self) -> dict[str, str]:
+        """Return the SHA-256 of the files that the participants read, by path; empty if they are not stated."""
+        return self._table("files.json")
+
+    def _table(self, name: str) -> dict[str, str]:
         try:
-            content = json.loads(self.attachments.get("versions.json", b"{}"))
-            return {str(name): str(version) for name, version in content.items()}
+            content = json.loads(self.attachments.get(name, b"{}"))
+            return {str(key): str(value) for key, value in content.items()}
         except (AttributeError, ValueError) as error:
-            raise RecordingError(f"'{self.file}': attachment versions.json is no table of versions: {error}") from error
+            raise RecordingError(f"'{self.file}': attachment {name} is no table: {error}") from error
 
     def session(self) -> str:
         """Return the name of the session."""

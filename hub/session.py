@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import logging
 import math
 import secrets
-import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from time import monotonic, monotonic_ns, sleep
@@ -15,6 +13,7 @@ from time import monotonic, monotonic_ns, sleep
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
+from hub.account import Account
 from hub.clock import Clock
 from hub.control import ControlServer, RunState
 from hub.coupling import stable_step_problem
@@ -30,7 +29,7 @@ from hub.membership import Failures, Membership
 from hub.observers import Observers
 from hub.participant import Device, Stepped
 from hub.plan import Member, Plan
-from hub.recorder import Recorder, RecorderSummary
+from hub.recorder import Recorder
 from hub.summary import Progress, Summary
 from hub.wire import Drops, Wire, open_session
 from schemas.codec import decode, encode
@@ -40,7 +39,7 @@ from schemas.lockstep import Permission, Report, pack_permission, unpack_report
 from schemas.ports import BondSide
 from schemas.ros import StringMessage
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import Grant, ParticipantStatus, SessionStatus
+from schemas.trocar_msgs import Grant
 
 __all__ = ["Session"]
 
@@ -84,21 +83,15 @@ class Session:
         self._on_report = on_report
         self._run_id = secrets.randbits(63) | 1
         self._keys = Keys(scenario.name)
-        self._steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
-        self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=self._steps)
+        steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
+        self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
         self._inlets = Inlets(plan)
-        self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
-        self._last_steps = dict.fromkeys(plan.order, -1)
         self._drops = Drops()
         self._away = {name for name in plan.order if plan.members[name].host != "hub"}
         self._common_period = math.lcm(*(plan.members[name].period for name in plan.order))
         self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
         self._reports: list[tuple[Member, Report, bytes | None]] = []
         self._interrupt = Interrupt()
-        self._phase = "starting"
-        self._detail = ""
-        self._started_ns: int | None = None
-        self._wall_ns: int | None = None
 
     # --- the run ---------------------------------------------------------------------------------------------------
 
@@ -114,19 +107,20 @@ class Session:
         try:
             with self._interrupt, open_session("router", listen=[self.endpoint]) as session:
                 self._observers = Observers(self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder)
+                self._account = Account(self.scenario, self.plan, self._run_id, self._clock, self._drops, self._observers)
                 self._open(session)
                 try:
                     self._start_and_step(progress)
-                    self._phase = "done"
+                    self._account.phase = "done"
                 except SessionError as error:
-                    self._detail = str(error)
+                    self._account.detail = str(error)
                     log.error("ending the session: %s", error)  # at once: it may take a while until all have closed
                     raise
                 finally:
                     self._close()
         finally:
             recorded = recorder.close() if recorder is not None else None
-        return self._summary(recorded)
+        return self._account.summary(recorded)
 
     def _start_and_step(self, progress: Callable[[Progress], None] | None) -> None:
         """Run, and let nothing interrupt what comes after: one failure brings others, which may be told at any moment."""
@@ -240,8 +234,7 @@ class Session:
         self._watchdog.wait_for(())
 
     def _loop(self, progress: Callable[[Progress], None] | None) -> None:
-        self._phase = "running"
-        self._started_ns = monotonic_ns()
+        self._account.start()
         shown = told = 0.0
         self._clock.start()
         while not self._clock.done and not self.state.ending:
@@ -257,23 +250,23 @@ class Session:
             now = monotonic()
             if progress is not None and now - shown > _PROGRESS_S:
                 shown = now
-                progress(self._progress())
+                progress(self._account.progress())
             if now - told > _STATUS_S:
                 told = now
                 self._tell_status()
-        self._wall_ns = monotonic_ns() - self._started_ns
+        self._account.stop()
         self._host.drain()
         self._settle()
         if progress is not None:
-            progress(self._progress())
+            progress(self._account.progress())
 
     def _wait_while_paused(self) -> None:
         self._settle()
-        self._phase = "paused"  # after the reports are booked: a status that says so tells the steps taken
+        self._account.phase = "paused"  # after the reports are booked: a status that says so tells the steps taken
         self._tell_status()
         while not self.state.wait(0.2):
             self._check()
-        self._phase = "running"
+        self._account.phase = "running"
         self._clock.start()
 
     def _next_grant(self, budget: int | None) -> Permission | None:
@@ -359,18 +352,15 @@ class Session:
 
     def _take(self, member: Member, report: Report, payload: bytes | None) -> None:
         """Book what a participant reports: its hashes, its last step, the work of its bonds."""
-        self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
-        first = report.step + -report.step % member.period
-        last = self._last_steps[member.name] = first + (len(report.state_hash) - 1) * member.period
-        self._observers.report(member, report, (last + member.period) * self.plan.step_ns, payload)
+        self._observers.report(member, report, self._account.book(member, report), payload)
         if self._on_report is not None:
             self._on_report(member, report)
 
     def _close(self) -> None:
         """End processes and close everything; the hosts end when the hub's token is gone."""
         self._settle()
-        if self._phase != "done":
-            self._phase = "failed"
+        if self._account.phase != "done":
+            self._account.phase = "failed"
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()
@@ -414,7 +404,7 @@ class Session:
         self._membership.lose(member.host)
         if member.role == "device":
             log.warning("device '%s' is gone; it may join again", name)
-        elif self._phase in ("starting", "running", "paused"):
+        elif self._account.phase in ("starting", "running", "paused"):
             self._fail(name, "its host is gone")
 
     def _inlet_callback(self, device: str, port: str) -> Callback[zenoh.Sample]:
@@ -436,61 +426,9 @@ class Session:
 
     def _answer_status(self, query: zenoh.Query) -> None:
         with query:
-            query.reply(self._keys.status, encode(self.status()), encoding=zenoh.Encoding.APPLICATION_CDR)
+            query.reply(self._keys.status, encode(self._account.status(self._membership.pid)), encoding=zenoh.Encoding.APPLICATION_CDR)
 
     def _tell_status(self) -> None:
-        status = self.status()
+        status = self._account.status(self._membership.pid)
         self._observers.status(status)
         self._status_publisher.put(encode(status))
-
-    def status(self) -> SessionStatus:
-        """Return what the session is doing now."""
-        members = [
-            ParticipantStatus(name=m.name, role=m.role, host=m.host, pid=self._membership.pid(m.host), step=self._last_steps.get(m.name, self._clock.step))
-            for m in self.plan.members.values()
-        ]
-        progress = self._progress()
-        return SessionStatus(
-            session=self.scenario.name,
-            run=self._run_id,
-            state=self._phase,
-            step=progress.step,
-            sim_time_ns=self._clock.time_ns,
-            real_time_factor=progress.real_time_factor,
-            late_steps=progress.late_steps,
-            dropped_messages=self._dropped,
-            detail=self._detail,
-            participants=members,
-        )
-
-    @property
-    def _dropped(self) -> int:
-        return self._drops.total + self._observers.drops.total
-
-    def _progress(self) -> Progress:
-        sim_s = self._clock.time_ns / 1e9
-        running_ns = 0 if self._started_ns is None else monotonic_ns() - self._started_ns
-        wall_ns = running_ns if self._wall_ns is None else self._wall_ns
-        factor = sim_s / (wall_ns / 1e9) if wall_ns else 0.0
-        return Progress(self._clock.step, self._steps, sim_s, factor, self._clock.late_steps, self._observers.measures.live())
-
-    def _summary(self, recorded: RecorderSummary | None) -> Summary:
-        digest = hashlib.blake2b(digest_size=16)
-        for name, part in sorted(self._digests.items()):
-            digest.update(name.encode() + part.digest())
-        progress = self._progress()
-        return Summary(
-            session=self.scenario.name,
-            state=self._phase,
-            steps=progress.step,
-            sim_time_s=progress.sim_time_s,
-            wall_time_s=(self._wall_ns or 0) / 1e9,
-            real_time_factor=progress.real_time_factor,
-            late_steps=progress.late_steps,
-            dropped_messages=self._dropped,
-            state_hash=digest.hexdigest(),
-            recording=None if recorded is None else str(recorded.path),
-            recording_complete=None if recorded is None else recorded.complete,
-            energy_residual_j=self._observers.energy.residual_j,
-            measures=self._observers.measures.results(),
-        )

@@ -18,6 +18,7 @@ Location = tuple[str | int, ...]
 """Keys and list indices from the root of the scenario."""
 
 _Mark = tuple[int, int]
+_MERGE = "tag:yaml.org,2002:merge"
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,9 @@ def read(file: Path) -> Source:
     """Return the scenario text in `file`. Raises ScenarioError if it cannot be read or is not one YAML mapping."""
     try:
         text = file.read_text(encoding="utf-8")
-        tree: Any = _yaml().load(text)
+        tree: Any = _copied(_yaml().load(text))
         root: Any = _yaml().compose(text)
+        marks = {} if root is None else dict(_marks(root, root, ()))
     except MarkedYAMLError as error:
         detail: Any = error
         mark = detail.problem_mark
@@ -84,9 +86,11 @@ def read(file: Path) -> Source:
         raise ScenarioError(f"{file}{where}: not valid YAML: {detail.problem}{f' ({detail.context})' if detail.context else ''}") from error
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise ScenarioError(f"{file}: cannot be read: {error}") from error
+    except RecursionError:
+        raise ScenarioError(f"{file}: nested too deeply: does an alias (*name) stand inside what it is an alias of?") from None
     if not isinstance(tree, dict):
         raise ScenarioError(f"{file}:1:1: a scenario is a mapping with at least the keys name, step and participants")
-    return Source(file, cast("dict[str, Any]", tree), dict(_marks(root, root, ())))
+    return Source(file, cast("dict[str, Any]", tree), marks)
 
 
 def _yaml() -> Any:
@@ -94,15 +98,33 @@ def _yaml() -> Any:
 
 
 def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tuple[_Mark, _Mark]]]:
-    """Yield where each value below a YAML node stands."""
+    """Yield where each value below a YAML node stands, the place that counts last: a key of one's own goes before a merged one."""
+    if value.id == "mapping":
+        for merged in _merged(value):
+            yield from _marks(key, merged, path)
     empty = value.start_mark.index == value.end_mark.index  # `key:` without a value: the parser is already on the next line
     yield path, (_mark(key), _mark(key if empty else value))
     if value.id == "mapping":
         for name, child in value.value:
-            yield from _marks(name, child, (*path, name.value))
+            if name.tag != _MERGE:
+                yield from _marks(name, child, (*path, name.value))
     elif value.id == "sequence":
         for index, child in enumerate(value.value):
             yield from _marks(child, child, (*path, index))
+
+
+def _merged(mapping: Any) -> Iterator[Any]:
+    """Yield the nodes that `<<` merges into a mapping; of several that have a key the first one counts, so it comes last."""
+    for name, child in mapping.value:
+        if name.tag == _MERGE:
+            yield from reversed(child.value) if child.id == "sequence" else (child,)
+
+
+def _copied(value: Any) -> Any:
+    """Return a YAML tree in which no part is shared: what an alias stands for can then be overridden in one place alone."""
+    if isinstance(value, dict):
+        return {key: _copied(part) for key, part in cast("dict[Any, Any]", value).items()}
+    return [_copied(part) for part in cast("list[Any]", value)] if isinstance(value, list) else value
 
 
 def _mark(node: Any) -> _Mark:

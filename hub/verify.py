@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from hub import registry
+from hub.files import changed_files
 from hub.plan import Member, Plan
 from hub.recording import Recording
 from hub.session import Session
@@ -17,6 +19,8 @@ from schemas.lockstep import Report
 from schemas.trocar_msgs import Ack
 
 __all__ = ["VerifySummary", "verify"]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ def verify(recording: Recording, *, endpoint: str | None = None, progress: Calla
     scenario, plan, directory = recording.scenario().model_copy(update={"pace": "fast"}), _plan(recording), _directory(recording)
     here = [member for member in plan.members.values() if member.host == "hub" and member.role != "device"]
     made = {member.name: registry.make(member.kind, member.name, scenario.participants[member.name].params, directory) for member in here}
+    for path in changed_files(recording.files()):
+        log.warning("'%s' is not the file that was read when this was recorded: expect differences", path)
     comparison = _Comparison(recording, plan)
     session = Session(scenario, plan, made, directory, endpoint=endpoint, grants=recording.grants(), on_report=comparison.take)
     comparison.stop = session.state.shutdown

@@ -1,18 +1,21 @@
 """Kinematics of a serial chain in modified Denavit-Hartenberg form.
 
 Link i stands to link i-1 as Rx(alpha) Tx(a) Rz(theta) Tz(d) (Craig, Introduction to Robotics, section 3.4); q is added to
-theta of a revolute and to d of a prismatic joint.
+theta of a revolute and to d of a prismatic joint. A table in standard form becomes one in modified form by `from_standard`.
+
+A chain takes one configuration, shape (n,), or many at once, shape (..., n).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import cos, sin
+from dataclasses import dataclass, replace
+from math import cos, inf, sin
 from typing import Literal
 
 import numpy as np
 
+from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = ["Joint", "SerialChain"]
@@ -20,7 +23,7 @@ __all__ = ["Joint", "SerialChain"]
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: its modified DH row (rad, m) and what it can do (rad, m; rad/s, m/s; N m, N)."""
+    """One joint: its modified DH row (rad, m) and what it can do (rad, m; rad/s, m/s; N m, N; rad/s^2, m/s^2; rad/s^3, m/s^3)."""
 
     name: str
     kind: Literal["revolute", "prismatic"]
@@ -30,8 +33,15 @@ class Joint:
     theta: float
     lower: float
     upper: float
-    velocity: float
-    effort: float
+    velocity: float = inf
+    effort: float = inf
+    acceleration: float = inf
+    jerk: float = inf
+
+    @property
+    def unit(self) -> str:
+        """Of a position: rad or m."""
+        return "rad" if self.kind == "revolute" else "m"
 
     def transform(self, q: float) -> Vector:
         """Return the pose of this link in the link before it, shape (4, 4), at joint position `q`."""
@@ -51,13 +61,22 @@ def _sin(angle: float) -> float:
 class SerialChain:
     """Forward kinematics and geometric Jacobian of n joints and a tip fixed to the last link."""
 
-    def __init__(self, joints: Sequence[Joint], tip: Vector) -> None:
-        """Take the joints from the base outwards, and the pose of the tip in the last link's frame, shape (4, 4)."""
+    def __init__(self, joints: Sequence[Joint], tip: Vector, base: Vector | None = None) -> None:
+        """Take the joints from the base outwards.
+
+        Args:
+            joints: the n joints.
+            tip: pose of the tip in the last link's frame, shape (4, 4).
+            base: pose of the frame before the first joint in the base frame, shape (4, 4); None where they are one.
+        """
         self.joints = tuple(joints)
         self.tip = tip
         self.lower = np.array([joint.lower for joint in joints])  # (n,)
         self.upper = np.array([joint.upper for joint in joints])  # (n,)
         self.velocity = np.array([joint.velocity for joint in joints])  # (n,)
+        self.acceleration = np.array([joint.acceleration for joint in joints])  # (n,)
+        self.jerk = np.array([joint.jerk for joint in joints])  # (n,)
+        self.effort = np.array([joint.effort for joint in joints])  # (n,)
         self._prismatic = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
         # A link's transform is affine in (cos q, sin q) or in q: all of them come from one multiplication.
         zero = np.array([joint.transform(0.0) for joint in joints])
@@ -67,11 +86,27 @@ class SerialChain:
         constant = np.where(revolute, (zero + half) / 2, zero)
         cosine = np.where(revolute, (zero - half) / 2, 0.0)
         other = quarter - constant  # factor of sin q, or of q
-        self._basis = np.stack([constant, cosine, other], axis=1).reshape(len(self.joints), 3, 16)
+        basis = np.stack([constant, cosine, other], axis=1)  # (n, 3, 4, 4)
+        if base is not None:
+            basis[0] = base @ basis[0]
+        self._basis = basis.reshape(len(self.joints), 3, 16)
         self._factors = np.ones((len(self.joints), 1, 3))
 
+    @classmethod
+    def from_standard(cls, joints: Sequence[Joint], tip: Vector) -> SerialChain:
+        """Return the chain whose joints carry rows of standard form: link i stands to link i-1 as Rz(theta) Tz(d) Tx(a) Rx(alpha).
+
+        Only the frames between base and tip differ from those of the standard form: each stands before the a and alpha
+        of its own row, which go to the row after it, the last ones to the tip.
+        """
+        last = Joint("", "revolute", joints[-1].alpha, joints[-1].a, 0.0, 0.0, 0.0, 0.0).transform(0.0)
+        before = [(0.0, 0.0), *((joint.alpha, joint.a) for joint in joints[:-1])]
+        return cls([replace(joint, alpha=alpha, a=a) for joint, (alpha, a) in zip(joints, before, strict=True)], last @ tip)
+
     def frames(self, q: Vector) -> Vector:
-        """Return the poses of all links and of the tip in the base frame, shape (n + 1, 4, 4), at `q`, shape (n,)."""
+        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4), at `q`, shape (..., n)."""
+        if q.ndim > 1:
+            return self._frames_of_many(q)
         n = len(self.joints)
         factors = self._factors
         np.cos(q, out=factors[:, 0, 1])
@@ -85,19 +120,62 @@ class SerialChain:
         np.matmul(pose, self.tip, out=poses[n])
         return poses
 
-    def forward(self, q: Vector) -> Vector:
-        """Return the pose of the tip in the base frame, shape (4, 4)."""
-        return self.frames(q)[-1]
+    def _frames_of_many(self, q: Vector) -> Vector:
+        n = len(self.joints)
+        factors = np.stack([np.ones_like(q), np.cos(q), np.sin(q)], axis=-1)[..., None, :]  # (..., n, 1, 3)
+        factors[..., self._prismatic, 0, 2] = q[..., self._prismatic]
+        links = (factors @ self._basis).reshape(*q.shape, 4, 4)
+        poses = np.empty((*q.shape[:-1], n + 1, 4, 4))
+        poses[..., 0, :, :] = links[..., 0, :, :]
+        for i in range(1, n):
+            poses[..., i, :, :] = poses[..., i - 1, :, :] @ links[..., i, :, :]
+        poses[..., n, :, :] = poses[..., n - 1, :, :] @ self.tip
+        return poses
 
-    def jacobian(self, frames: Vector) -> Vector:
-        """Return J, shape (6, n), with twist of the tip (m/s, rad/s; in the base frame) = J dq, from `frames(q)`."""
-        jacobian = np.empty((6, len(self.joints)))
-        zx, zy, zz = axes = frames[:-1, :3, 2].T  # (3, n)
-        rx, ry, rz = frames[-1, :3, 3:] - frames[:-1, :3, 3].T  # (3, n)
-        jacobian[0] = zy * rz - zz * ry
-        jacobian[1] = zz * rx - zx * rz
-        jacobian[2] = zx * ry - zy * rx
-        jacobian[3:] = axes
-        jacobian[:3, self._prismatic] = axes[:, self._prismatic]
-        jacobian[3:, self._prismatic] = 0.0
+    def out_of_range(self, q: Vector, *, slack: float = 0.0) -> list[str]:
+        """Return what is wrong with the positions `q`, shape (n,): a sentence for each joint outside its range by more than `slack`."""
+        return [
+            f"joint {joint.name} at {value:.6g} {joint.unit}, allowed are {joint.lower:g} .. {joint.upper:g}"
+            for joint, value in zip(self.joints, q.tolist(), strict=True)
+            if not joint.lower - slack <= value <= joint.upper + slack
+        ]
+
+    def check(self, q: Vector) -> None:
+        """Raise MotionError if `q` is not n finite numbers, each inside the range of its joint."""
+        names = ", ".join(joint.name for joint in self.joints)
+        if q.shape != (len(self.joints),):
+            raise MotionError(f"positions of shape {q.shape}, expected {len(self.joints)}: {names}")
+        if not np.isfinite(q).all():
+            raise MotionError(f"not all positions are finite: {q.tolist()} of {names}")
+        if wrong := self.out_of_range(q):
+            raise MotionError("; ".join(wrong))
+
+    def forward(self, q: Vector) -> Vector:
+        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n)."""
+        return self.frames(q)[..., -1, :, :]
+
+    def jacobian(self, frames: Vector, *, frame: Literal["base", "tip"] = "base") -> Vector:
+        """Return J, shape (..., 6, n), with twist of the tip (m/s, rad/s) = J dq, from `frames(q)`.
+
+        Args:
+            frames: what `frames(q)` returned.
+            frame: in which the twist is expressed; its point is the tip's origin either way (CRTK's spatial and body Jacobian
+                differ by this rotation).
+        """
+        axes = frames[..., :-1, :3, 2]  # (..., n, 3)
+        arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]  # (..., n, 3)
+        zx, zy, zz = axes[..., 0], axes[..., 1], axes[..., 2]
+        rx, ry, rz = arms[..., 0], arms[..., 1], arms[..., 2]
+        jacobian = np.empty((*frames.shape[:-3], 6, len(self.joints)))
+        jacobian[..., 0, :] = zy * rz - zz * ry
+        jacobian[..., 1, :] = zz * rx - zx * rz
+        jacobian[..., 2, :] = zx * ry - zy * rx
+        turned = axes.swapaxes(-1, -2)  # (..., 3, n)
+        jacobian[..., 3:, :] = turned
+        jacobian[..., :3, self._prismatic] = turned[..., self._prismatic]
+        jacobian[..., 3:, self._prismatic] = 0.0
+        if frame == "tip":
+            to_tip = frames[..., -1, :3, :3].swapaxes(-1, -2)
+            jacobian[..., :3, :] = to_tip @ jacobian[..., :3, :]
+            jacobian[..., 3:, :] = to_tip @ jacobian[..., 3:, :]
         return jacobian

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from typing import TypeVar
 
@@ -10,7 +9,7 @@ from pydantic import ValidationError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from schemas import ros, trocar_msgs
+from schemas import crtk, ros, trocar_msgs
 from schemas.errors import MessageError, did_you_mean
 from schemas.message import Message, msg_text
 
@@ -28,7 +27,7 @@ M = TypeVar("M", bound=Message)
 @cache
 def message_types() -> dict[str, type[Message]]:
     """Return every message model by its ROS type name."""
-    models = (value for module in (ros, trocar_msgs) for value in vars(module).values())
+    models = (value for module in (ros, crtk, trocar_msgs) for value in vars(module).values())
     return {m.ros_type: m for m in models if isinstance(m, type) and issubclass(m, Message) and m is not Message}
 
 
@@ -42,7 +41,7 @@ def message_type(name: str) -> type[Message]:
 
 @cache
 def typestore() -> Typestore:
-    """Return the type store: ROS 2 Jazzy and our own types."""
+    """Return the type store: ROS 2 Jazzy, CRTK and our own types."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, model in message_types().items():
         if name not in store.types:
@@ -86,8 +85,3 @@ def ros2msg_definition(name: str) -> str:
     """Return the definition of `name` and of every type it holds, as MCAP's `ros2msg` schema encoding wants it."""
     text, _ = typestore().generate_msgdef(name, ros_version=2)
     return text
-
-
-def custom_types() -> Iterator[str]:
-    """Yield the names of our own types."""
-    return (name for name in message_types() if name.startswith("trocar_msgs/"))

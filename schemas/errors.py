@@ -8,6 +8,7 @@ TrocarError
 │   ├── ParticipantError   a participant raised, died or stopped answering
 │   └── StateError         a participant cannot save or restore its state
 ├── RecordingError         a recording cannot be written, read or re-simulated
+├── MotionError            an arm cannot be or go where it was asked to
 └── ConnectError           no hub, or not the hub that was asked for
 """
 
@@ -20,6 +21,7 @@ __all__ = [
     "ConnectError",
     "MessageError",
     "MissingExtraError",
+    "MotionError",
     "ParticipantError",
     "RecordingError",
     "ScenarioError",
@@ -77,6 +79,10 @@ class StateError(SessionError):
 
 class RecordingError(TrocarError):
     """A recording cannot be written, read or re-simulated."""
+
+
+class MotionError(TrocarError):
+    """An arm cannot be or go where it was asked to; the message says why and what was allowed."""
 
 
 class ConnectError(TrocarError):

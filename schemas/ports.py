@@ -14,6 +14,7 @@ class Port(BaseModel):
 
     A *signal* has one value at a time, a float64 vector whenever the type has a fixed layout (see `schemas.vectors`).
     An *event* port carries a queue of messages of which none is lost.
+    A signal may feed an event port: each new value is one message.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -25,6 +26,8 @@ class Port(BaseModel):
     variability: Literal["signal", "event"] = "signal"
     size: int = Field(default=1, ge=1)
     """Number of elements where the type leaves it open (multi-arrays)."""
+    shape: tuple[int, ...] = ()
+    """Of a multi-array that is a matrix, row after row: stands in the message's layout; the product is the size."""
     names: tuple[str, ...] = ()
     """Joint names of a `JointState`."""
     fields: tuple[Literal["position", "velocity", "effort"], ...] = ("position",)
@@ -42,6 +45,10 @@ class Port(BaseModel):
     clock: Literal["simulated", "wall"] = "simulated"
     """The clock of the stamps."""
     description: str = ""
+
+    def filled_from(self, other: Port) -> Port:
+        """Return this port with the frame and the joint names of `other` where it leaves them open."""
+        return self.model_copy(update={"frame": self.frame or other.frame, "names": self.names or other.names})
 
 
 class BondSide(BaseModel):

@@ -11,15 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from schemas.message import Bool, Float32Array, Float64, Float64Array, Int32, Int32Array, Message, String, StringArray, UInt32
+from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int32, Int32Array, Message, String, StringArray, UInt8, UInt32, fixed_float64
 
 __all__ = [
     "Accel",
     "AccelStamped",
     "BoolMessage",
+    "CameraInfo",
+    "CompressedImage",
+    "EmptyMessage",
     "Float64Message",
     "Float64MultiArray",
     "Header",
+    "Image",
     "JointState",
     "Joy",
     "MultiArrayDimension",
@@ -28,6 +32,7 @@ __all__ = [
     "Pose",
     "PoseStamped",
     "Quaternion",
+    "RegionOfInterest",
     "StringMessage",
     "Time",
     "Twist",
@@ -40,6 +45,10 @@ __all__ = [
 
 def _empty() -> NDArray[np.float64]:
     return np.zeros(0)
+
+
+def _no_bytes() -> NDArray[np.uint8]:
+    return np.zeros(0, np.uint8)
 
 
 class Time(Message):
@@ -73,6 +82,13 @@ class BoolMessage(Message):
 
     ros_type: ClassVar[str] = "std_msgs/msg/Bool"
     data: Bool = False
+
+
+class EmptyMessage(Message):
+    """A signal that something is to be done or has happened."""
+
+    ros_type: ClassVar[str] = "std_msgs/msg/Empty"
+    structure_needs_at_least_one_member: UInt8 = 0
 
 
 class Float64Message(Message):
@@ -224,3 +240,53 @@ class Joy(Message):
     header: Header = Header()
     axes: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
     buttons: Int32Array = Field(default_factory=lambda: np.zeros(0, np.int32))
+
+
+class Image(Message):
+    """An uncompressed image, row after row from the top; the stamp is when it was taken, the frame the camera's optical frame."""
+
+    ros_type: ClassVar[str] = "sensor_msgs/msg/Image"
+    header: Header = Header()
+    height: UInt32 = 0
+    width: UInt32 = 0
+    encoding: String = ""
+    is_bigendian: UInt8 = 0
+    step: UInt32 = 0
+    data: Bytes = Field(default_factory=_no_bytes)
+
+
+class CompressedImage(Message):
+    """An image as a file of the named format: `jpeg` or `png`."""
+
+    ros_type: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
+    header: Header = Header()
+    format: String = ""
+    data: Bytes = Field(default_factory=_no_bytes)
+
+
+class RegionOfInterest(Message):
+    """The part of the full image that was taken; all zeros for the whole."""
+
+    ros_type: ClassVar[str] = "sensor_msgs/msg/RegionOfInterest"
+    x_offset: UInt32 = 0
+    y_offset: UInt32 = 0
+    height: UInt32 = 0
+    width: UInt32 = 0
+    do_rectify: Bool = False
+
+
+class CameraInfo(Message):
+    """A camera's calibration: distortion d, intrinsics k (3 x 3), rectification r (3 x 3), projection p (3 x 4), row after row."""
+
+    ros_type: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
+    header: Header = Header()
+    height: UInt32 = 0
+    width: UInt32 = 0
+    distortion_model: String = ""
+    d: Float64Array = Field(default_factory=_empty)
+    k: Annotated[NDArray[np.float64], fixed_float64(9)] = Field(default_factory=lambda: np.zeros(9))
+    r: Annotated[NDArray[np.float64], fixed_float64(9)] = Field(default_factory=lambda: np.zeros(9))
+    p: Annotated[NDArray[np.float64], fixed_float64(12)] = Field(default_factory=lambda: np.zeros(12))
+    binning_x: UInt32 = 0
+    binning_y: UInt32 = 0
+    roi: RegionOfInterest = RegionOfInterest()

@@ -64,7 +64,11 @@ class ParticipantSpec(_Part):
 
 
 class Connection(_Part):
-    """An output port feeds an input port: `source -> target`."""
+    """An output port feeds an input port: `source -> target`.
+
+    `motion.drive/* -> robot.*` stands for one connection from each output of `motion` under `drive/` to the input of the same
+    name of `robot`; outputs that have no such input stay unconnected.
+    """
 
     source: Endpoint
     target: Endpoint
@@ -79,6 +83,18 @@ class Connection(_Part):
                 raise ValueError(f"'{value}' is no 'participant.port -> participant.port'")
             return {"source": source.strip(), "target": target.strip()}
         return value
+
+    @model_validator(mode="after")
+    def _check_wildcard(self) -> Connection:
+        stars = [end.port.count("*") for end in (self.source, self.target)]
+        if any(stars) and not (stars == [1, 1] and self.source.port.endswith("*") and self.target.port.endswith("*")):
+            raise ValueError(f"'{self.source} -> {self.target}': a wildcard is one '*' at the end of both ports")
+        return self
+
+    @property
+    def is_wildcard(self) -> bool:
+        """Whether this stands for several connections."""
+        return self.source.port.endswith("*")
 
 
 class Bond(_Part):

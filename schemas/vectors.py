@@ -20,7 +20,7 @@ from schemas.codec import encode, message_type
 from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.ros import Header, Time
+from schemas.ros import Header, MultiArrayDimension, MultiArrayLayout, Time
 
 __all__ = ["Vector", "VectorCodec", "has_vector"]
 
@@ -135,6 +135,8 @@ class VectorCodec:
             tree["header"] = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
         if self.port.type == "sensor_msgs/msg/JointState":
             tree["name"] = list(self.port.names)
+        if self.port.shape:
+            tree["layout"] = _layout_of(self.port.shape)
         for path, names, block in self._blocks:
             *parents, leaf = path.split(".")
             numbers = value[block]
@@ -171,3 +173,10 @@ class VectorCodec:
         if sorted(names) != sorted(self.port.names):
             raise MessageError(f"port '{self.port.name}': joints {names}, expected {list(self.port.names)}")
         return [names.index(name) for name in self.port.names]
+
+
+def _layout_of(shape: tuple[int, ...]) -> MultiArrayLayout:
+    """Return the layout of a dense array, row-major, as std_msgs/MultiArrayLayout defines strides: that of a dimension counts it too."""
+    labels = ("rows", "cols") if len(shape) == 2 else tuple(f"dim{axis}" for axis in range(len(shape)))
+    rows = zip(labels, shape, strict=True)
+    return MultiArrayLayout(dim=[MultiArrayDimension(label=label, size=size, stride=math.prod(shape[axis:])) for axis, (label, size) in enumerate(rows)])

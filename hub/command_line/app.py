@@ -11,7 +11,7 @@ import typer
 from rich.logging import RichHandler
 from rich.text import Text
 
-from hub.command_line import hosting, looking, recordings, running
+from hub.command_line import hosting, looking, plugins, recordings, running
 from hub.command_line.display import console
 from schemas.errors import ScenarioError, TrocarError
 
@@ -42,6 +42,7 @@ for command in (
     looking.schema,
 ):
     app.command()(command)
+plugins.mount(app)
 
 
 def _print_version(wanted: bool) -> None:

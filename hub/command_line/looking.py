@@ -36,6 +36,7 @@ def _print_plan(plan: Plan) -> None:
     """Print every participant with its ports, and who feeds its inputs."""
     feeds = {(link.target, link.target_port): f"{link.source}.{link.source_port}" for link in plan.links}
     feeds |= {(inlet.target, inlet.target_port): f"{inlet.device}.{inlet.device_port}" for inlet in plan.inlets}
+    feeds |= {(outlet.device, outlet.device_port): f"{outlet.source}.{outlet.source_port}" for outlet in plan.outlets}
     for member in plan.members.values():
         console.print(f"[bold]{member.name}[/] ({member.role} of kind {member.kind}) on host {member.host}")
         for port in member.ports:

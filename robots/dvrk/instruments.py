@@ -1,16 +1,28 @@
-"""Instruments of the PSM: joints, tip frame, and what their links weigh. SI units, radians."""
+"""Instruments of the PSM: joints, tip frame, jaw, and what their links weigh. SI units, radians.
+
+The numbers of all 54 instruments that the dVRK's controller knows are in `data/instruments.json`, each with the file they come
+from; right angles are exact there. An instrument is called by its name (`LARGE_NEEDLE_DRIVER_400006`) or by its number alone.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import pi, radians
+from functools import cache
+from importlib.resources import files
+from math import radians
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
+from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint
+from schemas.errors import MotionError, did_you_mean
 from schemas.vectors import Vector
 
-__all__ = ["INSTRUMENTS", "SHAFT_RADIUS", "STEEL_DENSITY", "WRIST_RADIUS", "Instrument"]
+__all__ = ["SHAFT_RADIUS", "STEEL_DENSITY", "WRIST_RADIUS", "Instrument", "Jaw", "instrument", "instruments"]
 
 SHAFT_RADIUS = 0.0084 / 2
 """Of the 8 mm instruments (m), as modelled in unina-icaros/dvrk-vrep."""
@@ -21,35 +33,96 @@ WRIST_RADIUS = 0.0063 / 2
 STEEL_DENSITY = 7900.0
 """Stainless steel 1.4301 (AISI 304), kg/m^3 (EN 10088-1, physical properties: 7.9 kg/dm^3)."""
 
+_WRIST_VELOCITY, _WRIST_ACCELERATION = radians(1080.0), radians(720.0)
+"""rad/s and rad/s^2, of roll, wrist and jaw (jhu-dvrk/sawIntuitiveResearchKit, core/components/code/mtsIntuitiveResearchKitPSM.cpp)."""
+
+_JAW_LENGTHS = {"006": 0.0102, "049": 0.0155, "093": 0.0286, "172": 0.021, "194": 0.0164, "205": 0.021, "309": 0.0155}
+"""From the wrist yaw axis to the end of the jaws (m), by the last digits of the number, which tell the type
+(jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as the Maryland ones, 172)."""
+
+_OTHER_JAW_LENGTH = _JAW_LENGTHS["049"]
+"""Of jaws whose length no public model states (m): that of the Cadiere forceps."""
+
+_PROBE = "palpation-probe"
+"""A steel sphere centred on the tip frame in place of the jaws of a large needle driver 400006."""
+
+
+@dataclass(frozen=True)
+class Jaw:
+    """Two fingers about the wrist yaw axis, each turned by half the jaw angle, either way."""
+
+    lower: float
+    """Smallest angle, rad; below 0 the fingers press on each other."""
+    upper: float
+    effort: float
+    """Largest torque, N m."""
+    length: float
+    """From the wrist yaw axis to the end of the fingers, m."""
+    velocity: float = _WRIST_VELOCITY
+    acceleration: float = _WRIST_ACCELERATION
+    jerk: float = jerk(_WRIST_ACCELERATION)
+
 
 @dataclass(frozen=True)
 class Instrument:
-    """What is mounted on the arm: three joints from the shaft to the wrist, and a tip."""
+    """What is mounted on the arm: joints from the shaft to the wrist, and a tip."""
 
-    joints: tuple[Joint, Joint, Joint]
+    name: str
+    number: str
+    """Intuitive's part number, first six digits; empty for what Intuitive does not make."""
+    joints: tuple[Joint, ...]
+    """Roll, wrist pitch, wrist yaw; roll and four wrist joints where the wrist is a snake."""
     tip: Vector
     """Pose of the tip frame in the frame of the last link, shape (4, 4)."""
-    roll_mass: float
-    """Mass of the link that rolls, kg."""
-    pitch_mass: float
-    """Mass of the link between wrist pitch and wrist yaw, kg."""
+    jaw: Jaw | None
+    """None where there is nothing that opens: probe, cautery hook and spatula."""
+    actuator_to_joint: Vector
+    """Joint positions (roll, wrist pitch, wrist yaw, jaw) of disc positions (rad), shape (4, 4)."""
+    source: str
+    roll_mass: float = 3.428938e-4
+    """Mass of the link that rolls, kg (WPI-AIM/dvrk_env, tool_lnd.urdf.xacro: CAD of the large needle driver, taken for all)."""
+    pitch_mass: float = 2.491212e-4
+    """Mass of the link between wrist pitch and wrist yaw, kg (same file)."""
+
+    @property
+    def has_snake_wrist(self) -> bool:
+        """Whether the wrist is that of a 5 mm instrument: four bending joints in place of wrist pitch and wrist yaw."""
+        return len(self.joints) != 3
 
 
-_WRIST_VELOCITY = radians(1080.0)
-"""rad/s, of roll and wrist (jhu-dvrk/sawIntuitiveResearchKit, core/components/code/mtsIntuitiveResearchKitPSM.cpp)."""
+def instrument(name: str) -> Instrument:
+    """Return the instrument of this name or number. Raises MotionError if there is none, saying which there are."""
+    found = instruments().get(name) or _by_number().get(name)
+    if found is None:
+        raise MotionError(f"no instrument '{name}'.{did_you_mean(name, _by_number() if name.isdigit() else instruments())}")
+    return found
 
-_LARGE_NEEDLE_DRIVER_JOINTS = (
-    Joint("roll", "revolute", 0.0, 0.0, 0.4162, 0.0, -4.53786, 4.53786, _WRIST_VELOCITY, 0.33),
-    Joint("wrist_pitch", "revolute", -pi / 2, 0.0, 0.0, -pi / 2, -1.39626, 1.39626, _WRIST_VELOCITY, 0.25),
-    Joint("wrist_yaw", "revolute", -pi / 2, 0.0091, 0.0, -pi / 2, -1.39626, 1.39626, _WRIST_VELOCITY, 0.20),
-)
-"""jhu-dvrk/sawIntuitiveResearchKit, share/tool/LARGE_NEEDLE_DRIVER_400006.json."""
 
-_TOOLTIP_OFFSET = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-"""Same file: turns the last link so that the tip's z axis points out of the instrument."""
+@cache
+def instruments() -> Mapping[str, Instrument]:
+    """Return all instruments by name."""
+    data = json.loads(files("robots.dvrk").joinpath("data/instruments.json").read_text(encoding="utf-8"))
+    made = {name: _from_data(name, row, data) for name, row in data["instruments"].items()}
+    driver = made["LARGE_NEEDLE_DRIVER_400006"]
+    made[_PROBE] = Instrument(_PROBE, "", driver.joints, driver.tip, None, driver.actuator_to_joint, driver.source)
+    return MappingProxyType(made)
 
-INSTRUMENTS = {
-    "palpation-probe": Instrument(_LARGE_NEEDLE_DRIVER_JOINTS, _TOOLTIP_OFFSET, roll_mass=3.428938e-4, pitch_mass=2.491212e-4),
-}
-"""By the name that a scenario uses. The palpation probe is a steel sphere centred on the tip frame in place of the jaws of a
-large needle driver 400006; link masses of that tool from CAD (WPI-AIM/dvrk_env, tool_lnd.urdf.xacro)."""
+
+@cache
+def _by_number() -> Mapping[str, Instrument]:
+    """Return the instruments by number. A geared variant of the same number goes by its name only."""
+    return {found.number: found for name, found in instruments().items() if found.number and name.endswith(found.number)}
+
+
+def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrument:
+    number = next(word for word in name.split("_") if word.isdigit() and len(word) == 6)
+    lower, upper, effort = row["jaw"]
+    jaw = Jaw(lower, upper, effort, _JAW_LENGTHS.get(number[3:], _OTHER_JAW_LENGTH)) if effort else None
+    tip = np.vstack([data["tips"][row["tip"]], [0.0, 0.0, 0.0, 1.0]])
+    coupling = np.array(data["actuator_to_joint"][row["actuator_to_joint"]])
+    return Instrument(name, number, tuple(_joint(*cells) for cells in row["joints"]), tip, jaw, coupling, row["source"])
+
+
+def _joint(name: str, alpha: float, a: float, d: float, theta: float, lower: float, upper: float, effort: float) -> Joint:
+    limits = (_WRIST_VELOCITY, effort, _WRIST_ACCELERATION, jerk(_WRIST_ACCELERATION))
+    return Joint(name, "revolute", radians(alpha), a, d, radians(theta), lower, upper, *limits)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator
 
 from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS
+from robots.dvrk.instruments import instrument
 from schemas.quantity import Angle, Length
 
 __all__ = ["ArmName", "PsmPositions", "UnitQuaternion"]
@@ -17,7 +17,7 @@ ArmName = Literal["PSM1", "PSM2", "PSM3"]
 
 
 def _in_range(value: tuple[float, ...]) -> tuple[float, ...]:
-    for joint, q in zip(psm.ARM_JOINTS + INSTRUMENTS["palpation-probe"].joints, value, strict=True):
+    for joint, q in zip(psm.ARM_JOINTS + instrument("palpation-probe").joints, value, strict=True):
         if not joint.lower <= q <= joint.upper:
             raise ValueError(f"{joint.name} {q:g} is out of its range {joint.lower:g} .. {joint.upper:g}")
     return value

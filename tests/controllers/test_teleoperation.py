@@ -10,13 +10,13 @@ from hub.inputs import Inputs
 from hub.participant import Setup
 from robots import rotation
 from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS
+from robots.dvrk.instruments import instrument
 from schemas.errors import StateError
 from schemas.ros import Joy
 from schemas.vectors import VectorCodec
 
 H = 1_000_000
-CHAIN = psm.chain(INSTRUMENTS["palpation-probe"])
+CHAIN = psm.chain(instrument("palpation-probe"))
 
 
 class Session:

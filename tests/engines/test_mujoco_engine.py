@@ -10,12 +10,14 @@ from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from hub.inputs import Inputs
 from hub.participant import BondPlan, Correction, Setup
-from robots.dvrk import psm
+from robots.dvrk import drives, psm
+from robots.dvrk.instruments import instrument
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import bond_ports
 from schemas.vectors import VectorCodec
 
 H = 1_000_000
+DRIVES = drives.psm(instrument("palpation-probe"))
 START = [0.1, -0.05, 0.14, 0.2, 0.1, -0.1]
 IMPULSE = BondPlan("velocity", mean=True)
 LINEARISED = BondPlan("velocity", mean=True, correction=Correction(gain=0.5, stiffness=1000.0, damping=9.0))
@@ -29,7 +31,8 @@ class Run:
         bonds = {} if plan is None else {"PSM1/probe": plan}
         self.outputs = self.engine.configure(Setup(period_ns=period, directory=Path(), bonds=bonds))
         self.command, self.wrench = np.array(START), np.zeros(6)
-        self.inputs = Inputs({"PSM1/servo_jp": self.command, "PSM1/probe/wrench": self.wrench})
+        starts = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
+        self.inputs = Inputs({**starts, "PSM1/servo_jp": self.command, "PSM1/probe/wrench": self.wrench})
         self.period, self.t = period, 0
 
     def steps(self, count):
@@ -85,7 +88,9 @@ def test_the_servo_reaches_its_goal_but_for_friction():
     run = Run()
     run.command += [0.05, -0.04, 0.01, 0.2, 0.1, -0.1]
     run.steps(1500)
-    stiction = [servo.coulomb_friction / servo.stiffness for servo in psm.SERVO]
+    discs = drives.discs(instrument("palpation-probe"))
+    losses = [DRIVES[name].coulomb_friction + sum(abs(disc.shares.get(name, 0.0)) * disc.coulomb_friction for disc in discs) for name in psm.JOINT_NAMES]
+    stiction = [loss / DRIVES[name].stiffness for loss, name in zip(losses, psm.JOINT_NAMES, strict=True)]
     assert (np.abs(run.output("measured_js")[:6] - run.command) <= np.array(stiction) * 1.01 + 1e-6).all()
     assert np.allclose(run.output("setpoint_js"), run.command)
 
@@ -95,7 +100,7 @@ def test_a_moving_command_is_followed_without_lag():
     for _ in range(500):
         run.command[0] += 2e-4
         run.steps(1)
-    lag_without_velocity_setpoint = 0.2 * psm.SERVO[0].damping / psm.SERVO[0].stiffness
+    lag_without_velocity_setpoint = 0.2 * DRIVES["yaw"].damping / DRIVES["yaw"].stiffness
     assert abs(run.output("measured_js")[0] - run.command[0]) < 0.2 * lag_without_velocity_setpoint
 
 
@@ -192,7 +197,7 @@ def test_the_step_is_that_of_mj_step():
     run = Run(plan=None, timestep="1 ms")
     model = run.engine._model
     data = mujoco.MjData(model)
-    data.qpos[:], data.ctrl[::2] = START, START
+    data.qpos[:], data.ctrl[::3] = run.engine._data.qpos, START
     mujoco.mj_forward(model, data)
     run.command += 0.01
     run.steps(1)

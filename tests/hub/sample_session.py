@@ -32,7 +32,7 @@ ATTACHMENTS = {
     "scenario.yaml": json.dumps(SCENARIO, indent=2).encode(),
     "scenario.json": Scenario.model_validate(SCENARIO).model_dump_json().encode(),
     "versions.json": json.dumps({"trocar": "0.1.0", "mujoco": "4.0.0", "pybullet": "3.2.7"}).encode(),
-    "models.json": json.dumps({"robot": "aa" * 8, "tissue": "bb" * 8}).encode(),
+    "files.json": json.dumps({"/data/hand/hand.mcap": "ab" * 32}).encode(),
 }
 
 

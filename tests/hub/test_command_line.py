@@ -105,7 +105,7 @@ def test_doctor_as_json(trocar):
     assert code == 0
     assert report["works"]
     found = {finding["name"]: finding for finding in report["findings"]}
-    assert {"Python", "Zenoh", "mujoco", "bullet", "fmu", "EGL", "OpenHaptics", "LibOVR", "OpenXR", "ROS 1", "ROS 2"} <= set(found)
+    assert {"Python", "Zenoh", "mujoco", "bullet", "fmu", "OpenGL", "OpenHaptics", "LibOVR", "OpenXR", "ROS 1", "ROS 2"} <= set(found)
     assert all(finding["works"] or finding["remedy"] for finding in found.values())
     assert "works" in trocar("doctor")[1]
 

@@ -158,14 +158,14 @@ def test_shutdown_while_a_host_has_not_joined(prepare):
 
 def test_the_budget_of_steps():
     state = RunState()
-    assert (state.paused, state.budget, state.wait(0.0)) == (False, None, True)
+    assert (state.budget, state.wait(0.0)) == (None, True)
     state.step(3)
     state.step(2)
     assert state.budget == 5
     state.spend(4)
-    assert not state.paused
+    assert state.budget == 1
     state.spend(2)  # a grant of a window may not exceed the budget, but the count never goes below zero
-    assert state.paused
+    assert state.budget == 0
     assert not state.wait(0.0)
     state.resume()
     assert state.budget is None

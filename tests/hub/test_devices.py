@@ -99,3 +99,36 @@ def test_a_remote_device_may_go_and_come_back(prepare):
     assert codes == [-9, 0]
     assert summary.state == "done"
     assert 0 < summary.measures["fresh_steps"] < summary.steps - 60
+
+
+TOLD = """\
+name: told
+step: 1 ms
+pace: realtime
+participants:
+  talker: {kind: "toys:Talker"}
+  mixer: {kind: "toys:Mixer", out_every: 2}
+  pad: {kind: "toys:Pad"}
+connections:
+  - talker.words -> pad.words
+  - mixer.out -> pad.numbers
+"""
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_a_device_is_told_every_event_and_each_value_of_a_signal_once(prepare, tmp_path, host):
+    file = tmp_path / "told.txt"
+    session = prepare(TOLD, f"participants.pad.file={file}", f"participants.talker.host={host}")
+
+    def lines(port):
+        return [line.partition(" ")[2] for line in file.read_text().splitlines() if line.startswith(f"{port} ")]
+
+    def enough(progress):
+        if min(len(lines("words")), len(lines("numbers"))) > 20:
+            session.state.shutdown()
+
+    summary = session.run(enough)
+    assert summary.dropped_messages == 0
+    words, numbers = lines("words"), lines("numbers")
+    assert words == [f"word {i}" for i in range(len(words))]
+    assert len(numbers) == len(set(numbers)) <= 1 + summary.steps // 2

@@ -147,6 +147,53 @@ class Probe(Part):
         return {}
 
 
+class Inbox(Part):
+    """Notes the messages that each of its steps finds on an event port."""
+
+    def __init__(self, name, **rest):
+        super().__init__(name, into(variability="event", **rest))
+        self.seen = []
+
+    def step(self, t, h, inputs):
+        self.seen.append(inputs.events("in"))
+        return {}
+
+
+@pytest.mark.parametrize(("algorithm", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
+@pytest.mark.parametrize(("source_ms", "target_ms"), [(1, 1), (2, 1), (1, 3), (4, 2), (2, 4)])
+def test_each_new_value_of_a_signal_is_one_message_of_an_event_port(algorithm, late, source_ms, target_ms):
+    inbox = Inbox("inbox", unit="s")
+    periods = {"ramp": {"period": f"{source_ms} ms"}, "inbox": {"period": f"{target_ms} ms"}}
+    run_in_process(
+        {"name": "ramp", "step": "1 ms", "duration": "12 ms", "algorithm": algorithm, "participants": periods, "connections": ["ramp.out -> inbox.in"]},
+        {"ramp": Ramp("ramp"), "inbox": inbox},
+    )
+    expected, told = [], 0
+    for step in range(0, 12, target_ms):
+        ready = (step if late else step + source_ms) // source_ms
+        expected.append([pytest.approx(1e-3 * source_ms * n) for n in range(told + 1, ready + 1)])
+        told = ready
+    assert [[message.data[0] for message in messages] for messages in inbox.seen] == expected
+
+
+def test_a_message_made_of_a_signal_has_stamp_frame_and_names():
+    class Arm(Part):
+        def configure(self, setup):
+            return {"out": np.array([0.0, 0.0])}
+
+        def step(self, t, h, inputs):
+            return {"out": np.array([1.0, t * 1e-9])}
+
+    joints = {"type": "sensor_msgs/msg/JointState", "names": ("x", "y")}
+    inbox = Inbox("inbox", type=joints["type"], frame="PSM1_base")
+    run_in_process(
+        {"name": "arm", "step": "1 ms", "duration": "2 ms", "connections": ["arm.out -> inbox.in"]}, {"arm": Arm("arm", out(**joints)), "inbox": inbox}
+    )
+    ((first,), (second,)) = inbox.seen
+    assert (first.name, first.header.frame_id, first.header.stamp.nanosec) == (["x", "y"], "PSM1_base", 1 * MS)
+    assert (second.position.tolist(), second.header.stamp.nanosec) == ([1.0, 1e-3], 2 * MS)
+
+
 @pytest.mark.parametrize(("algorithm", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
 def test_a_neighbour_in_this_process_sees_values_of_the_right_step(algorithm, late):
     probe = Probe("probe")

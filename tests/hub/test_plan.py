@@ -21,7 +21,7 @@ def force(**rest):
     ("source", "target", "message"),
     [
         (out(type=POSE), into(), "'a.out' gives geometry_msgs/msg/PoseStamped, 'b.in' takes std_msgs/msg/Float64MultiArray"),
-        (out(variability="event", type=TEXT), into(type=TEXT), "'a.out' is of variability event, 'b.in' of variability signal"),
+        (out(variability="event", type=TEXT), into(type=TEXT), "'a.out' gives events, 'b.in' takes a signal"),
         (out(unit="mm"), into(unit="m"), "'a.out' is in 'mm', 'b.in' takes 'm'"),
         (out(type=POSE, frame="PSM1_base"), into(type=POSE, frame="world"), "frame 'PSM1_base', 'b.in' takes frame 'world'"),
         (out(size=3), into(size=4), "'a.out' has 3 numbers, 'b.in' takes 4"),
@@ -56,6 +56,58 @@ def test_names_that_are_not_there(connection, message):
 def test_an_input_is_fed_once():
     with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.other'"):
         plan_of(Part("a", out(), out("other")), Part("b", into()), connections=[*FROM_A_TO_B, "a.other -> b.in"])
+
+
+def test_a_connection_is_named_once():
+    with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'") as raised:
+        plan_of(Part("a", out()), Part("b", into()), connections=FROM_A_TO_B * 2)
+    assert raised.value.path == ("connections", 1)
+
+
+def drives(*inputs):
+    """A controller that drives two arms and shows a state, and a robot with `inputs`."""
+    outputs = (out("state"), out("drive/PSM1/servo_jp"), out("drive/PSM1/jaw"), out("drive/PSM2/servo_jp"))
+    return Part("motion", *outputs), Part("robot", *(into(name, start=(0.0,)) for name in inputs), out("PSM1/jaw"))
+
+
+def test_a_wildcard_joins_what_has_the_same_rest_of_the_name():
+    parts = drives("PSM1/servo_jp", "PSM1/other", "PSM2/servo_jp", "state")
+    plan = plan_of(*parts, connections=["motion.drive/* -> robot.*"])
+    assert [(link.source_port, link.target_port) for link in plan.links] == [
+        ("drive/PSM1/servo_jp", "PSM1/servo_jp"),
+        ("drive/PSM2/servo_jp", "PSM2/servo_jp"),
+    ]
+    plan = plan_of(*parts, connections=["motion.drive/PSM1/* -> robot.PSM2/*", "motion.* -> robot.*"])
+    assert [(link.source_port, link.target_port) for link in plan.links] == [("drive/PSM1/servo_jp", "PSM2/servo_jp"), ("state", "state")]
+
+
+def test_a_wildcard_that_joins_nothing_names_what_there_is():
+    with pytest.raises(ScenarioError) as raised:
+        plan_of(*drives("PSM3/servo_jp"), connections=["motion.drive/* -> robot.*"])
+    assert raised.value.path == ("connections", 0)
+    assert str(raised.value) == (
+        "'motion.drive/* -> robot.*' joins nothing (outputs of 'motion': state, drive/PSM1/servo_jp, drive/PSM1/jaw, drive/PSM2/servo_jp; "
+        "inputs of 'robot': PSM3/servo_jp)"
+    )
+
+
+def test_what_a_wildcard_joins_is_checked_like_any_connection():
+    parts = drives("PSM1/servo_jp")
+    with pytest.raises(ScenarioError, match=r"unknown participant 'robt'"):
+        plan_of(*parts, connections=["motion.drive/* -> robt.*"])
+    with pytest.raises(ScenarioError, match=r"input 'robot.PSM1/servo_jp' is fed twice, by 'motion.state' and by 'motion.drive/PSM1/servo_jp'") as raised:
+        plan_of(*parts, connections=["motion.state -> robot.PSM1/servo_jp", "motion.drive/* -> robot.*"])
+    assert raised.value.path == ("connections", 1)
+    with pytest.raises(ScenarioError, match=r"'motion.drive/PSM1/servo_jp' has 1 numbers, 'robot.PSM1/servo_jp' takes 2"):
+        plan_of(parts[0], Part("robot", into("PSM1/servo_jp", size=2)), connections=["motion.drive/* -> robot.*"])
+
+
+def test_a_signal_may_feed_an_event_port_whatever_its_size():
+    target = into(type=JOINTS, variability="event")
+    plan = plan_of(Part("a", out(type=JOINTS, names=("x", "y"))), Part("b", target), connections=FROM_A_TO_B)
+    assert [link.target_port for link in plan.links] == ["in"]
+    with pytest.raises(ScenarioError, match=r"events cannot be extrapolated, as 'a.out -> b.in' would"):
+        plan_of(Part("a", out(type=JOINTS)), Part("b", target), connections=[{"source": "a.out", "target": "b.in", "extrapolation": "linear"}])
 
 
 def test_an_input_without_a_source_needs_a_start_value():

@@ -40,6 +40,7 @@ def test_scenario_and_versions(session: Path) -> None:
     assert recording.scenario().name == "palpation"
     assert recording.scenario().bonds[0].name == BOND
     assert recording.versions()["mujoco"] == "4.0.0"
+    assert list(recording.files()) == ["/data/hand/hand.mcap"]
     assert recording.session() == "palpation"
     assert recording.attachments == ATTACHMENTS
 

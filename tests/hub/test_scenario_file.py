@@ -108,6 +108,58 @@ def test_a_wrong_override_is_named_instead_of_a_line(problems, override, expecte
     assert expected in "\n".join(problems(GOOD, override))
 
 
+MERGED = """\
+name: swinging
+step: 1 ms
+participants:
+  one:
+    kind: pendulum
+    <<: &shape
+      length: 80 mm
+      springs: {a: {stiffness: 3}}
+  two: {kind: pendulum, <<: *shape, length: 0.5}
+  three:
+    <<: [{length: 2}, *shape]
+    kind: pendulum
+"""
+
+
+@pytest.fixture
+def merged(tmp_path):
+    file = tmp_path / "merged.yaml"
+    file.write_text(MERGED)
+    return str(file)
+
+
+def test_merge_keys_give_several_participants_the_same_parameters(merged):
+    params = load(merged).params
+    assert [params[name].length for name in ("one", "two", "three")] == [0.08, 0.5, 2.0]
+    assert [params[name].springs["a"].stiffness for name in ("one", "two", "three")] == [3.0] * 3
+
+
+def test_an_override_changes_what_it_names_and_no_other_that_merges_it(merged):
+    params = load(merged, ["participants.two.springs.a.stiffness=4"]).params
+    assert [params[name].springs["a"].stiffness for name in ("one", "two", "three")] == [3.0, 4.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("stiffness: 3", "stifness: 3", [f"8:21: participants.{name}.springs.a.stifness: there is no 'stifness'" for name in ("one", "two", "three")]),
+        ("80 mm", "80 kg", ["7:15: participants.one.length: '80 kg' is no quantity in m"]),
+        ("0.5", "-0.5", ["9:45: participants.two.length: Input should be greater than 0"]),
+        ("length: 2", "length: -2", ["11:19: participants.three.length: Input should be greater than 0"]),
+        ("[{length: 2}, *shape]", "3", ["11:9: not valid YAML: expected a mapping or list of mappings for merging"]),
+        ("*shape]", "*shpe]", ["11:23: not valid YAML: found undefined alias 'shpe'"]),
+        ("springs: {a:", "springs: &s {b: *s, a:", ["nested too deeply: does an alias (*name) stand inside what it is an alias of?"]),
+    ],
+)
+def test_a_mistake_in_what_is_merged_is_shown_where_it_is_written(problems, old, new, expected):
+    assert old in MERGED
+    told = "\n".join(problems(MERGED.replace(old, new)))
+    assert [line for line in expected if line not in told] == [], told
+
+
 def test_installed_scenarios_are_found_by_name_only():
     assert "palpation" in installed_scenarios()
     with pytest.raises(ScenarioError, match=r"there is no scenario 'palpatoin'. Did you mean 'palpation'\?"):

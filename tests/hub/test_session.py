@@ -18,6 +18,7 @@ participants:
   slow_talker: {kind: "toys:Talker", period: 5 ms}
   listener: {kind: "toys:Listener", period: 2 ms}
   other_listener: {kind: "toys:Listener"}
+  ledger: {kind: "toys:Ledger", period: 2 ms}
   player: {kind: "toys:Player", silent_after_ms: 30, max_age_ms: 10}
   follower: {kind: "toys:Follower"}
   slow_follower: {kind: "toys:Follower", period: 5 ms}
@@ -34,6 +35,8 @@ connections:
   - five.out -> five.b
   - talker.words -> listener.words
   - slow_talker.words -> other_listener.words
+  - fast.out -> ledger.a
+  - rare.out -> ledger.b
   - player.hand -> follower.hand
   - player.buttons -> follower.buttons
   - player.hand -> slow_follower.hand
@@ -41,13 +44,14 @@ connections:
 measure:
   heard: {kind: final, of: listener.heard}
   heard_elsewhere: {kind: final, of: other_listener.heard}
+  entries: {kind: final, of: ledger.entries}
   pressed: {kind: final, of: follower.pressed}
   pressed_slowly: {kind: final, of: slow_follower.pressed}
   stale_steps: {kind: final, of: follower.stale_steps}
   mixed: {kind: mean, of: two.out}
 """
 
-ONE, OTHER, THIRD = ("rare", "two", "listener", "slow_talker", "follower"), ("five", "talker", "slow_follower"), ("fast", "other_listener")
+ONE, OTHER, THIRD = ("rare", "two", "listener", "slow_talker", "follower"), ("five", "talker", "slow_follower", "ledger"), ("fast", "other_listener")
 
 
 def _on(host, names):
@@ -91,6 +95,7 @@ def test_the_same_hashes_wherever_participants_run(prepare, reference, tmp_path,
 def test_every_event_arrives_and_silence_is_marked(reference):
     assert reference.measures["heard"] > 50
     assert reference.measures["heard_elsewhere"] > 10
+    assert reference.measures["entries"] == 59 + 19  # of 60 and 20 values: its last step is at 58 ms
     assert reference.measures["pressed"] == 30  # one every 2 ms from 0 to 58 ms
     assert reference.measures["pressed_slowly"] == 28  # its last step is at 55 ms
     assert reference.measures["stale_steps"] == 60 - 41  # the last pose is of 30 ms, and fresh up to 40 ms
@@ -106,4 +111,4 @@ def test_what_was_recorded_comes_out_again(prepare, tmp_path):
     prepare(NETWORK, "window=7", *PLACEMENTS["two hosts"], record=tmp_path / "recording").run()
     verified = verify(Recording(tmp_path / "recording"))
     assert (verified.same, verified.steps) == (True, 60)
-    assert verified.hashes == 5 * 60 + 2 * 30 + 3 * 12
+    assert verified.hashes == 5 * 60 + 3 * 30 + 3 * 12

@@ -128,6 +128,26 @@ class Listener(Chain):
         return {"heard": self.heard}
 
 
+class Ledger(Chain):
+    """Writes down every message that two signals have made; `entries` counts them."""
+
+    ports = (
+        *(Port(name=name, causality="input", variability="event") for name in "ab"),
+        Port(name="entries", causality="output", type="std_msgs/msg/Float64"),
+    )
+
+    def configure(self, setup):
+        super().configure(setup)
+        self.entries = np.zeros(1)
+        return {"entries": self.entries}
+
+    def step(self, t, h, inputs):
+        messages = [*inputs.events("a"), *inputs.events("b")]
+        self.entries[0] += len(messages)
+        self.fold(t.to_bytes(8, "little"), *(message.data for message in messages))
+        return {"entries": self.entries}
+
+
 class Follower(Chain):
     """Listens to a device: a pose, the staleness of it, and buttons of which none may be lost."""
 
@@ -211,6 +231,33 @@ class Player(Device):
             made.append((ms, Sample("buttons", joy)))
             self.next["buttons"] += 2
         return [sample for _, sample in sorted(made, key=lambda row: row[0])]
+
+    def close(self):
+        pass
+
+
+class PadParams(Params):
+    file: str
+
+
+class Pad(Device):
+    """Writes down, a line each, what it is told: words, and messages made of a signal."""
+
+    params_model = PadParams
+    ports = (
+        Port(name="words", causality="input", type=TEXT, variability="event"),
+        Port(name="numbers", causality="input", variability="event"),
+    )
+
+    def open(self, directory):
+        Path(self.params.file).touch()
+
+    def read(self, t):
+        return ()
+
+    def write(self, port, value):
+        with Path(self.params.file).open("a") as file:
+            file.write(f"{port} {value.data if port == 'words' else value.data.tolist()}\n")
 
     def close(self):
         pass

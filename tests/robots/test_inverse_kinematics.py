@@ -4,10 +4,10 @@ from hypothesis import strategies as st
 
 from robots import rotation
 from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS
+from robots.dvrk.instruments import instrument
 from robots.inverse_kinematics import approach
 
-CHAIN = psm.chain(INSTRUMENTS["palpation-probe"])
+CHAIN = psm.chain(instrument("palpation-probe"))
 MIDDLE = np.array(psm.HOME)
 ANY_STEP = np.full(6, np.inf)
 near = st.tuples(*(st.floats(-s, s) for s in (0.3, 0.3, 0.05, 0.5, 0.5, 0.5))).map(lambda d: MIDDLE + np.array(d))

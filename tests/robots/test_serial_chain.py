@@ -1,59 +1,114 @@
+from math import pi
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robots import rotation
-from robots.dvrk import psm
-from robots.dvrk.instruments import INSTRUMENTS
+from robots.dvrk import arms
+from robots.dvrk.instruments import instrument
+from robots.serial_chain import Joint, SerialChain
+from schemas.errors import MotionError
 
-CHAIN = psm.chain(INSTRUMENTS["palpation-probe"])
-
-# Poses of the tip in the RCM frame, computed in double precision from the numbers of jhu-dvrk/sawIntuitiveResearchKit
-# (share/kinematic/PSM.json, share/tool/LARGE_NEEDLE_DRIVER_400006.json) with 1.5708 taken as pi/2.
-REFERENCE_POSES = [
-    ([0, 0, 0, 0, 0, 0], [0.0, 0.0, 0.0065], [[0, 1, 0], [1, 0, 0], [0, 0, -1]]),
-    (
-        [0.3, -0.2, 0.15, 0.5, -0.4, 0.25],
-        [0.042794255, 0.03141424, -0.132593198],
-        [[0.261614256, 0.734433945, 0.626230598], [0.714829259, -0.583397599, 0.385572784], [0.648519168, 0.346776618, -0.677620001]],
-    ),
-    (
-        [1.2, -0.7, 0.08, 2.5, 0.3, 0.9],
-        [0.050228875, 0.048735989, -0.021254746],
-        [[0.877391398, -0.328990764, 0.34921256], [-0.395001595, -0.908472569, 0.136569879], [0.272319803, -0.257764755, -0.927037894]],
-    ),
-    (
-        [0.65, -0.35, 0.24, 4.0, -1.3, 1.3],
-        [0.124860871, 0.072397047, -0.17521155],
-        [[-0.672656663, 0.105696189, -0.732366936], [-0.494650277, 0.671866775, 0.551285896], [0.55032183, 0.733091639, -0.399653014]],
-    ),
-]
-
-configurations = st.tuples(*(st.floats(joint.lower, joint.upper) for joint in CHAIN.joints)).map(np.array)
+NAMES = ("PSM1", "ECM", "MTML", "MTMR", "SUJ/PSM3")
+CHAINS = {name: arms.chain(name) for name in NAMES}
 
 
-@pytest.mark.parametrize(("q", "position", "orientation"), REFERENCE_POSES)
-def test_tip_stands_where_the_reference_says(q, position, orientation):
-    tip = CHAIN.forward(np.array(q, float))
-    assert np.allclose(tip[:3, 3], position, atol=1e-8)
-    assert np.allclose(tip[:3, :3], orientation, atol=1e-8)
+def configurations(chain):
+    return st.tuples(*(st.floats(max(joint.lower, -pi), min(joint.upper, pi)) for joint in chain.joints)).map(np.array)
 
 
-@given(configurations)
+def many(chain, count=100):
+    return np.random.default_rng(0).uniform(np.maximum(chain.lower, -pi), np.minimum(chain.upper, pi), (count, len(chain.joints)))
+
+
+anywhere = st.sampled_from(NAMES).flatmap(lambda name: st.tuples(st.just(CHAINS[name]), configurations(CHAINS[name])))
+
+
+@given(configurations(CHAINS["PSM1"]))
 def test_forward_kinematics_is_the_product_of_the_links(q):
+    chain = CHAINS["PSM1"]
     product = np.eye(4)
-    for joint, position in zip(CHAIN.joints, q, strict=True):
+    for joint, position in zip(chain.joints, q, strict=True):
         product = product @ joint.transform(position)
-    assert np.allclose(CHAIN.forward(q), product @ CHAIN.tip, atol=1e-14)
+    assert np.allclose(chain.forward(q), product @ chain.tip, atol=1e-14)
 
 
-@given(configurations)
-def test_jacobian_is_the_derivative_of_the_pose(q):
+@given(anywhere)
+def test_jacobian_is_the_derivative_of_the_pose(case):
+    chain, q = case
     step = 1e-6
-    jacobian = CHAIN.jacobian(CHAIN.frames(q))
+    jacobian = chain.jacobian(chain.frames(q))
     for i, dq in enumerate(step * np.eye(len(q))):
-        back, ahead = CHAIN.forward(q - dq), CHAIN.forward(q + dq)
+        back, ahead = chain.forward(q - dq), chain.forward(q + dq)
         linear = (ahead[:3, 3] - back[:3, 3]) / (2 * step)
         turn = rotation.product(rotation.from_matrix(ahead), rotation.conjugate(rotation.from_matrix(back)))
         assert np.allclose(jacobian[:, i], [*linear, *(rotation.log(turn) / (2 * step))], atol=1e-8)
+
+
+@given(anywhere)
+def test_jacobian_in_the_tip_frame_is_that_of_the_base_turned(case):
+    chain, q = case
+    frames = chain.frames(q)
+    to_base = np.kron(np.eye(2), frames[-1, :3, :3])
+    assert np.allclose(to_base @ chain.jacobian(frames, frame="tip"), chain.jacobian(frames), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_many_configurations_give_what_each_gives_alone(name):
+    chain = CHAINS[name]
+    q = many(chain)
+    frames = chain.frames(q.reshape(10, 10, -1)).reshape(100, -1, 4, 4)
+    assert np.allclose(frames, [chain.frames(one) for one in q], atol=1e-14)
+    for frame in ("base", "tip"):
+        assert np.allclose(chain.jacobian(frames, frame=frame), [chain.jacobian(chain.frames(one), frame=frame) for one in q], atol=1e-14)
+    assert np.array_equal(chain.forward(q), frames[:, -1])
+
+
+def test_the_standard_form_of_the_psm_is_its_modified_form():
+    psm = CHAINS["PSM1"]
+    rows = [  # alpha, a, d, theta in standard form, after a first turn by Rx(pi/2)
+        (-pi / 2, 0.0, 0.0, pi / 2),
+        (pi / 2, 0.0, 0.0, -pi / 2),
+        (0.0, 0.0, -0.4318, 0.0),
+        (-pi / 2, 0.0, 0.4162, 0.0),
+        (-pi / 2, 0.0091, 0.0, -pi / 2),
+        (0.0, 0.0, 0.0, -pi / 2),
+    ]
+    joints = [Joint(j.name, j.kind, *row, j.lower, j.upper) for j, row in zip(psm.joints, rows, strict=True)]
+    standard = SerialChain.from_standard(joints, instrument("400006").tip)
+    upright = Joint("", "revolute", pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0).transform(0.0)
+    q = many(psm)
+    assert np.allclose(upright @ standard.forward(q), psm.forward(q), atol=1e-15)
+
+
+def test_standard_form_is_the_product_of_its_own_links():
+    joint = Joint("one", "revolute", 0.7, 0.3, 0.2, 0.1, -pi, pi)
+    other = Joint("two", "prismatic", -0.4, 0.1, 0.5, 0.6, 0.0, 1.0)
+
+    def link(row, theta, d):
+        turn = Joint("", "revolute", 0.0, 0.0, d, theta, 0.0, 0.0).transform(0.0)
+        return turn @ Joint("", "revolute", row.alpha, row.a, 0.0, 0.0, 0.0, 0.0).transform(0.0)
+
+    expected = link(joint, 0.1 + 0.9, 0.2) @ link(other, 0.6, 0.5 + 0.4)
+    assert np.allclose(SerialChain.from_standard([joint, other], np.eye(4)).forward(np.array([0.9, 0.4])), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("q", "reason"),
+    [
+        ([0, 0, 0.1, 0, 0], r"shape \(5,\), expected 6: yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw"),
+        ([0, 0, np.nan, 0, 0, 0], "not all positions are finite"),
+        ([0, 1.0, 0.3, 0, 0, 0], r"joint pitch at 1 rad, allowed are -0.925025 .. 0.925025; joint insertion at 0.3 m, allowed are 0 .. 0.24$"),
+    ],
+)
+def test_positions_that_cannot_be_are_refused_with_what_can(q, reason):
+    with pytest.raises(MotionError, match=reason):
+        CHAINS["PSM1"].check(np.array(q, float))
+
+
+def test_positions_at_the_limits_can_be():
+    chain = CHAINS["PSM1"]
+    chain.check(chain.lower)
+    chain.check(chain.upper)

@@ -145,3 +145,11 @@ def test_every_port_of_a_bond_has_a_vector(side: str, dof: int) -> None:
     assert VectorCodec(velocity).size == VectorCodec(force).size == dof
     assert VectorCodec(position).size == (7 if dof == 6 else dof)
     assert position.causality == velocity.causality == ("output" if side == "motion" else "input") != force.causality
+
+
+def test_a_matrix_stands_in_the_layout_row_after_row():
+    codec = VectorCodec(Port(name="jacobian", causality="output", size=12, shape=(3, 4)))
+    value = np.arange(12.0)
+    message = decode(Float64MultiArray, codec.encode(value, 0))
+    assert [(d.label, d.size, d.stride) for d in message.layout.dim] == [("rows", 3, 12), ("cols", 4, 4)]
+    assert np.array_equal(codec.decode(encode(message)), value)

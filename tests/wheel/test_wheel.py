@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 import zipfile
 from importlib.metadata import version
 from pathlib import Path
@@ -74,13 +75,9 @@ def test_without_extras_the_command_line_works(base, tmp_path):
 
 def test_without_extras_every_kind_can_be_described(base, tmp_path):
     findings = json.loads(succeed(base / "trocar", "doctor", "--json", cwd=tmp_path))["findings"]
-    assert {f["name"] for f in findings if f["area"] in ("engine", "controller", "device") and f["detail"] == "from trocar"} == {
-        "mujoco",
-        "bullet",
-        "fmu",
-        "teleoperation",
-        "scripted",
-    }
+    found = {f["name"] for f in findings if f["area"] in ("engine", "controller", "device") and f["detail"] == "from trocar"}
+    entries = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    assert found == {name for group in ("trocar.engines", "trocar.controllers", "trocar.devices") for name in entries[group]}
     assert succeed(base / "trocar", "schema", cwd=tmp_path) == (ROOT / "configs" / "scenario.schema.json").read_text()
 
 

@@ -1,0 +1,1 @@
+"""The motion controller of the patient cart's arms: CRTK's commands in, setpoints for the drives out."""

@@ -1,0 +1,130 @@
+"""One arm under CRTK's commands: what arrives, what is told, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+
+from controllers.motion.commands import Commands
+from controllers.motion.drives import Drives
+from controllers.motion.frames import Frames
+from controllers.motion.lifecycle import Lifecycle
+from controllers.motion.messages import Messages
+from controllers.motion.params import MotionParams
+from controllers.motion.ports import COMMANDS, JAW_COMMANDS
+from controllers.motion.telemetry import Telemetry
+from hub.inputs import Inputs
+from robots.dvrk.setup_joints import CartArm
+from schemas.crtk import StringStamped
+from schemas.errors import MotionError
+from schemas.message import Message
+from schemas.vectors import Vector
+
+__all__ = ["Arm"]
+
+_ANY_TIME = "trajectory_j/set_ratio"
+"""A command that is heeded whatever the operating state."""
+
+
+class Arm:
+    """One arm. All that changes is in the arrays of `state`."""
+
+    def __init__(self, name: CartArm, params: MotionParams, frames: Frames, camera: Callable[[], Vector | None], period: float) -> None:
+        """Take the arm's name, what the scenario says, the base frames, what returns the ECM's tip in `ECM_base`, and the step (s)."""
+        arm = params.arms.driven[name]
+        self._name: CartArm = name
+        self._frames, self._camera, self._period = frames, camera, period
+        self._messages = Messages(name)
+        self._drives = Drives(arm, self._messages)
+        self._telemetry = Telemetry(name, arm.chain)
+        self._commands = Commands(name, self._drives, frames, camera, period)
+        self._lifecycle = Lifecycle(self._drives, self._messages, np.array(arm.home), params.power_time * 1e-9, homed=params.initial_state == "homed")
+        heeding = self._commands.handlers
+        self._state_port = f"{name}/state_command"
+        names = [*(command for command in COMMANDS if command != "state_command"), *(JAW_COMMANDS if self._drives.jaw else ())]
+        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in names]
+        self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
+        self.state = (self._started, self._commands.ratio, self._lifecycle.flags, self._messages.state, *self._drives.state)
+        self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip((name, f"{name}/jaw"), self._drives.groups, strict=False)]
+        self._jaw_setpoint = np.zeros(3)
+        self.events = self._messages.outputs
+        """Event outputs of the last step."""
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """All outputs; the arrays stay the same ones."""
+        outputs: dict[str, Any] = {**self.events, **self._telemetry.outputs, f"drive/{self._name}/control_mode": self._modes}
+        for prefix, axes in zip((self._name, f"{self._name}/jaw"), self._drives.groups, strict=False):
+            outputs |= {f"drive/{prefix}/servo_jp": axes.setpoint.position, f"drive/{prefix}/servo_jf": axes.effort}
+        if self._drives.jaw is not None:
+            outputs |= {f"{self._name}/jaw/measured_js": self._drives.jaw.measured, f"{self._name}/jaw/setpoint_js": self._jaw_setpoint}
+        return outputs
+
+    @property
+    def tip(self) -> Vector:
+        """Pose of the tip as measured, in the arm's base frame, shape (4, 4)."""
+        return self._drives.joints.chain.forward(self._drives.joints.position)
+
+    def sense(self, inputs: Inputs) -> None:
+        """Take what is measured; the first time the setpoint starts from there."""
+        for port, axes in self._sensed:
+            axes.measured[:] = inputs[port]
+            if not self._started[0]:
+                axes.setpoint.reset(axes.position)
+
+    def step(self, t: int, h: int, inputs: Inputs) -> None:
+        """Heed the commands that have arrived, and advance from `t` to `t + h` (ns)."""
+        self._messages.begin(t + h)
+        before = self._condition() if self._started[0] else None
+        self._started[0] = 1.0
+        self._lifecycle.watch(self._period)
+        heeded = self._heed(inputs)
+        self._lifecycle.step(self._period)
+        self._drives.step(self._period)
+        if heeded or self._condition() != before:
+            state, homed, busy = self._condition()
+            self._messages.operating_state(state, homed=homed, busy=busy)
+        self._modes[:] = self._drives.modes
+
+    def publish(self) -> None:
+        """Bring the states that are not published at every step up to date."""
+        joints, jaw = self._drives.joints, self._drives.jaw
+        self._telemetry.update(joints.measured, joints.commanded, float(self._commands.ratio[0]), self._frames.of(self._name, self._camera()))
+        if jaw is not None:
+            self._jaw_setpoint[:] = jaw.commanded
+
+    def restored(self) -> None:
+        """Bring what is not in `state` up to it."""
+        for axes in self._drives.groups:
+            axes.setpoint.restored()
+        self._modes[:] = self._drives.modes
+
+    def _condition(self) -> tuple[Any, bool, bool]:
+        return self._lifecycle.state, self._lifecycle.is_homed, self._lifecycle.is_busy
+
+    def _heed(self, inputs: Inputs) -> bool:
+        """Carry out what has arrived; return whether there was a command after which clients wait for the operating state."""
+        awaited = False
+        for message in inputs.events(self._state_port):
+            awaited |= self._lifecycle.command(cast("StringStamped", message))
+        for command, port, heed in self._ports:
+            for message in inputs.events(port):
+                done = self._heed_one(command, heed, message)
+                awaited |= done and "move_" in command
+        return awaited
+
+    def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> bool:
+        if command != _ANY_TIME and (reason := self._lifecycle.not_ready()):
+            self._messages.refuse(command, reason, ready=False)
+            return False
+        try:
+            heed(message)
+        except MotionError as error:
+            self._messages.refuse(command, str(error), ready=True)
+            if "move_" in command and not self._drives.is_moving:
+                self._messages.goal_reached(reached=False)  # as the real controller does; a move under way goes on
+            return False
+        self._messages.heeded(command)
+        return True

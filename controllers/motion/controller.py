@@ -1,0 +1,101 @@
+"""The motion controller as a participant: all arms of a patient cart under CRTK's commands."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from controllers.motion.frames import Frames
+from controllers.motion.params import MotionParams
+from controllers.motion.ports import arm_ports
+from hub.inputs import Inputs
+from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from schemas.errors import MissingExtraError, StateError
+from schemas.ports import Port
+from schemas.vectors import Vector
+
+if TYPE_CHECKING:
+    from controllers.motion.arm import Arm
+
+__all__ = ["MotionController"]
+
+
+class MotionController(Stepped):
+    """Takes CRTK's commands for each arm, and tells the drives where to be: `motion.drive/* -> robot.*`, `robot.* -> motion.sense/*`."""
+
+    params_model: ClassVar[type[Params]] = MotionParams
+    params: MotionParams
+
+    def __init__(self, name: str, params: MotionParams) -> None:
+        """Take the participant's name and its parameters."""
+        super().__init__(name, params)
+        self._frames = Frames(params)
+        self._arms: dict[str, Arm] = {}
+        self._outputs: dict[str, Any] = {}
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Per arm: CRTK's commands in, its states and events out; `drive/<arm>/...` and `sense/<arm>/...` towards the robot."""
+        period, frames = self.params.publish_period, self._frames.names
+        return tuple(port for name, arm in self.params.arms.driven.items() for port in arm_ports(name, arm, frames[name], period))
+
+    def configure(self, setup: Setup) -> Outputs:
+        """Put every arm where the parameters say."""
+        if find_spec("ruckig") is None:
+            raise MissingExtraError(f"participant '{self.name}' (kind motion)", "motion", "ruckig")
+        from controllers.motion.arm import Arm
+
+        period = setup.period_ns * 1e-9
+        self._arms = {name: Arm(name, self.params, self._frames, self._camera, period) for name in self.params.arms.driven}
+        for arm in self._arms.values():
+            arm.publish()
+            self._outputs |= arm.outputs
+        return self._outputs
+
+    def _camera(self) -> Vector | None:
+        """Return the pose of the ECM's tip in `ECM_base`, shape (4, 4), if there is an ECM."""
+        ecm = self._arms.get("ECM")
+        return None if ecm is None else ecm.tip
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Heed commands and advance all setpoints by `h` nanoseconds."""
+        arms = self._arms.values()
+        for arm in arms:
+            arm.sense(inputs)
+        due = not (t + h) % self.params.publish_period
+        for arm in arms:
+            arm.step(t, h, inputs)
+            if due:
+                arm.publish()
+            self._outputs |= arm.events
+        return self._outputs
+
+    def _state(self) -> tuple[Vector, ...]:
+        return tuple(array for arm in self._arms.values() for array in arm.state)
+
+    def state_hash(self) -> int:
+        """Return the hash of what is measured and commanded, and of every arm's operating state."""
+        return state_hash(*self._state())
+
+    def save(self) -> bytes:
+        """Return the state of every arm; trajectories as their start, goal and age."""
+        return b"".join(array.tobytes() for array in self._state())
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state. Raises StateError if it has the wrong size."""
+        size = sum(array.nbytes for array in self._state())
+        if len(state) != size:
+            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
+        values, at = np.frombuffer(state), 0
+        for array in self._state():
+            array[...] = values[at : at + array.size].reshape(array.shape)
+            at += array.size
+        for arm in self._arms.values():
+            arm.restored()
+
+    def close(self) -> None:
+        """Let go of the arms."""
+        self._arms.clear()
+        self._outputs.clear()

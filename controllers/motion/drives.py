@@ -1,0 +1,126 @@
+"""Arm and jaw together: what is done with them, and telling when a move has ended or was given up."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from controllers.motion.axes import Axes, Mode
+from controllers.motion.messages import Messages
+from controllers.motion.params import EcmParams, PsmParams
+from controllers.motion.telemetry import body_to_spatial
+from robots.serial_chain import Joint, SerialChain
+from schemas.vectors import Vector
+
+__all__ = ["Drives", "WrenchFrame"]
+
+
+class WrenchFrame(IntEnum):
+    """How a commanded wrench is meant: at the tip in the tip's frame, or at the base frame's origin in the base frame."""
+
+    NONE = 0
+    BODY = 1
+    SPATIAL = 2
+
+
+class Drives:
+    """The joints of an arm, and its jaw if it has one."""
+
+    def __init__(self, arm: PsmParams | EcmParams, messages: Messages) -> None:
+        """Take the arm's parameters and where to tell what ends."""
+        self._messages = messages
+        self.joints = Axes(arm.chain, np.array(arm.start))
+        self.jaw = _jaw(arm)
+        self.groups = (self.joints,) if self.jaw is None else (self.joints, self.jaw)
+        """All that is driven: the arm's joints, then the jaw."""
+        self._wrench = np.zeros(7)
+        self._frame = self._wrench[6:]
+        self.state = (self._wrench, *(array for axes in self.groups for array in axes.state))
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a move of the arm or of the jaw is under way."""
+        return any(axes.is_moving for axes in self.groups)
+
+    @property
+    def modes(self) -> tuple[Mode, Mode]:
+        """What arm and jaw do; a jaw that is not there is off."""
+        return self.joints.mode, Mode.OFF if self.jaw is None else self.jaw.mode
+
+    def power(self, *, on: bool) -> None:
+        """Switch all drives off, or on to hold what they hold."""
+        self._give_up(*self.groups)
+        self._frame[0] = WrenchFrame.NONE
+        for axes in self.groups:
+            axes.power(on=on)
+
+    def rest(self) -> None:
+        """Brake and stay; a jaw that presses goes on pressing."""
+        self._give_up(*self.groups)
+        self._frame[0] = WrenchFrame.NONE
+        for axes in self.groups:
+            if axes is self.joints or axes.mode is Mode.POSITION:
+                axes.hold()
+
+    def follow(self, axes: Axes, goal: Vector, h: float) -> None:
+        """Let `axes` follow `goal`, shape (n,); `h` is the step (s). Raises MotionError if it is out of range."""
+        axes.chain.check(goal)
+        self._take_over(axes)
+        axes.follow(goal, h)
+
+    def move(self, axes: Axes, goal: Vector, ratio: float) -> None:
+        """Let `axes` move to `goal`, shape (n,), at the share `ratio` of their limits. Raises MotionError if it is out of range."""
+        axes.chain.check(goal)
+        if axes is self.joints:
+            self._frame[0] = WrenchFrame.NONE
+        axes.move(goal, ratio)
+
+    def apply(self, axes: Axes, effort: Vector) -> None:
+        """Let `axes` apply efforts, shape (n,)."""
+        self._take_over(axes)
+        axes.apply(effort)
+
+    def press(self, wrench: Vector, frame: WrenchFrame) -> None:
+        """Apply `wrench`, shape (6,), with the arm from now on, wherever it goes."""
+        self._take_over(self.joints)
+        self._wrench[:6], self._frame[0] = wrench, frame
+        self._balance()
+
+    def step(self, h: float) -> None:
+        """Advance by `h` seconds."""
+        if self._frame[0]:
+            self._balance()
+        for axes in self.groups:
+            axes.step(h)
+
+    def tell_arrivals(self, *, silent: bool) -> None:
+        """Tell of moves that have arrived since the last step; `silent`: not of the arm's, which homes."""
+        for axes in self.groups:
+            if axes.finished() and not (silent and axes is self.joints):
+                self._messages.goal_reached(reached=True)
+
+    def _take_over(self, axes: Axes) -> None:
+        self._give_up(axes)
+        if axes is self.joints:
+            self._frame[0] = WrenchFrame.NONE
+
+    def _give_up(self, *groups: Axes) -> None:
+        if any(axes.is_moving for axes in groups):
+            self._messages.goal_reached(reached=False)
+
+    def _balance(self) -> None:
+        """Apply the joint efforts J^T w, none over what its drive can do."""
+        chain = self.joints.chain
+        frames = chain.frames(self.joints.position)
+        jacobian = chain.jacobian(frames, frame="tip")
+        if self._frame[0] == WrenchFrame.SPATIAL:
+            jacobian = body_to_spatial(frames[-1]) @ jacobian
+        self.joints.apply(np.clip(jacobian.T @ self._wrench[:6], -chain.effort, chain.effort))
+
+
+def _jaw(arm: PsmParams | EcmParams) -> Axes | None:
+    if not isinstance(arm, PsmParams) or (jaw := arm.gripper) is None:
+        return None
+    joint = Joint("jaw", "revolute", 0.0, 0.0, 0.0, 0.0, jaw.lower, jaw.upper, jaw.velocity, jaw.effort, jaw.acceleration, jaw.jerk)
+    return Axes(SerialChain([joint], np.eye(4)), np.array([arm.jaw]))

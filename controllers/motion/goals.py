@@ -1,0 +1,80 @@
+"""From CRTK's messages to goals of an arm. Whatever is wrong with a message raises MotionError, which says what is allowed."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import Literal
+
+import numpy as np
+
+from robots import rotation
+from robots.serial_chain import SerialChain
+from schemas.errors import MotionError
+from schemas.ros import JointState, PoseStamped, WrenchStamped
+from schemas.vectors import Vector
+
+__all__ = ["check_frame", "efforts", "joint_values", "tip_frame", "wrench"]
+
+_QUATERNION_TOLERANCE = 1e-3
+"""Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
+
+
+def joint_values(chain: SerialChain, message: JointState, part: Literal["position", "effort"]) -> Vector:
+    """Return positions or efforts, shape (n,), in the order of the chain; a message that names its joints may have them in any."""
+    names = [joint.name for joint in chain.joints]
+    values: Vector = message.position if part == "position" else message.effort
+    if values.shape != (len(names),):
+        raise MotionError(f"{values.size} values of {part}, expected {len(names)}: {', '.join(names)}")
+    if message.name:
+        if sorted(message.name) != sorted(names):
+            raise MotionError(f"joints {', '.join(message.name)}, expected {', '.join(names)}")
+        values = values[[message.name.index(name) for name in names]]
+    _check_finite(values, part)
+    return values
+
+
+def efforts(chain: SerialChain, message: JointState) -> Vector:
+    """Return the efforts, shape (n,), none over what its drive can do."""
+    values = joint_values(chain, message, "effort")
+    wrong = [
+        f"joint {joint.name} at {value:.6g} {'N m' if joint.kind == 'revolute' else 'N'}, allowed are {-joint.effort:g} .. {joint.effort:g}"
+        for joint, value in zip(chain.joints, values.tolist(), strict=True)
+        if abs(value) > joint.effort
+    ]
+    if wrong:
+        raise MotionError("; ".join(wrong))
+    return values
+
+
+def check_frame(frame_id: str, *allowed: str) -> str:
+    """Return `frame_id`, the first of `allowed` where the message leaves it open."""
+    if frame_id and frame_id not in allowed:
+        raise MotionError(f"frame '{frame_id}', allowed are {', '.join(dict.fromkeys(allowed))}")
+    return frame_id or allowed[0]
+
+
+def tip_frame(message: PoseStamped) -> Vector:
+    """Return the pose as (4, 4) matrix in the frame of its message."""
+    p, q = message.pose.position, message.pose.orientation
+    position, quaternion = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+    _check_finite(position, "position")
+    _check_finite(quaternion, "orientation")
+    norm = hypot(*quaternion.tolist())
+    if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
+        raise MotionError(f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}")
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = rotation.matrix(quaternion / norm), position
+    return frame
+
+
+def wrench(message: WrenchStamped) -> Vector:
+    """Return force and torque, shape (6,)."""
+    f, m = message.wrench.force, message.wrench.torque
+    values = np.array([f.x, f.y, f.z, m.x, m.y, m.z])
+    _check_finite(values, "wrench")
+    return values
+
+
+def _check_finite(values: Vector, part: str) -> None:
+    if not np.isfinite(values).all():
+        raise MotionError(f"{part} {values.tolist()}: every number must be finite")

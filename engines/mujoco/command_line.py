@@ -1,0 +1,178 @@
+"""The commands `trocar model`: where an arm's tip stands, what its dynamics are, and the model as files for other programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+import numpy as np
+import typer
+from pydantic import ValidationError
+from typer.core import TyperCommand
+
+from engines.mujoco.params import SceneArm, SceneParams
+from robots import command_line as kinematics
+from robots.dvrk.arms import ARMS, DEFAULT_INSTRUMENT
+from schemas.errors import MissingExtraError, MotionError, did_you_mean
+
+if TYPE_CHECKING:
+    from engines.mujoco.model.dynamics import JointDynamics
+
+__all__ = ["app"]
+
+app = typer.Typer(help="Numbers and files of the robot's model.", no_args_is_help=True)
+
+_CART: tuple[SceneArm, ...] = get_args(SceneArm)
+
+
+class _NumbersInARow(TyperCommand):
+    """Takes `--q 0.1 -0.2 0.3` like `--q 0.1,-0.2,0.3`: all numbers that follow belong to the option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        for option in ("--q", "--dq"):
+            if option in args:
+                start = args.index(option) + 1
+                end = start
+                while end < len(args) and _numbers(args[end]) is not None:
+                    end += 1
+                if end > start:
+                    args = [*args[: start - 1], f"{option}={','.join(args[start:end])}", *args[end:]]
+        return super().parse_args(ctx, args)
+
+
+def _numbers(text: str) -> list[float] | None:
+    try:
+        return [float(number) for number in text.replace(",", " ").split()]
+    except ValueError:
+        return None
+
+
+def _checked(text: str | None) -> str | None:
+    if text is not None and not _numbers(text):
+        raise typer.BadParameter(f"'{text}' holds no numbers; write one per joint in SI units, separated by spaces or commas")
+    return text
+
+
+Arm = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(ARMS)}.", autocompletion=lambda: list(ARMS))]
+CartArm = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(_CART)}.", autocompletion=lambda: list(_CART))]
+Tool = Annotated[
+    str | None,
+    typer.Option("--instrument", metavar="N", help="Of a PSM: its instrument, by name or number (400006 unless given); of the ECM: straight, up or down."),
+]
+Positions = Annotated[str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_checked, help="Joint positions, rad and m.")]
+Velocities = Annotated[
+    str | None, typer.Option("--dq", metavar="V1 V2 ...", callback=_checked, help="Joint velocities for the friction, rad/s and m/s; 0 unless given.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+
+
+@app.command(cls=_NumbersInARow)
+def fk(arm: Arm, *, instrument: Tool = None, q: Positions, as_json: Json = False) -> None:
+    """Print the pose of an arm's tip in its base frame: p in m and the rotation matrix R."""
+    with _refusing():
+        pose = kinematics.fk(arm, instrument, _numbers(q) or [])
+    typer.echo(json.dumps(pose, indent=2) if as_json else kinematics.table(pose))
+
+
+@app.command(cls=_NumbersInARow)
+def dynamics(arm: CartArm, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False) -> None:
+    """Print an arm's joint-space inertia, gravity, friction and elasticity, its base upright; SI units."""
+    _need_mujoco("dynamics")
+    name, positions = _cart_arm(arm), _numbers(q) or []
+    tool = instrument or ("straight" if name == "ECM" else DEFAULT_INSTRUMENT)
+    velocities = [0.0] * len(positions) if dq is None else _numbers(dq) or []
+    with _refusing():
+        kinematics.fk(arm, tool, positions)  # refuses what is out of range
+        if len(velocities) != len(positions):
+            raise MotionError(f"{arm}: {len(velocities)} joint velocities, expected {len(positions)}")
+        from engines.mujoco.model.dynamics import dynamics as of
+
+        found = of(name, tool, positions, velocities)
+    if as_json:
+        typer.echo(json.dumps({"arm": arm, "instrument": tool, "q": positions, "dq": velocities, **_plain(found)}, indent=2))
+    else:
+        _print(found)
+
+
+def _plain(found: JointDynamics) -> dict[str, Any]:
+    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in asdict(found).items()}
+
+
+def _print(found: JointDynamics) -> None:
+    columns = {
+        "gravity": found.gravity,
+        "elastic": found.elastic,
+        "viscous": found.viscous_friction,
+        "coulomb": found.coulomb_friction,
+        "friction": found.friction,
+    }
+    width = max(map(len, found.joints))
+    typer.echo(f"{'':{width}}{''.join(f'{title:>11}' for title in columns)}   inertia matrix")
+    for i, name in enumerate(found.joints):
+        row = "".join(f"{column[i]:11.5f}" for column in columns.values())
+        typer.echo(f"{name:{width}}{row}   {''.join(f'{cell:11.6f}' for cell in found.inertia[i])}")
+
+
+@app.command()
+def export(
+    path: Annotated[Path, typer.Argument(help="File (.xml or .urdf), or folder for dvrk.xml or dvrk.urdf; meshes go to assets beside it.")],
+    *,
+    arms: Annotated[str, typer.Option(metavar="ARM,ARM", help="Which arms of the cart.")] = ",".join(_CART),
+    instrument: Annotated[
+        list[str] | None, typer.Option(metavar="ARM=N", help="Instrument of a PSM or endoscope of the ECM (400006 and straight unless given). May be repeated.")
+    ] = None,
+    mounting: Annotated[Literal["cart", "free"], typer.Option(help="On the cart's setup joints, or one arm alone with its base in the origin.")] = "cart",
+    form: Annotated[Literal["mjcf", "urdf"] | None, typer.Option("--format", help="By default what the file's suffix says, else mjcf.")] = None,
+) -> None:
+    """Write the robot's model as MJCF or URDF with its meshes."""
+    _need_mujoco("export")
+    from engines.mujoco.export import FORMATS, write
+    from engines.mujoco.model import spec
+
+    known = FORMATS.get(path.suffix)
+    form = form or known or "mjcf"
+    if known is None:
+        path = path / {"mjcf": "dvrk.xml", "urdf": "dvrk.urdf"}[form]
+    scene = _scene([_cart_arm(arm) for arm in arms.replace(",", " ").split()], instrument or [], mounting)
+    files = write(spec(scene), path, form)
+    typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")
+
+
+def _scene(arms: list[SceneArm], instruments: list[str], mounting: str) -> SceneParams:
+    tools = {arm: {} if arm == "ECM" else {"instrument": DEFAULT_INSTRUMENT} for arm in arms}
+    for text in instruments:
+        arm, _, tool = text.partition("=")
+        if arm not in tools or not tool:
+            raise typer.BadParameter(f"'{text}' is no ARM=N with an arm of this model: {', '.join(tools)}", param_hint="--instrument")
+        tools[_cart_arm(arm)] = {"endoscope" if arm == "ECM" else "instrument": tool}
+    if mounting == "free" and len(tools) > 1:
+        raise typer.BadParameter(f"{len(tools)} arms would stand in one place; name one with --arms, or mount them on the cart", param_hint="--mounting")
+    with _refusing():
+        return SceneParams.model_validate({"arms": tools, "mounting": mounting})
+
+
+def _cart_arm(arm: str) -> SceneArm:
+    if arm not in _CART:
+        raise typer.BadParameter(f"no arm '{arm}' in the model.{did_you_mean(arm, _CART)}", param_hint="ARM")
+    return arm
+
+
+@contextmanager
+def _refusing() -> Generator[None]:
+    """Turn what an arm cannot do into bad usage."""
+    try:
+        yield
+    except MotionError as error:
+        raise typer.BadParameter(str(error)) from error
+    except ValidationError as error:
+        raise typer.BadParameter("; ".join(str(problem["msg"]) for problem in error.errors())) from error
+
+
+def _need_mujoco(command: str) -> None:
+    if find_spec("mujoco") is None:
+        raise MissingExtraError(f"'trocar model {command}'", "mujoco", "mujoco")

@@ -1,0 +1,148 @@
+"""The stereo endoscope: draws the scene at the joint positions it is given, at a period of its own.
+
+A picture of the state at `t` comes out at the end of the step that begins there, stamped `t`, as a camera delivers a frame one
+period after it was exposed (docs/decisions/0013).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from io import BytesIO
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.mujoco import opengl
+from engines.mujoco.endoscope_params import EndoscopeParams
+from engines.mujoco.positions import position_count
+from hub.inputs import Inputs
+from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from robots.dvrk.endoscope import EYES, Eye, StereoCamera
+from schemas.errors import MissingExtraError, StateError
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
+
+if TYPE_CHECKING:
+    from engines.mujoco.endoscope_scene import EndoscopeScene
+
+__all__ = ["Endoscope", "camera_info"]
+
+_log = logging.getLogger(__name__)
+
+
+class Endoscope(Stepped):
+    """Two cameras at the tip of the ECM, or where the scenario puts them."""
+
+    params_model: ClassVar[type[Params]] = EndoscopeParams
+    params: EndoscopeParams
+
+    def __init__(self, name: str, params: EndoscopeParams) -> None:
+        """Take the participant's name and its parameters."""
+        super().__init__(name, params)
+        self._positions = np.zeros(position_count(params))
+        self._frame = f"{name}_left_optical"
+        kinds: dict[str, type[Message]] = {"camera_info": CameraInfo}
+        if params.images != "compressed":
+            kinds["image_raw"] = Image
+        if params.images != "raw":
+            kinds["image_raw/compressed"] = CompressedImage
+        self._pictures = tuple(
+            Port(name=f"{eye}/{kind}", causality="output", type=model.ros_type, variability="event", frame=self._frame)
+            for eye in EYES
+            for kind, model in kinds.items()
+        )
+        self._scene: EndoscopeScene | None = None
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """`qpos` of the same scene in; per eye, with ROS's names, pictures and their calibration out.
+
+        Pictures are events: none comes before the first step, and none at all on a machine without OpenGL.
+        """
+        qpos = Port(name="qpos", causality="input", size=self._positions.size, description="joint positions of the scene, as the mujoco engine publishes them")
+        return (qpos, *self._pictures)
+
+    def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
+        """Build the scene. Where there is no OpenGL, say so once and publish no pictures."""
+        for package in ("mujoco", "PIL"):
+            if find_spec(package) is None:
+                raise MissingExtraError(f"participant '{self.name}' (kind endoscope)", "mujoco", "pillow" if package == "PIL" else package)
+        found = opengl.find()
+        if found.name:
+            from engines.mujoco.endoscope_scene import EndoscopeScene
+
+            self._scene = EndoscopeScene(self.params, found.name)
+        else:
+            _log.warning("participant '%s' publishes no pictures: no OpenGL works here (%s). To mend it: %s", self.name, found.detail, opengl.REMEDY)
+        return self._outputs({})
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
+        """Draw the state at `t`."""
+        self._positions[:] = inputs["qpos"]
+        if self._scene is None:
+            return self._outputs({})
+        header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
+        pictures = self._scene.draw(self._positions)
+        return self._outputs(
+            {f"{eye}/{name}": message for eye, pixels in zip(EYES, pictures, strict=True) for name, message in self._messages(eye, pixels, header)}
+        )
+
+    def _messages(self, eye: Eye, pixels: NDArray[np.uint8], header: Header) -> Iterator[tuple[str, Message]]:
+        params = self.params
+        yield "camera_info", camera_info(params.camera, eye, header)
+        if params.images != "compressed":
+            yield "image_raw", Image(header=header, height=params.height, width=params.width, encoding="rgb8", step=3 * params.width, data=pixels.reshape(-1))
+        if params.images != "raw":
+            yield "image_raw/compressed", CompressedImage(header=header, format=params.format, data=self._compressed(pixels))
+
+    def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
+        return {port.name: (messages[port.name],) if messages else () for port in self._pictures}
+
+    def _compressed(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        from PIL import Image as Picture
+
+        file = BytesIO()
+        # PNG is lossless at every level; the lowest is several times as fast for a little more length.
+        options = {"quality": self.params.quality} if self.params.format == "jpeg" else {"compress_level": 1}
+        Picture.fromarray(pixels).save(file, self.params.format, **options)
+        return np.frombuffer(file.getvalue(), np.uint8)
+
+    def state_hash(self) -> int:
+        """Return the hash of the positions last drawn; of no pixel, since two machines need not draw the same ones."""
+        return state_hash(self._positions)
+
+    def save(self) -> bytes:
+        """Return the positions last drawn."""
+        return self._positions.tobytes()
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state. Raises StateError if it is none of this scene's."""
+        if len(state) != self._positions.nbytes:
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes, this scene's has {self._positions.nbytes}; was it saved elsewhere?"
+            )
+        self._positions[:] = np.frombuffer(state)
+
+    def close(self) -> None:
+        """Give the OpenGL context back."""
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None
+
+
+def camera_info(camera: StereoCamera, eye: Eye, header: Header) -> CameraInfo:
+    """Return the calibration of one camera, as ROS has it for a rectified stereo pair: both in the left camera's optical frame."""
+    return CameraInfo(
+        header=header,
+        height=camera.height,
+        width=camera.width,
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=camera.intrinsics().reshape(-1),
+        r=np.eye(3).reshape(-1),
+        p=camera.projection(eye).reshape(-1),
+    )

@@ -1,0 +1,5 @@
+"""The model as files for other programs: MJCF or URDF, with the meshes beside it."""
+
+from engines.mujoco.export.files import FORMATS, Format, write
+
+__all__ = ["FORMATS", "Format", "write"]

@@ -1,0 +1,52 @@
+"""The model as MJCF.
+
+MuJoCo writes numbers with six digits. All that carries a name gets its full numbers back here, so that the model reads back as it was.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.export.assets import FOLDER, file_of, numbers
+from schemas.vectors import Vector
+
+__all__ = ["mjcf"]
+
+_INERTIAL = {"pos": "ipos", "quat": "iquat", "diaginertia": "inertia"}
+"""Attributes of the element `inertial` that a compiled body calls otherwise."""
+_DIGITS = 1e-5
+"""What six digits leave of a number, relative to the largest of its attribute."""
+
+
+def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
+    """Return the root element of the model's MJCF, whose meshes are files in `FOLDER`."""
+    model = spec.compile()
+    root = ElementTree.fromstring(spec.to_xml())
+    (compiler,) = root.findall("compiler")
+    compiler.set("meshdir", FOLDER)
+    for mesh in root.findall("asset/mesh"):
+        del mesh.attrib["vertex"], mesh.attrib["face"]
+        mesh.set("file", file_of(mesh.attrib["name"]))
+    by_tag = {"body": spec.body, "joint": spec.joint, "site": spec.site, "geom": spec.geom, "general": spec.actuator}
+    for element in root.iter():
+        if element.tag in by_tag and (name := element.get("name")):
+            _restore(element, by_tag[element.tag](name), {})
+            if (inertial := element.find("inertial")) is not None:
+                _restore(inertial, model.body(name), _INERTIAL)
+    return root
+
+
+def _restore(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
+    """Give the numbers of `element` all the digits that they have in `source`, where some are called otherwise."""
+    for attribute, text in element.attrib.items():
+        value: Any = getattr(source, names.get(attribute, attribute), None)
+        if not isinstance(value, float | np.ndarray):
+            continue
+        written = np.array(text.split(), float)
+        exact: Vector = np.asarray(value, float).ravel()[: len(written)]
+        if np.abs(exact - written).max() <= _DIGITS * np.abs(written).max():
+            element.set(attribute, numbers(exact))

@@ -1,0 +1,160 @@
+"""The model as URDF.
+
+A link is called `<arm>_<link>_link`, its joint `<arm>_<link>`. The bars of the linkage mimic the pitch or the insertion. The two fingers mimic a
+joint `<arm>_jaw`, which moves a link without mass or shape: its position is the angle between them. What can be moved about freely and
+the world's own shapes are left out, a URDF being one robot.
+"""
+
+from __future__ import annotations
+
+from math import atan2, hypot
+from xml.etree.ElementTree import Element, SubElement
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.export.assets import FOLDER, file_of, numbers
+from engines.mujoco.model.names import FINGERS
+from robots import rotation
+from schemas.vectors import Vector
+
+__all__ = ["urdf"]
+
+_KINDS = {mujoco.mjtJoint.mjJNT_HINGE: "revolute", mujoco.mjtJoint.mjJNT_SLIDE: "prismatic"}
+_WORLD = "world"
+
+
+def urdf(spec: mujoco.MjSpec) -> Element:
+    """Return the root element `robot` of the model's URDF, whose meshes are files in `FOLDER`."""
+    model = spec.compile()
+    robot = Element("robot", name=spec.modelname)
+    SubElement(robot, "link", name=_WORLD)
+    for body in spec.bodies[1:]:
+        if any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints):
+            continue
+        _add_link(robot, spec, model, body)
+        _add_joint(robot, spec, model, body)
+        for site in body.sites:
+            _add_frame(robot, model, body, site)
+    for arm in sorted({body.name.split("/")[0] for body in spec.bodies if body.name.endswith(FINGERS)}):
+        _add_jaw(robot, spec, arm)
+    return robot
+
+
+def _add_link(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:
+    link = SubElement(robot, "link", name=_link(body.name))
+    compiled = model.body(body.name)
+    if mass := float(compiled.mass[0]):
+        inertial = SubElement(link, "inertial")
+        _add_origin(inertial, compiled.ipos, compiled.iquat)
+        SubElement(inertial, "mass", value=repr(mass))
+        xx, yy, zz = compiled.inertia.tolist()
+        SubElement(inertial, "inertia", ixx=repr(xx), iyy=repr(yy), izz=repr(zz), ixy="0", ixz="0", iyz="0")
+    for geom in body.geoms:
+        shape = SubElement(link, "collision" if geom.contype or geom.conaffinity else "visual")
+        _add_shape(shape, geom)
+        if shape.tag == "visual":
+            surface = spec.material(geom.material)
+            rgba = geom.rgba if surface is None else surface.rgba
+            material = SubElement(shape, "material", name="_".join(f"{round(255 * channel)}" for channel in rgba))
+            SubElement(material, "color", rgba=numbers(rgba))
+
+
+def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
+    kind, size = geom.type, geom.size
+    pos, quat = geom.pos, geom.quat
+    if kind != mujoco.mjtGeom.mjGEOM_MESH and not np.isnan(geom.fromto[0]):
+        start, end = geom.fromto[:3], geom.fromto[3:]
+        pos, quat, size = (start + end) / 2, _turn_z_to(end - start), np.array([size[0], np.linalg.norm(end - start) / 2, 0.0])
+    _add_origin(shape, pos, quat)
+    geometry = SubElement(shape, "geometry")
+    match kind:
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            SubElement(geometry, "mesh", filename=f"{FOLDER}/{file_of(geom.meshname)}")
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            SubElement(geometry, "box", size=numbers(2.0 * size))
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            SubElement(geometry, "sphere", radius=repr(float(size[0])))
+        case mujoco.mjtGeom.mjGEOM_CAPSULE | mujoco.mjtGeom.mjGEOM_CYLINDER:  # URDF knows no capsule: its cylinder, without the caps
+            SubElement(geometry, "cylinder", radius=repr(float(size[0])), length=repr(2.0 * float(size[1])))
+        case _:
+            raise NotImplementedError(f"a shape of kind {kind} has no form in URDF")
+
+
+def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:
+    moving = next(iter(body.joints), None)
+    name = _joint(moving.name if moving else body.name)
+    joint = SubElement(robot, "joint", name=name, type=_KINDS[moving.type] if moving else "fixed")
+    compiled = model.body(body.name)
+    _add_origin(joint, compiled.pos, compiled.quat)
+    SubElement(joint, "parent", link=_link(body.parent.name))
+    SubElement(joint, "child", link=_link(body.name))
+    if moving is None:
+        return
+    SubElement(joint, "axis", xyz=numbers(moving.axis))
+    leader, ratio = _leader(spec, moving.name)
+    if leader:
+        SubElement(joint, "mimic", joint=_joint(leader), multiplier=repr(ratio), offset="0")
+    _add_limit(joint, spec, moving.range, leader or moving.name)
+    SubElement(joint, "dynamics", damping=repr(float(moving.damping[0])), friction=repr(float(moving.frictionloss)))
+
+
+def _leader(spec: mujoco.MjSpec, joint: str) -> tuple[str, float]:
+    """Return the joint that `joint` follows, empty if none, and the ratio of their positions."""
+    arm, _, link = joint.rpartition("/")
+    if link in FINGERS:
+        return f"{arm}/jaw", 0.5
+    tie = spec.equality(joint)
+    return (tie.name2, float(tie.data[1])) if tie else ("", 0.0)
+
+
+def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str) -> None:
+    servo = spec.actuator(f"{driven.rpartition('/')[0]}/{FINGERS[0]}" if driven.endswith("/jaw") else driven)
+    lower, upper = (repr(float(end)) for end in span)
+    SubElement(joint, "limit", lower=lower, upper=upper, effort=repr(float(servo.forcerange[1])), velocity=repr(float(servo.velrange[1])))
+
+
+def _add_jaw(robot: Element, spec: mujoco.MjSpec, arm: str) -> None:
+    left = spec.body(f"{arm}/{FINGERS[0]}")
+    name = f"{arm}/jaw"
+    SubElement(robot, "link", name=_link(name))
+    joint = SubElement(robot, "joint", name=_joint(name), type="revolute")
+    SubElement(joint, "parent", link=_link(left.parent.name))
+    SubElement(joint, "child", link=_link(name))
+    SubElement(joint, "axis", xyz="0 0 1")
+    _add_limit(joint, spec, 2.0 * left.joints[0].range, name)
+
+
+def _add_frame(robot: Element, model: mujoco.MjModel, body: mujoco.MjsBody, site: mujoco.MjsSite) -> None:
+    """Add a link without mass or shape where a site is, such as the tip of an arm."""
+    name = site.name.replace("/", "_")
+    SubElement(robot, "link", name=name)
+    joint = SubElement(robot, "joint", name=f"{name}_fixed", type="fixed")
+    compiled = model.site(site.name)
+    _add_origin(joint, compiled.pos, compiled.quat)
+    SubElement(joint, "parent", link=_link(body.name))
+    SubElement(joint, "child", link=name)
+
+
+def _add_origin(element: Element, pos: Vector, quat: Vector) -> None:
+    """State a pose; quaternion w first. URDF's angles turn about the fixed axes x, y, z in this order."""
+    r = rotation.matrix(np.array([quat[1], quat[2], quat[3], quat[0]], float) / np.linalg.norm(quat))
+    across = hypot(r[0, 0], r[1, 0])
+    upright = across < 1e-9  # then only the difference of roll and yaw counts
+    roll = atan2(-r[1, 2], r[1, 1]) if upright else atan2(r[2, 1], r[2, 2])
+    SubElement(element, "origin", xyz=numbers(pos), rpy=numbers([roll, atan2(-r[2, 0], across), 0.0 if upright else atan2(r[1, 0], r[0, 0])]))
+
+
+def _turn_z_to(axis: Vector) -> Vector:
+    """Return a quaternion (w, x, y, z) that turns z to `axis`."""
+    quat = np.empty(4)
+    mujoco.mju_quatZ2Vec(quat, np.ascontiguousarray(axis, float))
+    return quat
+
+
+def _link(body: str) -> str:
+    return _WORLD if body == "world" else f"{body.replace('/', '_')}_link"
+
+
+def _joint(joint: str) -> str:
+    return joint.replace("/", "_")

@@ -1,0 +1,178 @@
+"""Who holds what: objects between jaws, and the brakes of the endoscope manipulator.
+
+An object is held by an arm once both fingers have touched it for `_SETTLED`. With `grasp: weld` a weld between wrist and object
+comes and goes with that; with `grasp: friction` nothing but contact acts, and this module only looks.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.model import FINGERS
+from engines.mujoco.params import SceneParams
+from engines.mujoco.ports import has_jaw
+from schemas.vectors import Vector
+
+__all__ = ["Brakes", "Holding", "prepare"]
+
+_SETTLED = 0.1
+"""s; a jaw that closes at its greatest speed has come to rest on the object by then."""
+_FOUND_AND_POSITION = 1 << 0 | 1 << 4
+"""Of a contact sensor: how many contacts there are, and where (mjtConDataField)."""
+_CENTROID = 3
+"""Of a contact sensor: all contacts as one, where their forces are (mjtConReduce netforce)."""
+_RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
+_BRAKED = "ECM"
+
+
+def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
+    """Add to the model of `scene` what this module needs.
+
+    That is the tie that makes two fingers one jaw (however hard it closes, they do not give way together to one side), contact sensors
+    between fingers and objects, and, not active yet, welds and brakes.
+    """
+    if _BRAKED in scene.arms:
+        for joint in scene.arms[_BRAKED].chain.joints:
+            name = f"{_BRAKED}/{joint.name}"
+            spec.add_equality(name=f"{name}/brake", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name, active=False, **_RIGID)
+    for arm in _jawed(scene):
+        left, right = (f"{arm}/{finger}" for finger in FINGERS)
+        spec.add_equality(
+            name=f"{arm}/jaw", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=left, name2=right, data=[0.0, 1.0, *[0.0] * 10], **_RIGID
+        )
+    for thing in scene.objects:
+        for arm in _jawed(scene):
+            for finger in FINGERS:
+                sensor = spec.add_sensor(name=f"{thing}/{arm}/{finger}", type=mujoco.mjtSensor.mjSENS_CONTACT)
+                sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, f"{arm}/{finger}"
+                sensor.reftype, sensor.refname = mujoco.mjtObj.mjOBJ_BODY, thing
+                sensor.intprm[:3] = _FOUND_AND_POSITION, _CENTROID, 1
+            if scene.grasp == "weld":
+                ends = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "name1": f"{arm}/wrist_yaw", "name2": thing}
+                spec.add_equality(name=f"{thing}/{arm}/weld", type=mujoco.mjtEq.mjEQ_WELD, active=False, **ends, **_RIGID)
+
+
+def _jawed(scene: SceneParams) -> list[str]:
+    return [name for name, arm in scene.arms.items() if has_jaw(arm)]
+
+
+class Brakes:
+    """The brakes of the ECM, which hold its joints where they are when its drives go off."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams) -> None:
+        """Find the brakes that `prepare` added."""
+        joints = [joint.name for joint in scene.arms[_BRAKED].chain.joints] if _BRAKED in scene.arms else []
+        self._model, self._data = model, data
+        self._locks = [model.equality(f"{_BRAKED}/{joint}/brake").id for joint in joints]
+        self._positions = [int(model.joint(f"{_BRAKED}/{joint}").qposadr[0]) for joint in joints]
+        self._on = False
+
+    def set(self, on: bool) -> None:
+        """Close or open the brakes; closed ones stay where they closed."""
+        if on != self._on:
+            self._on = on
+            self._model.eq_data[self._locks, 0] = self._data.qpos[self._positions]
+            self._data.eq_active[self._locks] = on
+
+    @property
+    def state(self) -> Vector:
+        """What MuJoCo's own state does not hold: where the brakes closed."""
+        return np.array([*self._model.eq_data[self._locks, 0], float(self._on)])
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        self._model.eq_data[self._locks, 0] = state[:-1]
+        self._on = bool(state[-1])
+
+
+class Holding:
+    """Watches objects and jaws; makes the outputs of the objects."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams, period: float) -> None:
+        """Watch the objects of `scene`, which is looked at every `period` seconds."""
+        things, arms = list(scene.objects), _jawed(scene)
+        self._model, self._data = model, data
+        self._settled = max(1, round(_SETTLED / period))
+        self._numbers = [int(arm[-1]) for arm in arms]
+        self._bodies = [model.body(thing).id for thing in things]
+        self._fingers = [model.body(f"{arm}/{FINGERS[0]}").id for arm in arms]
+        self._wrists = [model.body(f"{arm}/wrist_yaw").id for arm in arms]
+        first = int(model.sensor(f"{things[0]}/{arms[0]}/{FINGERS[0]}").adr[0]) if things and arms else 0
+        shape = (len(things), len(arms))
+        self._contacts = data.sensordata[first : first + 8 * shape[0] * shape[1]].reshape(*shape, 2, 4)  # per finger: number, position
+        self._welds = [[model.equality(f"{thing}/{arm}/weld").id for arm in arms] for thing in things] if scene.grasp == "weld" else None
+        self._touched = np.zeros(shape)  # how often in succession both fingers were seen to touch
+        self._holder = np.full(len(things), -1.0)  # index of an arm
+        self._grip = np.zeros((*shape, 6))  # where the fingers took hold: in the object, and in the left finger
+        self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 3))
+        self._height = data.xpos[self._bodies, 2].copy()
+        self.outputs: dict[str, Vector] = {}
+        for i, thing in enumerate(things):
+            held_by, slip, lift = self._values[i, 0:1], self._values[i, 1:2], self._values[i, 2:3]
+            self.outputs |= {f"{thing}/pose": self._poses[i], f"{thing}/held_by": held_by, f"{thing}/slip": slip, f"{thing}/lift": lift}
+
+    def update(self) -> None:
+        """Look at the contacts, set welds, and bring the outputs up to date."""
+        if not self._bodies:
+            return
+        touch = (self._contacts[..., 0] > 0.0).all(axis=-1)
+        self._touched[:] = np.where(touch, self._touched + 1.0, 0.0)
+        for i, j in np.argwhere(self._touched == self._settled):
+            self._take(i, j)
+        if self._welds is not None:
+            for i, j in np.argwhere(self._touched == 0.0):
+                self._data.eq_active[self._welds[i][j]] = 0
+        for i in range(len(self._bodies)):
+            self._choose_holder(i)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bring the outputs up to the model's present state."""
+        data = self._data
+        for i, body in enumerate(self._bodies):
+            self._poses[i, :3] = data.xpos[body]
+            self._poses[i, 3:] = data.xquat[body, [1, 2, 3, 0]]
+            holder = int(self._holder[i])
+            self._values[i] = (0.0, 0.0, 0.0) if holder < 0 else (self._numbers[holder], self._slip(i, holder), 0.0)
+            self._values[i, 2] = data.xpos[body, 2] - self._height[i]
+
+    def _choose_holder(self, i: int) -> None:
+        """Keep the arm that holds object `i` as long as it does; then take the first that does."""
+        holding = self._touched[i] >= self._settled
+        holder = int(self._holder[i])
+        if holder < 0 or not self._touched[i, holder]:
+            self._holder[i] = int(np.argmax(holding)) if holding.any() else -1
+
+    def _take(self, i: int, j: int) -> None:
+        data, body, finger = self._data, self._bodies[i], self._fingers[j]
+        point = self._contacts[i, j, :, 1:].mean(axis=0)
+        self._grip[i, j, :3] = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
+        self._grip[i, j, 3:] = data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger])
+        if self._welds is not None:
+            wrist, weld = self._wrists[j], self._welds[i][j]
+            position, turn, back = np.zeros(3), np.zeros(4), np.zeros(4)
+            mujoco.mju_negQuat(back, data.xquat[wrist])
+            mujoco.mju_rotVecQuat(position, data.xpos[body] - data.xpos[wrist], back)
+            mujoco.mju_mulQuat(turn, back, data.xquat[body])
+            self._model.eq_data[weld, :3], self._model.eq_data[weld, 3:10] = 0.0, [*position, *turn]
+            data.eq_active[weld] = 1
+
+    def _slip(self, i: int, j: int) -> float:
+        data, body, finger = self._data, self._bodies[i], self._fingers[j]
+        point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self._grip[i, j, :3]
+        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:]))
+
+    @property
+    def state(self) -> Vector:
+        """What MuJoCo's own state does not hold."""
+        welds = np.zeros(0) if self._welds is None else self._model.eq_data[self._welds].ravel()
+        return np.concatenate([self._touched.ravel(), self._holder, self._grip.ravel(), welds])
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        sizes = np.cumsum([self._touched.size, self._holder.size, self._grip.size])
+        touched, holder, grip, welds = np.split(state, sizes)
+        self._touched[:], self._holder[:], self._grip[:] = touched.reshape(self._touched.shape), holder, grip.reshape(self._grip.shape)
+        if self._welds is not None:
+            self._model.eq_data[self._welds] = welds.reshape(len(self._bodies), len(self._fingers), -1)

@@ -1,0 +1,56 @@
+"""Looks by the name of what is looked at."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import get_args
+
+from engines.mujoco.looks import cart, contact, ecm, instruments, psm, setup_joints
+from engines.mujoco.looks.part import Collisions, Looks
+from robots.dvrk.instruments import instrument
+from robots.dvrk.setup_joints import CartArm
+from schemas.errors import MotionError
+
+__all__ = ["collision", "parts"]
+
+_INSTRUMENT = "instrument/"
+
+
+@cache
+def parts(what: str) -> Looks:
+    """Return the meshes of `what` by body, drawn with every joint at 0.
+
+    Args:
+        what: `psm` and `ecm` (in the arm's base frame `<arm>_base`; the PSM without instrument, the ECM with endoscope),
+            `instrument/<name or number>` (in the PSM's base frame), `cart` and `suj/<arm>` (in the cart's frame).
+
+    Raises:
+        MotionError: no such instrument, or nothing of this name.
+    """
+    if what.startswith(_INSTRUMENT):
+        return instruments.parts(instrument(what.removeprefix(_INSTRUMENT)))
+    for arm in get_args(CartArm):
+        if what == f"suj/{arm}":
+            return setup_joints.parts(arm)
+    simple = {"psm": psm.parts, "ecm": ecm.parts, "cart": cart.parts}
+    if what not in simple:
+        raise _nothing(what)
+    return simple[what]()
+
+
+@cache
+def collision(what: str) -> Collisions:
+    """Return what collides of `what` by body: `psm`, `ecm` or `instrument/<name or number>`, in the same frames as `parts`.
+
+    Raises:
+        MotionError: no such instrument, or nothing of this name that collides.
+    """
+    if what.startswith(_INSTRUMENT):
+        return contact.instrument(instrument(what.removeprefix(_INSTRUMENT)))
+    if what not in ("psm", "ecm"):
+        raise _nothing(what)
+    return contact.psm() if what == "psm" else contact.ecm()
+
+
+def _nothing(what: str) -> MotionError:
+    return MotionError(f"no look of '{what}': there are psm, ecm, cart, suj/<arm> and instrument/<name or number>; the last and the arms collide")

@@ -1,0 +1,61 @@
+"""What of arms and instruments collides: convex hulls of the links' covers, capsules for shafts, boxes for fingers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engines.mujoco.looks import ecm as ecm_look
+from engines.mujoco.looks import fingers, instruments
+from engines.mujoco.looks import psm as psm_look
+from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
+from engines.mujoco.looks.solids import hull, part
+from robots.dvrk import psm as psm_arm
+from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
+
+__all__ = ["ecm", "instrument", "psm"]
+
+_ECM_SHAFT_RADIUS = 0.006
+_THIN = ("cannula", "endoscope_shaft")
+"""Parts that a hull of the whole link would swell."""
+
+
+def psm() -> Collisions:
+    """Return what collides of a PSM without its instrument."""
+    return {body: (_hull(body, shown),) for body, shown in psm_look.parts().items() if body != "counterweight"}
+
+
+def ecm() -> Collisions:
+    """Return what collides of an ECM with its endoscope."""
+    hulls: dict[str, tuple[Part | Primitive, ...]] = {body: (_hull(body, shown),) for body, shown in ecm_look.parts().items()}
+    shaft = next(p for p in ecm_look.parts()["roll"] if p.name == "endoscope_shaft").vertices[:, 2]
+    hulls["roll"] += (_upright("shaft", _ECM_SHAFT_RADIUS, float(shaft.min()), float(shaft.max())),)
+    return hulls
+
+
+def instrument(tool: Instrument) -> Collisions:
+    """Return what collides of an instrument in its PSM: housing, shaft, wrist and fingers."""
+    looks: Looks = instruments.parts(tool)
+    frames = psm_arm.chain(tool).frames(np.zeros(3 + len(tool.joints)))
+    pitch, yaw = frames[4][2, 3], frames[-2][2, 3]
+    collisions: dict[str, tuple[Part | Primitive, ...]] = {
+        "insertion": (_hull("housing", looks["insertion"]),),
+        "roll": (_upright("shaft", SHAFT_RADIUS, pitch, float(looks["roll"][0].vertices[:, 2].max())),),
+        tool.joints[1].name: (_upright("wrist", WRIST_RADIUS, yaw, pitch),),
+    }
+    if tool.jaw is not None:
+        form, pose = fingers.shape(tool, tool.jaw), instruments.finger_frame(tool)
+        for name, side in zip(instruments.FINGERS, (1, -1), strict=True):
+            collisions[name] = (fingers.grip(name, form, side, pose),)
+    return collisions
+
+
+def _hull(name: str, shown: tuple[Part, ...]) -> Part:
+    points = np.concatenate([p.vertices for p in shown if p.name not in _THIN])
+    return part(f"{name}_hull", hull(points), shown[0].material)
+
+
+def _upright(name: str, radius: float, low: float, high: float) -> Primitive:
+    """Return a capsule along the z axis between two heights."""
+    pose = np.eye(4)
+    pose[2, 3] = (low + high) / 2.0
+    return Primitive(name, "capsule", (radius, max((high - low) / 2.0 - radius, radius)), pose)

@@ -1,0 +1,103 @@
+"""Fingers of instruments: what shape each kind has, its mesh, and the box that grasps.
+
+A finger is drawn with x the way the left one opens, y the wrist yaw axis, z to the tip, origin in the axis. Its pad is flat and lies
+in the plane x = 0, so that the pads of two fingers meet when the jaw is at 0; a curved one (Maryland) curves along y, within
+that plane. Metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from engines.mujoco.looks.part import DARK, STEEL, Part, Primitive
+from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
+from robots.dvrk.instruments import Instrument, Jaw
+from schemas.vectors import Vector
+
+__all__ = ["Shape", "finger", "grip", "shape"]
+
+_HUB_RADIUS, _HUB_WIDTH = 0.0025, 0.00195
+"""Of the eye about the wrist yaw axis: a hub lies on either side of y = 0 (bounds of the jaw meshes in med-air/SurRoL)."""
+_ROOT = 0.0030
+"""Distance from the axis at which the pad's plane is free of the other finger's hub."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A finger's measures; widths are halves, thicknesses whole."""
+
+    length: float
+    width: float
+    tip_width: float
+    thickness: float
+    tip_thickness: float
+    window: bool = False
+    """An opening through the pad, as grasping forceps have."""
+    curve: float = 0.0
+    """How far the tip lies off the middle, along the yaw axis."""
+
+
+_DRIVER = Shape(0.0, 0.00235, 0.00170, 0.0024, 0.0014)
+_GRASPER = Shape(0.0, 0.00240, 0.00230, 0.0020, 0.0013, window=True)
+_DISSECTOR = Shape(0.0, 0.00220, 0.00090, 0.0021, 0.0011, curve=0.0028)
+_FORCEPS = Shape(0.0, 0.00220, 0.00120, 0.0020, 0.0011)
+_KINDS = {
+    "NEEDLE": _DRIVER,
+    "SUTURECUT": _DRIVER,
+    "CADIERE": _GRASPER,
+    "FENESTRATED": _GRASPER,
+    "PROGRASP": _GRASPER,
+    "BOWEL": _GRASPER,
+    "MARYLAND": _DISSECTOR,
+    "SCISSORS": _DISSECTOR,
+}
+"""By a word in the instrument's name; widths within those of the jaw meshes in unina-icaros/dvrk-vrep (4.8 mm, 3.0 mm for both), forms ours."""
+
+
+def shape(tool: Instrument, jaw: Jaw) -> Shape:
+    """Return the shape of the fingers of `tool`."""
+    kind = next((kind for word, kind in _KINDS.items() if word in tool.name), _FORCEPS)
+    return replace(kind, length=jaw.length)
+
+
+def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
+    """Return the meshes of the finger on the side +1 (left) or -1 (right), drawn in the frame `pose`, shape (4, 4)."""
+    length, back = form.length, form.thickness
+    profile = [(_ROOT, 0.0), (length, 0.0), (length, 0.6 * form.tip_thickness), (length - 0.0006, form.tip_thickness), (0.45 * length, back), (_ROOT, back)]
+    blade = plate("y", outline(profile), -0.01, 0.01) ^ plate("x", outline(_top_view(form, _ROOT / length), 0.0004), -0.01, 0.01)
+    low, high = sorted((-side * _HUB_WIDTH, 0.0))
+    hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
+    arm = block((0.0, low, 0.0), (back, high, _ROOT + 0.0012))
+    pad = plate("x", outline(_top_view(form, 0.42, 0.97, share=0.8)), 0.0, 0.0002)
+    if form.window:
+        half, low_end, high_end = 0.45 * form.width, 0.50 * length, 0.86 * length
+        hole = plate("x", outline([(-half, low_end), (half, low_end), (half, high_end), (-half, high_end)], 0.0004), -0.01, 0.01)
+        blade, pad = blade - hole, pad - hole
+    finished = [(name, union(hub, arm, blade - pad), STEEL), (f"{name}_pad", pad, DARK)]
+    solids = [(label, solid if side > 0 else solid.mirror((1.0, 0.0, 0.0)), material) for label, solid, material in finished]
+    return tuple(part(label, placed(solid, pose[:3, :3], pose[:3, 3]), material) for label, solid, material in solids)
+
+
+def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
+    """Return the box of a finger for contact: its pad's face is exactly the pad's plane."""
+    centre = np.array([side * form.tip_thickness / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0])
+    box = pose.copy()
+    box[:3, 3] += pose[:3, :3] @ centre
+    return Primitive(name, "box", (form.tip_thickness / 2.0, (form.width + form.tip_width) / 2.0, (form.length - _ROOT) / 2.0), box)
+
+
+def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -> list[tuple[float, float]]:
+    """Return the outline (y, z) of the pad's face between two fractions of the length, counter-clockwise, and over a share of its width."""
+    root = _ROOT / form.length
+    right, left = list[tuple[float, float]](), list[tuple[float, float]]()
+    for s in np.linspace(start, end, 5 if form.curve else 2).tolist():
+        half = share * (form.width + (form.tip_width - form.width) * (s - root) / (1.0 - root))
+        right.append((_curve(form, s) - half, s * form.length))
+        left.append((_curve(form, s) + half, s * form.length))
+    return [*left, *reversed(right)]
+
+
+def _curve(form: Shape, s: float) -> float:
+    return form.curve * s**2

@@ -1,0 +1,85 @@
+"""The equations of motion of one arm, in its independent joints: M(q) a + gravity(q) + elastic(q) + friction(v) = effort.
+
+The linkage, and the fingers held closed, move with the joints that lead them: with v = G u, from the velocities u of the
+independent joints to those of all, the inertia is G' M G and a load G' f.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.model.scene import build
+from engines.mujoco.model.tree import links
+from engines.mujoco.params import PsmParams, SceneArm, SceneParams
+from robots.dvrk import drives
+from schemas.vectors import Vector
+
+__all__ = ["JointDynamics", "dynamics"]
+
+
+@dataclass(frozen=True)
+class JointDynamics:
+    """At one configuration; rad, m, N m, N, by joint in the order of `joints`."""
+
+    joints: tuple[str, ...]
+    inertia: Vector
+    """Joint-space inertia matrix, shape (n, n)."""
+    gravity: Vector
+    """Effort that holds the arm against gravity, its base upright, shape (n,)."""
+    viscous_friction: Vector
+    """Effort per velocity of a joint that moves alone, shape (n,); the discs of an instrument couple wrist and jaw, see `friction`."""
+    coulomb_friction: Vector
+    """Effort of a joint that moves alone, shape (n,)."""
+    friction: Vector
+    """Effort against friction at the velocities asked for, shape (n,)."""
+    elastic_stiffness: Vector
+    """Shape (n,)."""
+    elastic: Vector
+    """Effort that holds the arm against its springs, shape (n,)."""
+
+
+def dynamics(arm: SceneArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
+    """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m) and velocities `dq` (rad/s, m/s).
+
+    Args:
+        arm: PSM1, PSM2, PSM3 or ECM.
+        tool: instrument of a PSM, by name or number; endoscope of the ECM.
+        q: one number per joint, in range.
+        dq: the same.
+    """
+    what = {"endoscope" if arm == "ECM" else "instrument": tool}
+    scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False})
+    params = scene.arms[arm]
+    model = build(scene)
+    data = mujoco.MjData(model)
+    joints = [joint.name for joint in params.chain.joints]
+    to_all = np.zeros((model.nv, len(joints)))
+    for link in links(arm, params):
+        leader, ratio = (link.follow.joint, link.follow.ratio) if link.follow else (link.name, 1.0)
+        if leader in joints:
+            to_all[int(model.joint(f"{arm}/{link.name}").dofadr[0]), joints.index(leader)] = ratio
+    data.qpos[:] = to_all @ q
+    mujoco.mj_forward(model, data)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    driven, wrist = (drives.psm(params.tool), drives.discs(params.tool)) if isinstance(params, PsmParams) else (drives.ECM, ())
+    at_rest = dict.fromkeys(driven, 0.0)
+    moving = drives.friction(driven, {**at_rest, **dict(zip(joints, dq, strict=True))}, wrist)
+    alone = [
+        [getattr(driven[name], kind) + sum(getattr(disc, kind) * abs(disc.shares.get(name, 0.0)) ** power for disc in wrist) for name in joints]
+        for kind, power in (("viscous_friction", 2), ("coulomb_friction", 1))
+    ]
+    return JointDynamics(
+        joints=tuple(joints),
+        inertia=to_all.T @ inertia @ to_all,
+        gravity=to_all.T @ data.qfrc_bias,
+        viscous_friction=np.array(alone[0]),
+        coulomb_friction=np.array(alone[1]),
+        friction=np.array([moving[name] for name in joints]),
+        elastic_stiffness=to_all.T @ model.jnt_stiffness,
+        elastic=to_all.T @ (model.jnt_stiffness * (data.qpos - model.qpos_spring)),
+    )

@@ -1,0 +1,58 @@
+"""A whole scene: arms, free or on the cart's setup joints, a table and objects."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from engines.mujoco import objects
+from engines.mujoco.model import arm, setup_joints, shapes
+from engines.mujoco.params import ArmParams, SceneParams
+from robots import rotation
+from schemas.vectors import Vector
+
+__all__ = ["build", "spec"]
+
+_TIMESTEP = 5e-4
+"""s, unless whoever steps the model sets another: what `MujocoParams` has."""
+
+
+def build(scene: SceneParams, timestep: float = _TIMESTEP) -> mujoco.MjModel:
+    """Return the compiled model of `scene`, to be stepped by `timestep` seconds."""
+    result = spec(scene)
+    result.option.timestep = timestep
+    return result.compile()
+
+
+def spec(scene: SceneParams) -> mujoco.MjSpec:
+    """Return the model of `scene` before it is compiled, to be exported or added to."""
+    result = mujoco.MjSpec()
+    result.modelname = scene.model
+    result.compiler.degree = False
+    result.option.timestep = _TIMESTEP
+    _set_options(result.option, grasping=bool(scene.objects))
+    result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
+    for name, params in scene.arms.items():
+        pose = mounts.get(name, _free_pose(params))
+        shapes.add_arm(result, name, params, arm.add(result, name, params, pose), seen=scene.looks)
+    if scene.table is not None:
+        objects.add_table(result, scene.table)
+    for name, thing in scene.objects.items():
+        objects.add(result, name, thing)
+    return result
+
+
+def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
+    """Choose how the model is stepped; where there is something to hold, so that friction holds it (docs/decisions/0012)."""
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    if grasping:
+        option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
+
+
+def _free_pose(params: ArmParams) -> Vector:
+    pose = np.eye(4)
+    pose[:3, :3] = rotation.matrix(np.array(params.orientation))
+    pose[:3, 3] = params.position
+    return pose

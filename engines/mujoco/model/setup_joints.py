@@ -1,0 +1,36 @@
+"""The patient cart and its setup joints: braked, so bodies that stand still where they are set."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.model import shapes, transform
+from engines.mujoco.params import SceneArm, SceneParams
+from robots.dvrk import setup_joints
+from robots.dvrk.cart import inverse_pose
+from schemas.vectors import Vector
+
+__all__ = ["CART", "add"]
+
+CART = "cart"
+"""The body of the cart; its frame, which is the world's, is the one in which the setup joints are told."""
+
+
+def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[SceneArm, Vector]:
+    """Add the cart and the setup joint of every arm in `scene`; return the poses of the arms' base frames in the world, shape (4, 4)."""
+    cart = spec.worldbody.add_body(name=CART)
+    if scene.looks:
+        shapes.add_looks(spec, "cart", {CART: (cart, np.eye(4))})
+    mounts: dict[SceneArm, Vector] = {}
+    for arm in scene.arms:
+        chain = setup_joints.chain(arm)
+        *poses, mounts[arm] = chain.frames(np.array(scene.setup_joints.get(arm, setup_joints.SIMULATED[arm])))
+        drawn = chain.frames(np.zeros(len(setup_joints.JOINT_NAMES)))
+        body, above, bodies = cart, np.eye(4), dict[str, tuple[mujoco.MjsBody, Vector]]()
+        for joint, pose, zero in zip(setup_joints.JOINT_NAMES, poses, drawn[:-1], strict=True):
+            body = body.add_body(name=f"SUJ/{arm}/{joint}", **transform.placed(inverse_pose(above) @ pose))
+            bodies[joint], above = (body, zero), pose
+        if scene.looks:
+            shapes.add_looks(spec, f"suj/{arm}", bodies)
+    return mounts

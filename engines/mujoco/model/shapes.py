@@ -1,0 +1,86 @@
+"""What arms, setup joints and cart look like, and what of them collides.
+
+Looks and collision shapes come from `engines.mujoco.looks`, drawn in an arm's base frame (or the cart's) with every joint at 0, and are carried
+to the bodies here. What collides: every link with table and objects; shaft, wrist and fingers also with those of the other arms. Covers of two
+arms pass through each other, as they do in the dVRK's own simulated setup (PSM2 and PSM3 stand in one another there), and no arm
+collides with itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import get_args
+
+import mujoco
+import numpy as np
+
+from engines.mujoco import looks
+from engines.mujoco.model import transform
+from engines.mujoco.params import EcmParams, PsmParams, SceneArm
+from engines.mujoco.ports import has_probe
+from robots.dvrk.cart import inverse_pose
+from schemas.vectors import Vector
+
+__all__ = ["Bodies", "add_arm", "add_looks"]
+
+Bodies = Mapping[str, tuple[mujoco.MjsBody, Vector]]
+"""Per link: its body, and the body's pose, shape (4, 4), in the frame that the look is drawn in, with every joint at 0."""
+
+_SEEN, _COLLIDING = 1, 3
+"""Groups of geoms; MuJoCo's viewer hides the latter unless asked."""
+_THINGS = 1
+"""The collision bit of table and objects, which is MuJoCo's default."""
+_BIT = {arm: 2 << i for i, arm in enumerate(get_args(SceneArm))}
+"""The collision bit of what each arm holds."""
+_KINDS = {"box": mujoco.mjtGeom.mjGEOM_BOX, "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE}
+_UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEEN}
+
+
+def add_arm(spec: mujoco.MjSpec, arm: SceneArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool) -> None:
+    """Give an arm and what it holds its collision shapes and, if it is to be `seen`, its looks."""
+    whats = ("ecm",) if isinstance(params, EcmParams) else ("psm", f"instrument/{params.tool.name}")
+    for what in whats:
+        if seen:
+            add_looks(spec, what, bodies)
+        _add_collision(spec, what, arm, bodies, group=_COLLIDING if seen else _SEEN)
+    if isinstance(params, PsmParams) and has_probe(params):
+        body, _ = bodies["wrist_yaw"]
+        body.add_geom(name=f"{arm}/probe", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[params.probe_radius, 0.0, 0.0], mass=0.0, group=_SEEN, **_instrument(arm))
+
+
+def add_looks(spec: mujoco.MjSpec, what: str, bodies: Bodies) -> None:
+    """Show the meshes of `what`, a name that `looks.parts` knows, on `bodies`."""
+    for link, parts in looks.parts(what).items():
+        body, pose = bodies[link]
+        for part in parts:
+            material = part.material
+            if spec.material(material.name) is None:
+                spec.add_material(name=material.name, rgba=material.rgba, specular=material.specular, shininess=material.shininess)
+            mesh = _mesh(spec, f"{what}/{part.name}", part, pose)
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, material=material.name, **_UNSEEN_BY_PHYSICS)
+
+
+def _add_collision(spec: mujoco.MjSpec, what: str, arm: SceneArm, bodies: Bodies, *, group: int) -> None:
+    for link, shapes in looks.collision(what).items():
+        body, pose = bodies[link]
+        for shape in shapes:
+            common = {"name": f"{arm}/{shape.name}", "mass": 0.0, "group": group}
+            if isinstance(shape, looks.Part):
+                mesh = _mesh(spec, f"{what}/{shape.name}", shape, pose)
+                body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common)
+            else:
+                place = transform.placed(inverse_pose(pose) @ shape.pose)
+                body.add_geom(type=_KINDS[shape.kind], size=[*shape.size, 0.0, 0.0][:3], **place, **common, **_instrument(arm))
+
+
+def _instrument(arm: SceneArm) -> dict[str, int]:
+    """Return the collision filter of shaft, wrist and fingers."""
+    return {"contype": _BIT[arm], "conaffinity": _THINGS | sum(_BIT.values()) - _BIT[arm]}
+
+
+def _mesh(spec: mujoco.MjSpec, name: str, part: looks.Part, pose: Vector) -> str:
+    """Add the mesh of `part` in the frame of a body at `pose`, unless another arm has brought it."""
+    if spec.mesh(name) is None:
+        vertices = (part.vertices - pose[:3, 3]) @ pose[:3, :3]
+        spec.add_mesh(name=name, uservert=vertices.ravel(), userface=np.asarray(part.faces, np.int32).ravel())
+    return name

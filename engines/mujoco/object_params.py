@@ -1,0 +1,69 @@
+"""What a scenario may say about the things that lie in a scene. Lengths in m, poses in the world."""
+
+from __future__ import annotations
+
+from math import pi, radians
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hub.participant import Params
+from robots.dvrk.instruments import STEEL_DENSITY
+from robots.dvrk.parameters import UnitQuaternion
+from schemas.quantity import Angle, Density, Length
+
+__all__ = ["BlockParams", "NeedleParams", "ObjectParams", "RingParams", "TableParams"]
+
+POLYAMIDE_DENSITY = 1130.0
+"""Polyamide 6, kg/m^3 (1.12 to 1.14 g/cm^3 by the makers' data sheets)."""
+
+
+class _Object(Params):
+    position: tuple[Length, Length, Length] = Field(description="of the object's frame in the world at time 0")
+    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the object's frame in the world at time 0: quaternion x, y, z, w")
+
+
+class RingParams(_Object):
+    """A torus; its frame is in the middle, z along the axis."""
+
+    kind: Literal["ring"]
+    radius: Length = Field(default=8e-3, gt=0.0, description="of the centre line")
+    wire_radius: Length = Field(default=1e-3, gt=0.0, description="of the cross-section")
+    density: Density = Field(default=POLYAMIDE_DENSITY, gt=0.0)
+
+    @property
+    def arc(self) -> float:
+        """The whole turn, rad."""
+        return 2.0 * pi
+
+
+class NeedleParams(_Object):
+    """A round wire bent to an arc; its frame is in the arc's centre, z normal to its plane, x to the middle of the wire.
+
+    The defaults are the needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm, wire 0.8 mm.
+    """
+
+    kind: Literal["needle"]
+    radius: Length = Field(default=11.44e-3, gt=0.0, description="of the centre line")
+    wire_radius: Length = Field(default=0.4e-3, gt=0.0, description="of the cross-section")
+    arc: Angle = Field(default=radians(180.9), gt=0.0, lt=2.0 * pi, description="from end to end")
+    density: Density = Field(default=STEEL_DENSITY, gt=0.0)
+
+
+class BlockParams(_Object):
+    """A box; its frame is in the middle. The default size is that of the small objects in unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt."""
+
+    kind: Literal["block"]
+    size: tuple[Length, Length, Length] = Field(default=(9e-3, 14e-3, 20.5e-3), description="along x, y and z")
+    density: Density = Field(default=POLYAMIDE_DENSITY, gt=0.0)
+
+
+ObjectParams = Annotated[RingParams | NeedleParams | BlockParams, Field(discriminator="kind")]
+"""One thing that can be moved."""
+
+
+class TableParams(Params):
+    """A fixed slab with a level top. The default size is that of all scenes of unina-icaros/dvrk-vrep."""
+
+    position: tuple[Length, Length, Length] = Field(description="of the middle of its top in the world")
+    size: tuple[Length, Length, Length] = Field(default=(0.4972, 0.6952, 0.02), description="along x, y and z")

@@ -1,0 +1,69 @@
+"""The ports of the MuJoCo engine, with CRTK's names where CRTK has one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from engines.mujoco.params import EcmParams, MujocoParams, PsmParams
+from engines.mujoco.positions import position_count
+from schemas.ports import BondSide, Port
+
+__all__ = ["bond_sides", "has_jaw", "has_probe", "scene_ports"]
+
+_JOINT_STATE, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
+_ALL = ("position", "velocity", "effort")
+_MODES = "[arm, jaw]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
+
+
+def has_jaw(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds an instrument that opens and closes."""
+    return isinstance(params, PsmParams) and params.tool.jaw is not None
+
+
+def has_probe(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds a palpation probe."""
+    return isinstance(params, PsmParams) and params.tool.name == "palpation-probe"
+
+
+def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
+    """Return all ports but those of bonds."""
+    slow = params.publish_period
+    ports = [port for name, arm in params.arms.items() for port in (*_arm_ports(name, arm, slow), *_jaw_ports(name, arm))]
+    size = position_count(params)
+    ports.append(Port(name="qpos", causality="output", size=size, period_ns=slow, description="joint positions of the whole model, as MuJoCo has them"))
+    return (*ports, *(port for name in params.objects for port in _object_ports(name, slow)))
+
+
+def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
+    """Return per palpation probe the bond `<arm>/probe`, in the world."""
+    return tuple(BondSide(name=f"{name}/probe", side="motion", frame="world") for name, arm in params.arms.items() if has_probe(arm))
+
+
+def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[Port]:
+    names = tuple(joint.name for joint in params.chain.joints)
+    still = (0.0,) * len(names)
+    yield Port(name=f"{arm}/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=params.start, description="goal of the joint servos")
+    yield Port(name=f"{arm}/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode")
+    yield Port(name=f"{arm}/control_mode", causality="input", size=2, start=(1.0, 1.0), description=_MODES)
+    yield Port(name=f"{arm}/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
+    yield Port(name=f"{arm}/setpoint_js", causality="output", type=_JOINT_STATE, names=names, period_ns=slow)
+    yield Port(name=f"{arm}/measured_cp", causality="output", type=_POSE, frame=f"{arm}_base", period_ns=slow)
+
+
+def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
+    if isinstance(params, PsmParams) and has_jaw(params):
+        names = ("jaw",)
+        yield Port(name=f"{arm}/jaw/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=(params.jaw,), description="goal of the jaw's servo")
+        yield Port(
+            name=f"{arm}/jaw/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=(0.0,), description="acts in effort mode"
+        )
+        yield Port(name=f"{arm}/jaw/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
+
+
+def _object_ports(thing: str, slow: int) -> Iterator[Port]:
+    yield Port(name=f"{thing}/pose", causality="output", type=_POSE, frame="world", period_ns=slow)
+    holder = "number of the PSM between whose jaws it is held (the first, where two hold it), 0 while nobody holds it"
+    yield Port(name=f"{thing}/held_by", causality="output", type="std_msgs/msg/Float64", period_ns=slow, description=holder)
+    slip = "how far it has moved in the jaws that hold it since they closed"
+    yield Port(name=f"{thing}/slip", causality="output", type="std_msgs/msg/Float64", unit="m", period_ns=slow, description=slip)
+    yield Port(name=f"{thing}/lift", causality="output", type="std_msgs/msg/Float64", unit="m", period_ns=slow, description="height over where it started")

@@ -1,0 +1,24 @@
+"""How many joint positions (`qpos`) the model of a scene has, known without building it."""
+
+from __future__ import annotations
+
+from engines.mujoco.params import EcmParams, SceneParams
+from robots.dvrk import ecm, psm
+from robots.dvrk.linkage import LINKAGES
+
+__all__ = ["position_count"]
+
+_FREE_BODY = 7
+"""Position and quaternion."""
+
+
+def position_count(scene: SceneParams) -> int:
+    """Return the size of `qpos`: joints, linkage and fingers of every arm, then the pose of every object."""
+    count = _FREE_BODY * len(scene.objects)
+    for name, arm in scene.arms.items():
+        if isinstance(arm, EcmParams):
+            count += len(ecm.JOINT_NAMES)
+        else:
+            count += len(psm.JOINT_NAMES) + (0 if arm.tool.jaw is None else 2)
+        count += len(LINKAGES[name].joints)
+    return count

@@ -1,0 +1,164 @@
+"""The drives of all arms of a scene: commands in, inputs of MuJoCo's servos out.
+
+All joints and jaws of all arms stand in one vector, in the order of the arms: joints, then the jaw if there is one. The setpoints
+follow the commands at most as fast as joints and jaws may move, so no command, however it jumps, closes a jaw through what lies
+between its fingers. One product lays out what the servos take: position, its slope as velocity, and a feed-forward effort.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.model import FINGERS
+from engines.mujoco.params import EcmParams, PsmParams, SceneArm
+from hub.inputs import Inputs
+from schemas.errors import SessionError
+from schemas.vectors import Vector
+
+__all__ = ["Servos"]
+
+_OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
+"""Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
+
+
+@dataclass
+class _Group:
+    """What is commanded through one pair of ports: the joints of an arm, or its jaw."""
+
+    arm: str
+    part: slice
+    """In the vectors of all drives."""
+    actuators: list[int]
+    bodies: list[int]
+    """Whose weight its controller bears."""
+    ports: str
+    """Its ports' names up to `servo_jp` and `servo_jf`."""
+    mode: float = _POSITION
+
+
+class Servos:
+    """Takes commands and modes, and keeps the setpoints. While all drives hold positions, a step allocates nothing."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams], period: float) -> None:
+        """Drive `arms`, which are stepped every `period` seconds, from where they start."""
+        self._model, self._data = model, data
+        self._groups: list[_Group] = []
+        rows: list[tuple[float, float, float, float]] = []  # per drive: start, lower, upper, velocity
+        shares: list[tuple[int, int, float]] = []  # actuator, drive, share of the drive's position
+        for arm, params in arms.items():
+            names = [joint.name for joint in params.chain.joints]
+            self._add_group(arm, f"{arm}/", names, len(rows), len(names))
+            shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
+            rows += [(q, joint.lower, joint.upper, joint.velocity) for q, joint in zip(params.start, params.chain.joints, strict=True)]
+            if isinstance(params, PsmParams) and (jaw := params.tool.jaw) is not None:
+                self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
+                shares += [(actuator, len(rows), 0.5) for actuator in self._groups[-1].actuators]
+                rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
+        start, self._lower, self._upper, speed = np.array(rows).T.copy()
+        n = start.size
+        self._inputs = np.concatenate([start, start, np.zeros(n)])
+        self.setpoint, self._previous, self._effort = np.split(self._inputs, 3)
+        self._command, self._change, self._way = start.copy(), np.zeros(n), speed * period
+        self._layout, self._measure = self._matrices(shares, n, period)
+        self._springs, self._rest = self._elasticity(shares, n)
+        self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
+        self._gravity_compensation = model.body_gravcomp.copy()
+        self._modes = {arm: np.full(2, _POSITION).tobytes() for arm in arms}
+        self._holding = True
+        np.multiply(self._springs, start - self._rest, out=self._effort)
+        self._layout.dot(self._inputs, data.ctrl)
+
+    def _add_group(self, arm: str, ports: str, joints: list[str], first: int, count: int) -> None:
+        model = self._model
+        actuators = [model.actuator(f"{arm}/{joint}").id for joint in joints]
+        fingers = {f"{arm}/{finger}" for finger in FINGERS}
+        own = fingers if joints == list(FINGERS) else {name for i in range(model.nbody) if (name := model.body(i).name).startswith(f"{arm}/")} - fingers
+        bodies = [i for i in range(model.nbody) if model.body(i).name in own]
+        self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports))
+
+    def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
+        """Return what makes `ctrl` of (setpoint, setpoint one step ago, effort), and what makes the drives' positions of `qpos`."""
+        model = self._model
+        layout, measure = np.zeros((model.nu, 3 * n)), np.zeros((n, model.nq))
+        for actuator, drive, share in shares:
+            at = int(model.actuator_ctrladr[actuator])
+            layout[at, drive] = share
+            layout[at + 1, [drive, n + drive]] = share / period, -share / period
+            layout[at + 2, 2 * n + drive] = 1.0  # both fingers with the jaw's torque: their work is then that of the jaw
+            measure[drive, model.jnt_qposadr[model.actuator_trnid[actuator, 0]]] = 1.0
+        return layout, measure
+
+    def _elasticity(self, shares: list[tuple[int, int, float]], n: int) -> tuple[Vector, Vector]:
+        """Return stiffness of the joints' own springs and where these are at rest, both shape (n,)."""
+        model = self._model
+        stiffness, rest = np.zeros(n), np.zeros(n)
+        for actuator, drive, _share in shares:
+            joint = int(model.actuator_trnid[actuator, 0])
+            stiffness[drive], rest[drive] = np.ravel(model.jnt_stiffness[joint])[0], model.qpos_spring[model.jnt_qposadr[joint]]
+        return stiffness, rest
+
+    def arm_setpoint(self, arm: str) -> Vector:
+        """Return the view of `setpoint` that is the joints of `arm`."""
+        return self.setpoint[next(group.part for group in self._groups if group.arm == arm)]
+
+    def is_off(self, arm: str) -> bool:
+        """Say whether the joints of `arm` have no torque."""
+        return any(group.mode == _OFF for group in self._groups if group.arm == arm and not group.ports.endswith("/jaw/"))
+
+    def begin(self, inputs: Inputs) -> None:
+        """Take commands and modes for the step that begins. Raises SessionError for a mode that there is none of."""
+        for arm, known in self._modes.items():
+            if (modes := inputs[f"{arm}/control_mode"]).tobytes() != known:
+                self._set_modes(arm, modes)
+        command, setpoint, change, way = self._command, self.setpoint, self._change, self._way
+        for group in self._groups:
+            command[group.part] = inputs[group.ports + "servo_jp"]
+        self._previous[:] = setpoint
+        np.maximum(command, self._lower, out=command)
+        np.minimum(command, self._upper, out=command)
+        np.subtract(command, setpoint, out=change)
+        if (np.abs(change) <= way).all():
+            setpoint[:] = command
+        else:
+            np.maximum(change, -way, out=change)
+            setpoint += np.minimum(change, way, out=change)
+        np.multiply(self._springs, np.subtract(setpoint, self._rest, out=self._effort), out=self._effort)  # what holds against the springs there
+        if not self._holding:
+            self._let_go(inputs)
+        self._layout.dot(self._inputs, self._data.ctrl)
+
+    def _let_go(self, inputs: Inputs) -> None:
+        """Where no position is held, push as told, and let the setpoint go with the joint: it is held from where it is then."""
+        measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)
+        for group in self._groups:
+            part = group.part
+            if group.mode != _POSITION:
+                self._effort[part] = inputs[group.ports + "servo_jf"] if group.mode == _EFFORT else 0.0
+                self.setpoint[part] = self._previous[part] = measured[part]
+
+    def _set_modes(self, arm: str, modes: Vector) -> None:
+        if not np.isin(modes, (_OFF, _POSITION, _EFFORT)).all():
+            raise SessionError(f"input '{arm}/control_mode' is {modes}; each of [arm, jaw] is 0 (off), 1 (position servo) or 2 (effort)")
+        for group, mode in zip([group for group in self._groups if group.arm == arm], modes.tolist(), strict=False):
+            gain, bias = self._gains
+            self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
+            self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
+            self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (mode != _OFF)
+            group.mode = mode
+        self._modes[arm] = modes.tobytes()
+        self._holding = all(group.mode == _POSITION for group in self._groups)
+
+    @property
+    def state(self) -> Vector:
+        """What MuJoCo's own state does not hold: setpoints and modes."""
+        return np.concatenate([self.setpoint, np.frombuffer(b"".join(self._modes.values()))])
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        self.setpoint[:] = state[: self.setpoint.size]
+        for arm, modes in zip(self._modes, state[self.setpoint.size :].reshape(-1, 2), strict=True):
+            self._set_modes(arm, modes)

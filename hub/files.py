@@ -1,0 +1,48 @@
+"""The files that a session reads, and their hashes: a recording names them, so that a re-simulation knows whether they are still the same."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import BaseModel
+
+from hub.participant import Params
+
+__all__ = ["changed_files", "file_hashes"]
+
+
+def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
+    """Return the SHA-256 of every file that a `Path` in `params` names, by its full path; relative ones start at `directory`.
+
+    A path of a directory stands for all files right in it.
+    """
+    files: set[Path] = set()
+    for named in _paths(list(params)):
+        path = (directory / named).resolve()
+        files |= {file for file in (path.iterdir() if path.is_dir() else (path,)) if file.is_file()}
+    return {str(file): _hash(file) for file in sorted(files)}
+
+
+def changed_files(recorded: Mapping[str, str]) -> list[str]:
+    """Return which files of `recorded`, hashes by path, are gone or hold something else by now."""
+    return [path for path, digest in recorded.items() if not Path(path).is_file() or _hash(Path(path)) != digest]
+
+
+def _hash(file: Path) -> str:
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
+
+
+def _paths(value: Any) -> Iterator[Path]:
+    if isinstance(value, Path):
+        yield value
+    elif isinstance(value, BaseModel):
+        yield from _paths(list(vars(value).values()))
+    elif isinstance(value, Mapping):
+        yield from _paths(list(cast("Mapping[Any, Any]", value).values()))
+    elif isinstance(value, (list, tuple, set, frozenset)):
+        for part in cast("Iterable[Any]", value):
+            yield from _paths(part)

@@ -1,0 +1,54 @@
+"""What `trocar model fk` says: where an arm's tip stands. The command itself is mounted beside the model's other commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypedDict
+
+import numpy as np
+
+from robots.dvrk.arms import base_frame, chain
+from schemas.errors import MotionError
+
+__all__ = ["TipPose", "fk", "table"]
+
+
+class TipPose(TypedDict):
+    """Pose of an arm's tip in the frame `frame`: what the real system publishes as `local/measured_cp`."""
+
+    arm: str
+    frame: str
+    q: dict[str, float]
+    """By joint, rad and m."""
+    p: list[float]
+    """Position, m."""
+    R: list[list[float]]
+    """Rotation matrix, by rows."""
+
+
+def fk(arm: str, tool: str | None, q: Sequence[float]) -> TipPose:
+    """Return where the tip of `arm` stands at joint positions `q` (rad, m).
+
+    Args:
+        arm: one of `robots.dvrk.arms.ARMS`.
+        tool: instrument of a PSM, by name or number, or endoscope of the ECM; None for the usual one.
+        q: one number per joint; the setup joint of the ECM also takes its four that move.
+
+    Raises:
+        MotionError: unknown arm or tool, another number of joints, or a joint out of its range.
+    """
+    kinematics = chain(arm, tool)
+    positions = [*q, 0.0, 0.0] if arm == "SUJ/ECM" and len(q) == 4 else list(q)
+    names = [joint.name for joint in kinematics.joints]
+    if len(positions) != len(names):
+        raise MotionError(f"{arm}: {len(q)} joint positions, expected {len(names)}: {', '.join(names)}")
+    kinematics.check(np.array(positions, np.float64))
+    tip = kinematics.forward(np.array(positions, np.float64)) + 0.0  # no negative zeros
+    return TipPose(arm=arm, frame=base_frame(arm), q=dict(zip(names, positions, strict=True)), p=tip[:3, 3].tolist(), R=tip[:3, :3].tolist())
+
+
+def table(pose: TipPose) -> str:
+    """Return the pose as lines for a person: joints, position and rotation matrix."""
+    joints = ", ".join(f"{name} {value:g}" for name, value in pose["q"].items())
+    rows = (f"R row {i}  " + "  ".join(f"{cell: .9f}" for cell in row) for i, row in enumerate(pose["R"]))
+    return "\n".join([f"{pose['arm']} at {joints} (rad, m)", f"tip in frame {pose['frame']}", "p (m)    " + "  ".join(f"{x: .9f}" for x in pose["p"]), *rows])

@@ -1,0 +1,51 @@
+"""The kinematics of any arm of the da Vinci Research Kit by its name."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from robots.dvrk import ecm, mtm, psm, setup_joints
+from robots.dvrk.instruments import Instrument, instrument
+from robots.serial_chain import SerialChain
+from schemas.errors import MotionError, did_you_mean
+
+__all__ = ["ARMS", "DEFAULT_INSTRUMENT", "base_frame", "chain"]
+
+_CART = ("PSM1", "PSM2", "PSM3", "ECM")
+ARMS = (*_CART, "MTML", "MTMR", *(f"SUJ/{arm}" for arm in _CART))
+"""Names of all arms, the setup joints as on the real system."""
+
+DEFAULT_INSTRUMENT = "LARGE_NEEDLE_DRIVER_400006"
+
+
+def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
+    """Return the kinematics of `arm` from `base_frame(arm)` to its tip.
+
+    Args:
+        arm: one of `ARMS`.
+        tool: name or number of the instrument of a PSM (a large needle driver 400006 unless given), endoscope of the ECM
+            (straight unless given); nothing for the others.
+
+    Raises:
+        MotionError: no such arm or tool; the message says which there are.
+    """
+    if arm in ("PSM1", "PSM2", "PSM3"):
+        return psm.chain(tool if isinstance(tool, Instrument) else instrument(tool or DEFAULT_INSTRUMENT))
+    if arm == "ECM":
+        for endoscope in get_args(ecm.Endoscope):
+            if endoscope == (tool or "straight"):
+                return ecm.chain(endoscope)
+        raise MotionError(f"no endoscope '{tool}'.{did_you_mean(str(tool), get_args(ecm.Endoscope))}")
+    if tool is not None:
+        raise MotionError(f"arm '{arm}' holds no instrument, so it takes none")
+    if arm == "MTML" or arm == "MTMR":
+        return mtm.chain(arm)
+    for carried in get_args(setup_joints.CartArm):
+        if arm == f"SUJ/{carried}":
+            return setup_joints.chain(carried)
+    raise MotionError(f"no arm '{arm}'.{did_you_mean(arm, ARMS)}")
+
+
+def base_frame(arm: str) -> str:
+    """Return the name of the frame in which `chain(arm)` stands: the arm's own, the cart's for a setup joint."""
+    return "cart" if arm.startswith("SUJ/") else f"{arm}_base"

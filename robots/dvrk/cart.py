@@ -1,0 +1,37 @@
+"""Frames of a whole patient cart: what the real system calls the base frame of an arm, and the view of its endoscope.
+
+An arm's `local/measured_cp` is the pose of its tip in its own base frame `<arm>_base`. With setup joints and an endoscope,
+`ECM/measured_cp` is the camera in the cart's frame, `SUJ/<arm>/local/measured_cp` an arm's base in the cart's frame,
+`SUJ/<arm>/measured_cp` the same in the camera's frame, and `PSM1/measured_cp` the tip in the camera's frame
+(jhu-dvrk/sawIntuitiveResearchKit, core/components/code/mtsIntuitiveResearchKitSUJ.cpp).
+"""
+
+from __future__ import annotations
+
+from robots.dvrk.setup_joints import CartArm, base_pose
+from schemas.vectors import Vector
+
+__all__ = ["base_in_view", "camera_pose", "inverse_pose"]
+
+
+def inverse_pose(pose: Vector) -> Vector:
+    """Return the inverse of homogeneous transforms, shape (..., 4, 4)."""
+    inverse = pose.copy()
+    inverse[..., :3, :3] = pose[..., :3, :3].swapaxes(-1, -2)
+    inverse[..., :3, 3:] = -inverse[..., :3, :3] @ pose[..., :3, 3:]
+    return inverse
+
+
+def camera_pose(endoscope_tip: Vector, setup_positions: Vector) -> Vector:
+    """Return the pose of the camera in the cart's frame, shape (4, 4).
+
+    Args:
+        endoscope_tip: pose of the camera in `ECM_base`, shape (4, 4): the ECM's `forward`.
+        setup_positions: of the setup joint that carries the ECM, shape (6,).
+    """
+    return base_pose("ECM", setup_positions) @ endoscope_tip
+
+
+def base_in_view(arm: CartArm, setup_positions: Vector, camera: Vector) -> Vector:
+    """Return the pose of `<arm>_base` in the camera's frame, shape (4, 4), from setup joint positions (6,) and `camera_pose`."""
+    return inverse_pose(camera) @ base_pose(arm, setup_positions)

@@ -1,0 +1,126 @@
+"""Joint-space dynamics of an arm: inertia matrix and gravity, from its kinematics, its linkage and the masses of its bodies.
+
+Every body moves as a rigid displacement D(q) from where it is with every joint at 0. With the pseudo-inertia J of the body
+(integral of r r^T over its mass, r homogeneous, in the base frame there) the inertia matrix is M_ij = sum trace(D_i J D_j^T) and the
+effort of gravity G_i = -sum g^T D_i J e4, D_i being the derivative by q_i (Uicker's form of Lagrange's equations; Siciliano et
+al., Robotics, section 7.1). The linkage's bodies follow the joints, so that all is a function of the independent joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from robots.dvrk import drives, ecm, inertia, linkage, psm
+from robots.dvrk.inertia import Inertia
+from robots.dvrk.instruments import Instrument
+from robots.dvrk.linkage import Linkage
+from robots.serial_chain import SerialChain
+from schemas.vectors import Vector
+
+__all__ = ["STANDARD_GRAVITY", "Dynamics", "of_ecm", "of_psm"]
+
+STANDARD_GRAVITY = 9.81
+"""m/s^2, as in the identified model and the real controller's gravity compensation."""
+
+
+class _Motion(NamedTuple):
+    """How a body moves against its parent: `ratio` times joint `joint` along `twist`, shape (4, 4), in the base frame at q = 0."""
+
+    parent: int
+    joint: int
+    ratio: float
+    twist: Vector
+    is_revolute: bool
+
+
+class Dynamics:
+    """The dynamics of one arm over its n independent joints."""
+
+    def __init__(self, chain: SerialChain, bars: Linkage, bodies: Mapping[str, Inertia], rotors: Vector) -> None:
+        """Take kinematics, linkage, bodies by link, and the inertia of the drives at the joints, shape (n,).
+
+        A body that is neither a joint's nor the linkage's (a finger of the jaw) moves with the last link.
+        """
+        self._joints = len(chain.joints)
+        self._rotors = np.diag(rotors)
+        index = {joint.name: i for i, joint in enumerate(chain.joints)}
+        self._motions = [_Motion(i - 1, i, 1.0, *_joint_twist(chain, i)) for i in range(self._joints)]
+        for passive in bars.joints:
+            leader, parent = index[passive.follows], index[passive.parent]
+            is_revolute = chain.joints[leader].kind == "revolute"
+            axis = linkage.PITCH_AXIS if is_revolute else linkage.INSERTION_AXIS
+            twist = _twist(np.array(axis), np.array(passive.pivot), is_revolute)
+            index[passive.name] = len(self._motions)
+            self._motions.append(_Motion(parent, leader, passive.ratio, twist, is_revolute))
+        self._moved_by = [index.get(name, self._joints - 1) for name in bodies]
+        self._pseudo = np.array([body.pseudo_inertia for body in bodies.values()])  # (bodies, 4, 4)
+
+    def displacements(self, q: Vector) -> Vector:
+        """Return the derivatives by the joints of the bodies' displacements, shape (bodies, n, 4, 4), bodies in the order they were given."""
+        n = self._joints
+        poses, slopes = np.empty((len(self._motions), 4, 4)), np.zeros((len(self._motions), n, 4, 4))
+        for i, motion in enumerate(self._motions):
+            step = _exponential(motion.twist, motion.ratio * float(q[motion.joint]), motion.is_revolute)
+            above = poses[motion.parent] if motion.parent >= 0 else np.eye(4)
+            poses[i] = above @ step
+            if motion.parent >= 0:
+                slopes[i] = slopes[motion.parent] @ step
+            slopes[i, motion.joint] += motion.ratio * above @ motion.twist @ step
+        return slopes[self._moved_by]
+
+    def inertia_matrix(self, q: Vector) -> Vector:
+        """Return the joint-space inertia matrix at `q`, shape (n, n): kg m^2, kg m, kg."""
+        slopes = self.displacements(q)
+        return np.einsum("biac,bcd,bjad->ij", slopes, self._pseudo, slopes) + self._rotors
+
+    def gravity(self, q: Vector, acceleration: Vector | None = None) -> Vector:
+        """Return the effort (N m, N) that holds the arm at `q` against gravity, shape (n,).
+
+        Args:
+            q: joint positions, shape (n,).
+            acceleration: of gravity in the base frame, m/s^2, shape (3,); along -z, for an upright base, unless given. On a base
+                turned by R against the world it is R^T (0, 0, -9.81).
+        """
+        pull = np.array([0.0, 0.0, -STANDARD_GRAVITY]) if acceleration is None else acceleration
+        return -np.einsum("a,biac,bc->i", pull, self.displacements(q)[..., :3, :], self._pseudo[..., 3])
+
+
+def of_psm(tool: Instrument, probe_radius: float = inertia.PROBE_RADIUS) -> Dynamics:
+    """Return the dynamics of a PSM with `tool`, its jaw closed."""
+    chain = psm.chain(tool)
+    rotors = [drives.psm(tool)[joint.name].armature for joint in chain.joints]
+    return Dynamics(chain, linkage.PSM, inertia.psm(tool, probe_radius), np.array(rotors))
+
+
+def of_ecm(endoscope_mass: float = inertia.ENDOSCOPE_MASS["Classic_SD"]) -> Dynamics:
+    """Return the dynamics of the ECM with an endoscope of this mass (kg)."""
+    chain = ecm.chain()
+    rotors = [drives.ECM[joint.name].armature for joint in chain.joints]
+    return Dynamics(chain, linkage.ECM, inertia.ecm(endoscope_mass), np.array(rotors))
+
+
+def _joint_twist(chain: SerialChain, i: int) -> tuple[Vector, bool]:
+    frame = chain.frames(np.zeros(len(chain.joints)))[i]
+    is_revolute = chain.joints[i].kind == "revolute"
+    return _twist(frame[:3, 2], frame[:3, 3], is_revolute), is_revolute
+
+
+def _twist(axis: Vector, point: Vector, is_revolute: bool) -> Vector:
+    result = np.zeros((4, 4))
+    if is_revolute:
+        x, y, z = axis
+        result[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+        result[:3, 3] = -result[:3, :3] @ point
+    else:
+        result[:3, 3] = axis
+    return result
+
+
+def _exponential(twist: Vector, q: float, is_revolute: bool) -> Vector:
+    """Return exp(q twist): for a rotation 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q T."""
+    if not is_revolute:
+        return np.eye(4) + q * twist
+    return np.eye(4) + np.sin(q) * twist + (1.0 - np.cos(q)) * twist @ twist

@@ -1,0 +1,196 @@
+"""Closed-form inverse kinematics of the arms whose shaft passes a remote centre of motion (RCM): PSM and ECM.
+
+The shaft turns about the RCM, the base frame's origin, by yaw and pitch, slides by insertion and rolls. With d its direction and
+r the signed way from the RCM to the point where the wrist begins, all in the base frame:
+
+PSM. The wrist yaw axis z6 passes o6, both known from the goal. The wrist pitch axis z5 is perpendicular to z6 and to the shaft, and
+x5 points from it to the wrist yaw axis, a away. As the RCM lies on the shaft, the plane normal to z5 through the shaft holds RCM, o6
+and z6: so x5 is, up to its sign, the part of o6 perpendicular to z6, and o5 = o6 - a x5 = r d. Two signs of x5 and two of r: four
+branches. Where the yaw axis passes the RCM any x5 will do: the wrist yaw of `near` stays. Where the pitch axis passes it (insertion
+15.6 mm with the instruments of the Classic) any d perpendicular to z5 will do: the shaft stays as near to that of `near` as the
+wrist pitch allows.
+
+ECM. Four joints cannot take any pose. As on the real arm the position decides yaw, pitch and insertion, and the roll is what comes
+nearest to the orientation asked for; what remains is accepted up to `ORIENTATION_TOLERANCE` and refused beyond.
+
+Of the branches inside all joint ranges the one nearest to `near` is taken, by the time that each joint would need at its velocity limit.
+"""
+
+from __future__ import annotations
+
+from math import degrees, pi, radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.dvrk import ecm, psm
+from robots.dvrk.cart import inverse_pose
+from robots.serial_chain import Joint, SerialChain
+from schemas.errors import MotionError
+from schemas.vectors import Vector
+
+__all__ = ["ORIENTATION_TOLERANCE", "inverse"]
+
+ORIENTATION_TOLERANCE = radians(20.0)
+"""Between the ECM's goal and the nearest orientation at its position, rad. The real controller (jhu-dvrk/sawIntuitiveResearchKit,
+robManipulatorECM.cpp) has no bound. Below the 30 degrees by which endoscopes differ, so that a goal meant for another one is
+refused; above the 11 degrees that 20 mm sideways at a depth of 100 mm need, a step for which nobody should have to work out the orientation."""
+
+_SLACK = 1e-9
+"""rad and m by which rounding may carry a joint past its limit."""
+_POINT = 1e-9
+"""m: two axes that pass each other so closely meet."""
+_RCM_ROWS = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in psm.ARM_JOINTS)
+_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+_TURN = 2.0 * pi
+_BRANCH_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])[:, None, None], np.array([1.0, 1.0, -1.0, -1.0])[:, None, None]
+"""Of x5 and of the shaft's direction, in the four branches of a PSM."""
+_WRIST_ALPHAS = (0.0, -pi / 2, -pi / 2)
+
+
+def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
+    """Return joint positions, shape (..., n), inside the joint ranges, at which the tip has `pose`.
+
+    Args:
+        chain: a PSM with a wrist of three joints, or an ECM.
+        pose: of the tip in the chain's base frame, shape (..., 4, 4).
+        near: joint positions that decide between solutions, shape (n,) or (..., n).
+
+    Raises:
+        MotionError: not finite, or not reachable; the message names the joints, what they would have to be and their ranges.
+            Of many poses it speaks of the first that fails.
+    """
+    n = len(chain.joints)
+    poses = np.asarray(pose, np.float64).reshape(-1, 4, 4)
+    start = np.broadcast_to(near, (*np.shape(pose)[:-2], n)).reshape(-1, n)
+    if not (np.isfinite(poses).all() and np.isfinite(start).all()):
+        raise MotionError("a pose or a joint position that is not finite cannot be reached")
+    ends = poses @ inverse_pose(chain.tip)
+    if n == len(ecm.JOINTS):
+        _require(chain, ecm.JOINTS[3:])
+        branches = _ecm_branches(chain, ends)
+    else:
+        _require(chain, chain.joints[3:])
+        branches = _psm_branches(chain, ends, start)
+    branches = _unwind(chain, branches, start)
+    excess = np.maximum(chain.lower - branches, branches - chain.upper)  # (branches, N, n)
+    cost = np.where((excess <= _SLACK).all(axis=-1), (((branches - start) / chain.velocity) ** 2).sum(axis=-1), np.inf)
+    best, each = cost.argmin(axis=0), np.arange(len(poses))
+    reached = np.isfinite(cost[best, each])
+    if not reached.all():
+        raise _unreachable(chain, branches[:, reached.argmin()], reached.argmin(), len(poses))
+    q = np.clip(branches[best, each], chain.lower, chain.upper)
+    if n == len(ecm.JOINTS):
+        _check_orientation(chain.forward(q), poses)
+    return q.reshape(*np.shape(pose)[:-2], n)
+
+
+def _require(chain: SerialChain, wrist: tuple[Joint, ...]) -> None:
+    """Refuse a chain that the closed form is not for."""
+    rows = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in chain.joints[:3])
+    alphas = tuple(joint.alpha for joint in wrist)
+    if rows != _RCM_ROWS or alphas != _WRIST_ALPHAS[: len(wrist)] or len(chain.joints) != 3 + len(wrist) or len(wrist) not in (1, 3):
+        names = ", ".join(joint.name for joint in chain.joints)
+        raise MotionError(f"no closed form for the joints {names}: it is for a PSM with roll, wrist pitch and wrist yaw, and for the ECM")
+
+
+def _ecm_branches(chain: SerialChain, ends: Vector) -> Vector:
+    """Return the joint positions, shape (2, N, 4), of poses of the last link, shape (N, 4, 4)."""
+    position, rotation = ends[:, :3, 3], ends[:, :3, :3]
+    distance = np.linalg.norm(position, axis=-1, keepdims=True)
+    outwards = np.where(distance > _POINT, position / np.maximum(distance, _POINT), rotation[:, :, 2])
+    shaft = outwards * _BRANCH_SIGNS[0][:2]  # (2, N, 3)
+    q = np.empty((2, len(ends), 4))
+    x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, position), q)
+    # The turn about the shaft that brings x4, y4 nearest to the goal's x and y (least squares of the matrices' difference).
+    x, y = rotation[:, :, 0], rotation[:, :, 1]
+    q[..., 3] = np.arctan2(_dot(x, y3) - _dot(y, x3), _dot(x, x3) + _dot(y, y3)) - chain.joints[3].theta
+    return q
+
+
+def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
+    """Return the joint positions, shape (4, N, 6), of poses of the wrist yaw link, shape (N, 4, 4)."""
+    roll, pitch, yaw = chain.joints[3:]
+    x6, y6, yaw_axis, centre = ends[:, :3, 0], ends[:, :3, 1], ends[:, :3, 2], ends[:, :3, 3]
+    across = centre - _dot(centre, yaw_axis)[:, None] * yaw_axis
+    distance = np.linalg.norm(across, axis=-1, keepdims=True)
+    angle = near[:, 5:] + yaw.theta
+    kept = np.cos(angle) * x6 - np.sin(angle) * y6  # x5 at the wrist yaw of `near`
+    x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept) * _BRANCH_SIGNS[0]  # (4, N, 3)
+    z5 = _cross(x5, yaw_axis)
+    wrist = centre - yaw.a * x5
+    shaft = _shaft(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
+    q = np.empty((4, len(ends), 6))
+    x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, wrist), q)
+    q[..., 3] = np.arctan2(-_dot(z5, x3), _dot(z5, y3)) - roll.theta
+    q[..., 4] = np.arctan2(-_dot(x5, shaft), _dot(x5, _cross(z5, shaft))) - pitch.theta
+    q[..., 5] = np.arctan2(-_dot(y6, x5), _dot(x6, x5)) - yaw.theta
+    return q
+
+
+def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vector) -> Vector:
+    """Return the direction of the shaft, shape (4, N, 3), perpendicular to the wrist pitch axis z5, that passes RCM and wrist."""
+    distance = np.linalg.norm(wrist, axis=-1, keepdims=True)
+    yaw, pitch = near[:, 0], near[:, 1]
+    old = np.stack([np.cos(pitch) * np.sin(yaw), -np.sin(pitch), -np.cos(pitch) * np.cos(yaw)], axis=-1)
+    y5 = _cross(z5, x5)
+    joint = chain.joints[4]
+    bend = np.clip(np.arctan2(-_dot(old, y5), _dot(old, x5)), joint.lower, joint.upper)[..., None]
+    free = np.cos(bend) * x5 - np.sin(bend) * y5
+    shaft = np.where(distance > _POINT, wrist - _dot(wrist, z5)[..., None] * z5, free)
+    return shaft / np.linalg.norm(shaft, axis=-1, keepdims=True)
+
+
+def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -> tuple[Vector, Vector]:
+    """Write yaw, pitch and insertion into `q` and return the axes x3 and y3 of the insertion link, each shape (branches, N, 3).
+
+    The shaft's direction is (cos q2 sin q1, -sin q2, -cos q2 cos q1).
+    """
+    across = np.hypot(shaft[..., 0], shaft[..., 2])
+    q[..., 0] = np.arctan2(shaft[..., 0], -shaft[..., 2])
+    q[..., 1] = np.arctan2(-shaft[..., 1], across)
+    q[..., 2] = depth - chain.joints[3].d - chain.joints[2].d
+    s1, c1, s2, c2 = np.sin(q[..., 0]), np.cos(q[..., 0]), np.sin(q[..., 1]), np.cos(q[..., 1])
+    x3 = np.stack([-s1 * s2, -c2, c1 * s2], axis=-1)
+    return x3, _cross(shaft, x3)
+
+
+def _dot(a: Vector, b: Vector) -> Vector:
+    product: Vector = np.vecdot(a, b)
+    return product
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a.take(_YZX, -1) * b.take(_ZXY, -1) - a.take(_ZXY, -1) * b.take(_YZX, -1)  # a quarter of the cost of np.cross
+
+
+def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
+    """Return revolute positions as many whole turns away as is nearest to `near`, or to the middle of the range if that is outside."""
+    revolute = [i for i, joint in enumerate(chain.joints) if joint.kind == "revolute"]
+    q, lower, upper = branches[..., revolute], chain.lower[revolute], chain.upper[revolute]
+    nearest = q + _TURN * np.round((near[:, revolute] - q) / _TURN)
+    central = q + _TURN * np.round(((lower + upper) / 2 - q) / _TURN)
+    unwound = branches.copy()
+    unwound[..., revolute] = np.where((nearest >= lower - _SLACK) & (nearest <= upper + _SLACK), nearest, central)
+    return unwound
+
+
+def _unreachable(chain: SerialChain, branches: Vector, index: np.intp, count: int) -> MotionError:
+    """Say of the branch that needs least beyond the joint ranges, shape (branches, n), which joints stand against it."""
+    beyond = np.maximum(np.maximum(chain.lower - branches, branches - chain.upper), 0.0) / (chain.upper - chain.lower)
+    q = branches[beyond.sum(axis=-1).argmin()]
+    reasons = "; ".join(chain.out_of_range(q, slack=_SLACK))
+    return MotionError(f"pose{f' {index}' if count > 1 else ''} cannot be reached: {reasons}")
+
+
+def _check_orientation(reached: Vector, asked: Vector) -> None:
+    """Refuse goals whose orientation the ECM misses by more than `ORIENTATION_TOLERANCE`."""
+    difference = np.linalg.norm(reached[:, :3, :3] - asked[:, :3, :3], axis=(-2, -1))
+    angles: NDArray[np.float64] = 2.0 * np.arcsin(np.minimum(difference / np.sqrt(8.0), 1.0))
+    worst = int(angles.argmax())
+    if angles[worst] > ORIENTATION_TOLERANCE:
+        where = f" {worst}" if len(asked) > 1 else ""
+        raise MotionError(
+            f"pose{where} cannot be reached: four joints leave its orientation {degrees(angles[worst]):.1f} degrees away at this position, "
+            f"allowed are {degrees(ORIENTATION_TOLERANCE):g}; the endoscope looks away from the remote centre of motion"
+        )

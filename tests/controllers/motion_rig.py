@@ -1,0 +1,106 @@
+"""A motion controller stepped by hand, with a robot that is always exactly where it is told to be, or where a test puts it."""
+
+from pathlib import Path
+
+import numpy as np
+
+from controllers.motion.controller import MotionController
+from controllers.motion.params import MotionParams
+from hub.inputs import Inputs
+from hub.participant import Setup
+from schemas.crtk import StringStamped
+from schemas.ros import EmptyMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
+
+H = 1_000_000
+HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
+PSM1 = {"PSM1": {"instrument": "400006"}}
+CART = {**PSM1, "PSM2": {"instrument": "400006"}, "PSM3": {"instrument": "400006"}, "ECM": {}}
+
+
+class Rig:
+    def __init__(self, arms=PSM1, initial_state="homed", **params):
+        self.motion = MotionController("motion", MotionParams.model_validate({"arms": arms, "initial_state": initial_state, **params}))
+        self.outputs = dict(self.motion.configure(Setup(H, Path())))
+        self.sensed = {}
+        for port in self.motion.ports:
+            if port.causality == "input" and port.variability == "signal":
+                self.sensed[port.name] = np.zeros(3 * len(port.names))
+        self.inputs = Inputs(self.sensed)
+        self.follows, self.t = True, 0
+        self.heard = {}
+        self.mirror()
+
+    def mirror(self):
+        for port, value in self.sensed.items():
+            command = self.outputs[port.replace("sense/", "drive/").replace("measured_js", "servo_jp")]
+            value[: command.size] = command
+
+    def step(self, count=1, **orders):
+        """Step; orders of the first step by port, `__` for `/`; PSM1's unless they name an arm."""
+        events = {}
+        for name, order in orders.items():
+            port = name.replace("__", "/")
+            events[port if port.startswith(("PSM", "ECM")) else f"PSM1/{port}"] = order if isinstance(order, tuple) else (order,)
+        self.heard = {}
+        for _ in range(count):
+            self.inputs._events = events
+            self.outputs = dict(self.motion.step(self.t, H, self.inputs))
+            self.t += H
+            events = {}
+            if self.follows:
+                self.mirror()
+            for port, value in self.outputs.items():
+                if isinstance(value, tuple) and value:
+                    self.heard[port] = (*self.heard.get(port, ()), *value)
+        return self
+
+    def command(self, text, count=1):
+        return self.step(count, state_command=StringStamped(string=text))
+
+    def said(self, name, arm="PSM1"):
+        """What was said on an event port since the orders were given."""
+        return [getattr(message, "data", message) for message in self.heard.get(f"{arm}/{name}", ())]
+
+    def states(self, arm="PSM1"):
+        return [(m.state, m.is_homed, m.is_busy) for m in self.said("operating_state", arm)]
+
+    @property
+    def setpoint(self):
+        return self.outputs["drive/PSM1/servo_jp"].copy()
+
+    @property
+    def mode(self):
+        return self.outputs["drive/PSM1/control_mode"].tolist()
+
+    def until_idle(self, most=20_000):
+        for _ in range(most):
+            self.step()
+            if any(not busy for _, _, busy in self.states()):
+                return self
+        raise AssertionError("still busy")
+
+
+def jp(*values, names=()):
+    return JointState(name=list(names), position=np.array(values, np.float64))
+
+
+def jf(*values):
+    return JointState(effort=np.array(values, np.float64))
+
+
+def cp(pose, frame=""):
+    x, y, z, *q = (float(value) for value in pose)
+    orientation = Quaternion.model_construct(**dict(zip("xyzw", q, strict=True)))
+    return PoseStamped(header=Header(frame_id=frame), pose=Pose(position=Point(x=x, y=y, z=z), orientation=orientation))
+
+
+def cf(*values, frame=""):
+    force, torque = (Vector3(**dict(zip("xyz", map(float, part), strict=True))) for part in (values[:3], values[3:]))
+    return WrenchStamped(header=Header(frame_id=frame), wrench=Wrench(force=force, torque=torque))
+
+
+EMPTY = EmptyMessage()
+
+
+def ratio(value):
+    return Float64Message(data=value)

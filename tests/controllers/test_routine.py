@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from controllers.routine import Routine, RoutineParams
+from hub.inputs import Inputs
+from hub.participant import Setup
+from hub.testing import check_engine
+from schemas.crtk import OperatingState
+from schemas.errors import SessionError, StateError
+from schemas.ros import StringMessage
+
+H = 1_000_000
+STEPS = [
+    {"do": "state", "arm": "PSM1", "command": "home"},
+    {"do": "wait", "time": "2 ms"},
+    {
+        "do": "together",
+        "orders": [
+            {"do": "jaw", "arm": "PSM1", "angle": "30 deg"},
+            {"do": "move_cp", "arm": "PSM2", "position": ["10 mm", 0, "-0.1 m"], "orientation": [0, 0, 0, 1]},
+        ],
+    },
+]
+
+
+class Run:
+    """A routine whose arms are played by hand."""
+
+    def __init__(self, tmp_path, steps=STEPS, **params):
+        self.routine = Routine("routine", RoutineParams.model_validate({"steps": steps, **params}))
+        self.outputs, self.t = self.routine.configure(Setup(H, tmp_path)), 0
+
+    def step(self, **events):
+        inputs = Inputs({})
+        inputs._events = {name.replace("__", "/"): (message,) for name, message in events.items()}
+        self.outputs = dict(self.routine.step(self.t, H, inputs))
+        self.t += H
+        return {name: value for name, value in self.outputs.items() if isinstance(value, tuple) and value}
+
+
+def busy(value):
+    return OperatingState(state="ENABLED", is_homed=True, is_busy=value)
+
+
+def test_each_order_is_given_once_and_waited_for_until_the_arm_was_busy_and_is_not(tmp_path):
+    run = Run(tmp_path)
+    assert run.step()["PSM1/state_command"][0].string == "home"
+    assert not run.step(PSM1__operating_state=busy(False))  # from before the order
+    assert not run.step(PSM1__operating_state=busy(True))
+    assert run.outputs["step"][0] == 0.0
+    run.step(PSM1__operating_state=busy(False))
+    assert run.outputs["step"][0] == 1.0
+    for _ in range(3):
+        assert not run.step()
+    given = run.step()
+    assert given["PSM1/jaw/move_jp"][0].position == pytest.approx([np.radians(30)])
+    assert given["PSM2/move_cp"][0].header.frame_id == "PSM2_base"
+    assert given["PSM2/move_cp"][0].pose.position.x == pytest.approx(0.01)
+    run.step(PSM1__operating_state=busy(True), PSM2__operating_state=busy(True))
+    run.step(PSM1__operating_state=busy(False))
+    assert run.outputs["done"][0] == 0.0
+    run.step(PSM2__operating_state=busy(False))
+    assert run.outputs["done"][0] == 1.0
+    assert not run.step()
+
+
+@pytest.mark.parametrize("port", ["error", "warning"])
+def test_a_refused_order_ends_the_session_with_the_controllers_words(tmp_path, port):
+    run = Run(tmp_path)
+    run.step()
+    with pytest.raises(SessionError, match="step 0: PSM1: move_cp refused: too far"):
+        run.step(**{f"PSM1__{port}": StringMessage(data="PSM1: move_cp refused: too far")})
+
+
+def test_an_order_that_is_never_done_ends_the_session_and_names_the_arm(tmp_path):
+    run = Run(tmp_path, limit="5 ms")
+    for _ in range(6):
+        run.step()
+    with pytest.raises(SessionError, match=r"step 0: PSM1 not done within 0\.005 s"):
+        run.step()
+
+
+def test_a_restored_routine_goes_on_where_it_was(tmp_path):
+    run, other = Run(tmp_path), Run(tmp_path)
+    run.step()
+    run.step(PSM1__operating_state=busy(True))
+    other.routine.restore(run.routine.save())
+    other.t = run.t
+    for one in (run, other):
+        one.step(PSM1__operating_state=busy(False))
+    assert other.outputs["step"][0] == 1.0
+    assert run.routine.state_hash() == other.routine.state_hash()
+    with pytest.raises(StateError, match="3 bytes"):
+        run.routine.restore(b"abc")
+
+
+def test_it_keeps_the_contract_of_a_controller():
+    steps = [{"do": "wait", "time": 0}, *STEPS]
+    check_engine(lambda: Routine("routine", RoutineParams.model_validate({"steps": steps})), period_ns=H, counts_steps=True)
+
+
+@pytest.mark.parametrize("step", [{"do": "jump"}, {"do": "jaw", "arm": "MTML", "angle": 0}, {"do": "together", "orders": []}])
+def test_steps_that_mean_nothing_are_refused(step):
+    with pytest.raises(ValidationError):
+        RoutineParams.model_validate({"steps": [step]})

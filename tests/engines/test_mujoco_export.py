@@ -1,0 +1,185 @@
+import json
+import logging
+
+import mujoco
+import numpy as np
+import pytest
+import yourdfpy
+from typer.testing import CliRunner
+
+from engines.mujoco.command_line import app
+from engines.mujoco.export import write
+from engines.mujoco.model import build, spec
+from engines.mujoco.params import SceneParams
+from robots.dvrk.linkage import LINKAGES
+
+SCENE = SceneParams.model_validate(
+    {
+        "mounting": "cart",
+        "arms": {"PSM1": {"instrument": "400006"}, "PSM3": {"instrument": "400172"}, "ECM": {"endoscope": "down"}},
+        "setup_joints": {"PSM1": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]},
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    where = tmp_path_factory.mktemp("export")
+    write(spec(SCENE), where / "dvrk.xml", "mjcf")
+    write(spec(SCENE), where / "dvrk.urdf", "urdf")
+    return where
+
+
+def some_positions(model):
+    lower, upper = model.jnt_range.T
+    return np.random.default_rng(1).uniform(lower, upper)
+
+
+def test_mjcf_reads_back_as_it_was(folder):
+    model, back = build(SCENE), mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    assert (model.nq, model.nv, model.nu, model.neq, model.ngeom, model.nsensor) == (back.nq, back.nv, back.nu, back.neq, back.ngeom, back.nsensor)
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_pos", "jnt_range", "jnt_stiffness", "qpos_spring", "dof_damping", "dof_armature"):
+        assert np.allclose(getattr(model, field), getattr(back, field), rtol=1e-12, atol=1e-15), field
+    for field in ("dof_frictionloss", "actuator_biasprm", "actuator_forcerange", "tendon_frictionloss", "body_gravcomp"):
+        assert np.allclose(getattr(model, field), getattr(back, field), rtol=1e-5), field
+    assert [model.body(i).name for i in range(model.nbody)] == [back.body(i).name for i in range(back.nbody)]
+    data, other = mujoco.MjData(model), mujoco.MjData(back)
+    data.qpos[:] = other.qpos[:] = some_positions(model)
+    mujoco.mj_forward(model, data)
+    mujoco.mj_forward(back, other)
+    assert np.allclose(data.site_xpos, other.site_xpos, atol=1e-12)
+    assert np.allclose(data.xmat, other.xmat, atol=1e-12)
+
+
+def test_meshes_read_back_where_they_were(folder):
+    model, back = build(SCENE), mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    data, other = mujoco.MjData(model), mujoco.MjData(back)
+    mujoco.mj_forward(model, data)
+    mujoco.mj_forward(back, other)
+    assert np.allclose(data.geom_xpos, other.geom_xpos, atol=1e-6)
+    assert model.mesh_facenum.sum() == back.mesh_facenum.sum()
+
+
+@pytest.fixture(scope="module")
+def robot(folder):
+    logging.getLogger("yourdfpy").setLevel(logging.ERROR)
+    return yourdfpy.URDF.load(str(folder / "dvrk.urdf"), load_meshes=False)
+
+
+def test_urdf_has_the_tip_poses_of_the_arms(robot):
+    rng = np.random.default_rng(2)
+    for arm, params in SCENE.arms.items():
+        q = rng.uniform(params.chain.lower, params.chain.upper)
+        robot.update_cfg({f"{arm}_{joint.name}": value for joint, value in zip(params.chain.joints, q, strict=True)})
+        assert np.allclose(robot.get_transform(f"{arm}_tip", f"{arm}_base"), params.chain.forward(q), atol=1e-12)
+
+
+def test_urdf_moves_the_linkage_with_the_arm(robot):
+    pitch = 0.4
+    robot.update_cfg({"PSM1_pitch": pitch, "PSM1_yaw": 0.2, "PSM1_insertion": 0.1})
+    zero = np.zeros(len(robot.actuated_joint_names))
+    for pin in LINKAGES["PSM1"].pins:
+        robot.update_cfg(zero)
+        local = [np.linalg.inv(robot.get_transform(f"PSM1_{body}_link", "PSM1_base")) @ [*pin.position, 1.0] for body in pin.bodies]
+        robot.update_cfg({"PSM1_pitch": pitch, "PSM1_yaw": 0.2})
+        first, second = (robot.get_transform(f"PSM1_{body}_link", "PSM1_base") @ point for body, point in zip(pin.bodies, local, strict=True))
+        assert np.allclose(first, second, atol=1e-12)
+        assert not np.allclose(first[:3], pin.position, atol=1e-3)
+
+
+def test_urdf_opens_both_fingers_by_half_the_jaw(robot):
+    robot.update_cfg({"PSM1_jaw": 0.6})
+    left, right = (robot.get_transform(f"PSM1_{side}_link", "PSM1_wrist_yaw_link")[:3, :3] for side in ("jaw_left", "jaw_right"))
+    assert np.allclose(left[:, 0], [np.cos(0.3), np.sin(0.3), 0.0])
+    assert np.allclose(right[:, 0], [np.cos(0.3), -np.sin(0.3), 0.0])
+    jaw = SCENE.arms["PSM1"].tool.jaw
+    limit = robot.joint_map["PSM1_jaw"].limit
+    assert (limit.lower, limit.upper, limit.effort) == (jaw.lower, jaw.upper, jaw.effort)
+
+
+def test_urdf_has_the_masses_of_the_model(robot):
+    model = build(SCENE)
+    masses = {link.name: link.inertial.mass for link in robot.robot.links if link.inertial is not None}
+    assert sum(masses.values()) == pytest.approx(model.body_mass.sum())
+    assert masses["PSM1_pitch_link"] == pytest.approx(model.body("PSM1/pitch").mass[0])
+
+
+def test_urdf_meshes_are_beside_it(folder, robot):
+    names = {visual.geometry.mesh.filename for link in robot.robot.links for visual in link.visuals if visual.geometry.mesh}
+    assert names
+    assert all((folder / name).is_file() for name in names)
+
+
+def run(*words):
+    return CliRunner().invoke(app, words)
+
+
+@pytest.mark.parametrize(
+    "written", [("--q", "0.3", "-0.2", "0.15", "0.5", "-0.4", "0.25"), ("--q", "0.3,-0.2,0.15,0.5,-0.4,0.25"), ("--q=0.3 -0.2 0.15 0.5 -0.4 0.25",)]
+)
+def test_positions_are_numbers_in_a_row(written):
+    result = run("fk", "PSM1", *written, "--instrument", "400006", "--json")
+    assert result.exit_code == 0
+    assert np.allclose(json.loads(result.stdout)["p"], [0.042794255, 0.031414240, -0.132593198], atol=1e-9)
+
+
+def test_first_position_may_be_negative():
+    result = run("fk", "--json", "ECM", "--q", "-0.4", "-0.3", ".1", "-0.5")
+    assert result.exit_code == 0
+    assert list(json.loads(result.stdout)["q"].values()) == [-0.4, -0.3, 0.1, -0.5]
+
+
+def test_dynamics_are_those_of_the_model():
+    result = run("dynamics", "PSM1", "--q", "0.3", "-0.2", "0.15", "0.5", "-0.4", "0.25", "--dq", ".1", ".1", ".01", "0", "0", "0", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["joints"] == ["yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw"]
+    inertia = np.array(found["inertia"])
+    identified = np.array([[0.187651513, 0.0185569597, -0.000980066578], [0.0185569597, 0.204328846, 0.033], [-0.000980066578, 0.033, 0.4167]])
+    assert np.allclose(inertia, inertia.T)
+    assert np.linalg.eigvalsh(inertia).min() > 0
+    assert np.abs(inertia[:3, :3] - identified).max() < 0.05 * identified.max()
+    assert np.allclose(found["gravity"][:3], [0.175379166, -0.182047853, -0.539161725], atol=1e-3)
+    assert np.allclose(found["friction"][:3], [0.0766338642, 0.16430385, 0.302321826], atol=1e-6)
+    assert np.allclose(found["elastic"][:4], [0.0478078173, 0.0047528671, 0.0, 0.00505], atol=1e-6)
+
+
+def test_dynamics_for_a_person():
+    result = run("dynamics", "ECM", "--q", "0,0,0.1,0")
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in result.stdout.splitlines()] == ["gravity", "yaw", "pitch", "insertion", "roll"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("fk", "PSM1", "--q", "0,0"), "expected 6"),
+        (("fk", "PSM1", "--q", "9,0,0,0,0,0"), "-1.588 .. 1.588"),
+        (("fk", "PSM1", "--q", "a"), "holds no numbers"),
+        (("fk", "PSM9", "--q", "0"), "PSM1"),
+        (("fk", "PSM1", "--q", "nan,0,0,0,0,0"), "nan"),
+        (("dynamics", "MTML", "--q", "0"), "no arm 'MTML' in the model"),
+        (("dynamics", "PSM1", "--instrument", "12", "--q", "0,0,0,0,0,0"), "no instrument '12'"),
+        (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0"), "1 joint velocities, expected 6"),
+        (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "one place"),
+        (("export", "x", "--instrument", "PSM1"), "ARM=N"),
+        (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
+        (("export", "x", "--instrument", "PSM1=400143"), "snake"),
+    ],
+)
+def test_bad_usage_is_refused_with_what_is_allowed(words, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(*words)
+    assert result.exit_code == 2
+    assert message in " ".join(result.output.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "file"), [("a.urdf", (), "a.urdf"), ("b.xml", (), "b.xml"), ("c", ("--format", "urdf"), "c/dvrk.urdf"), ("d", (), "d/dvrk.xml")]
+)
+def test_export_writes_what_the_name_says(tmp_path, name, words, file):
+    result = run("export", str(tmp_path / name), "--arms", "PSM1", "--instrument", "PSM1=400049", "--mounting", "free", *words)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / file).is_file()
+    assert list((tmp_path / file).parent.glob("assets/*.obj"))

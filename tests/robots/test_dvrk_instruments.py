@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from robots.dvrk.instruments import instrument, instruments
+from schemas.errors import MotionError
+
+
+def test_all_instruments_of_the_controller_are_there_and_the_probe():
+    assert len(instruments()) == 54 + 1
+    assert sum(one.has_snake_wrist for one in instruments().values()) == 3
+
+
+@pytest.mark.parametrize("name", list(instruments()))
+def test_an_instrument_is_whole(name):
+    one = instruments()[name]
+    assert one.name == name
+    assert np.allclose(one.tip[:3, :3] @ one.tip[:3, :3].T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(one.tip[:3, :3]) == pytest.approx(1.0)
+    assert np.linalg.matrix_rank(one.actuator_to_joint) == 4
+    assert one.source.startswith("share/tool/")
+    assert all(joint.lower < 0 < joint.upper and joint.effort > 0 for joint in one.joints)
+    assert one.joints[0].name == "roll"
+    if one.jaw:
+        assert one.jaw.lower <= 0 < one.jaw.upper
+        assert 0.005 < one.jaw.length < 0.04
+
+
+@pytest.mark.parametrize(
+    ("number", "shaft", "offset", "jaw"),
+    [
+        ("400006", 0.4162, 0.0091, (-0.698132, 1.39626, 0.16)),
+        ("420006", 0.4670, 0.0091, (-0.349066, 1.39626, 0.16)),
+        ("400049", 0.4162, 0.0091, (-0.349066, 1.39626, 0.16)),
+        ("420049", 0.4670, 0.0091, (-0.349066, 1.39626, 0.16)),
+        ("400093", 0.4162, 0.0107, (-0.349066, 1.39626, 0.16)),
+        ("400172", 0.4162, 0.0107, (-0.349066, 1.39626, 0.19)),
+        ("400205", 0.4162, 0.0107, (-0.698132, 1.39626, 0.19)),
+    ],
+)
+def test_numbers_of_the_common_instruments(number, shaft, offset, jaw):
+    one = instrument(number)
+    assert one.number == number
+    assert instrument(one.name) is one
+    assert (one.joints[0].d, one.joints[2].a) == (shaft, offset)
+    assert one.jaw
+    assert (one.jaw.lower, one.jaw.upper, one.jaw.effort) == jaw
+
+
+def test_a_number_means_the_plain_variant():
+    assert instrument("420006").name == "LARGE_NEEDLE_DRIVER_420006"
+    assert instrument("LARGE_NEEDLE_DRIVER_420006_GEARED").number == "420006"
+
+
+@pytest.mark.parametrize("name", ["palpation-probe", "400183", "400184"])
+def test_what_does_not_open_has_no_jaw(name):
+    assert instrument(name).jaw is None
+
+
+@pytest.mark.parametrize(("word", "meant"), [("40006", "420006"), ("PROGRASP_400093", "PROGRASP_FORCEPS_400093"), ("palpation_probe", "palpation-probe")])
+def test_an_unknown_instrument_is_refused_with_what_is_near(word, meant):
+    with pytest.raises(MotionError, match=f"no instrument '{word}'. Did you mean '{meant}'"):
+        instrument(word)

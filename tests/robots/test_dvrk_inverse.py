@@ -1,0 +1,154 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robots.dvrk import arms
+from robots.dvrk.instruments import instruments
+from robots.dvrk.inverse import ORIENTATION_TOLERANCE, inverse
+from robots.serial_chain import Joint
+from schemas.errors import MotionError
+
+CASES = [("PSM1", "400006"), ("PSM2", "420006"), ("PSM3", "400205"), ("ECM", "straight"), ("ECM", "up"), ("ECM", "down")]
+PSM, ECM = arms.chain("PSM1", "400006"), arms.chain("ECM")
+HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
+LOOK = np.array([0.1, -0.2, 0.12, 0.3])
+
+
+def random_configurations(chain, count, seed=0):
+    return np.random.default_rng(seed).uniform(chain.lower, chain.upper, (count, len(chain.joints)))
+
+
+def configurations(chain):
+    return st.tuples(*(st.floats(joint.lower, joint.upper) for joint in chain.joints)).map(np.array)
+
+
+@pytest.mark.parametrize(("arm", "tool"), CASES)
+def test_there_and_back_ten_thousand_times(arm, tool):
+    chain = arms.chain(arm, tool)
+    q, near = random_configurations(chain, 10_000), random_configurations(chain, 10_000, seed=1)
+    found = inverse(chain, chain.forward(q), near)
+    assert ((chain.lower <= found) & (found <= chain.upper)).all()
+    assert np.allclose(chain.forward(found), chain.forward(q), rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name, one in instruments().items() if not one.has_snake_wrist])
+def test_every_instrument_with_a_wrist_of_three_joints_is_solved(name):
+    chain = arms.chain("PSM1", name)
+    q = random_configurations(chain, 200)
+    assert np.allclose(chain.forward(inverse(chain, chain.forward(q), q)), chain.forward(q), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("arm", "tool"), CASES)
+def test_the_solution_is_the_one_at_hand(arm, tool):
+    chain = arms.chain(arm, tool)
+    q = random_configurations(chain, 1000)
+    assert np.allclose(inverse(chain, chain.forward(q), q), q, rtol=0.0, atol=1e-9)
+
+
+@settings(max_examples=200)
+@given(configurations(PSM), configurations(PSM))
+def test_the_psm_comes_back_from_everywhere(q, near):
+    try:
+        found = inverse(PSM, PSM.forward(q), near)
+    except MotionError:  # only where an axis passes the RCM, and the one solution of many that is near does not fit
+        wrist = PSM.frames(q)[4:6, :3, 3]
+        assert np.linalg.norm(wrist, axis=1).min() < 2e-9
+        return
+    assert np.allclose(PSM.forward(found), PSM.forward(q), rtol=0.0, atol=3e-9)
+
+
+def test_many_poses_give_what_each_gives_alone():
+    q = random_configurations(PSM, 12)
+    poses = PSM.forward(q).reshape(3, 4, 4, 4)
+    found = inverse(PSM, poses, HOME)
+    assert found.shape == (3, 4, 6)
+    assert np.allclose(found.reshape(12, 6), [inverse(PSM, pose, HOME) for pose in poses.reshape(12, 4, 4)], rtol=0.0, atol=1e-12)
+
+
+def test_roll_goes_the_short_way_inside_its_range():
+    roll = 2.5  # also at 2.5 - 2 pi
+    pose = PSM.forward(np.add(HOME, [0, 0, 0, roll, 0, 0]))
+    for near, expected in ((3.0, roll), (-3.0, roll - 2 * np.pi), (0.0, roll)):
+        assert inverse(PSM, pose, np.add(HOME, [0, 0, 0, near, 0, 0]))[3] == pytest.approx(expected)
+    pose = PSM.forward(np.add(HOME, [0, 0, 0, 1.0, 0, 0]))
+    assert inverse(PSM, pose, np.add(HOME, [0, 0, 0, -4.5, 0, 0]))[3] == pytest.approx(1.0)  # 1 - 2 pi is out of range
+
+
+def test_where_the_wrist_pitch_axis_passes_the_rcm_the_shaft_stays():
+    through = 0.4318 - 0.4162
+    q = np.array([0.3, -0.2, through, 0.5, -0.4, 0.25])
+    assert np.allclose(inverse(PSM, PSM.forward(q), q), q, atol=1e-9)
+    for beside in (through - 1e-12, through + 1e-12, through + 1e-7):
+        q[2] = beside
+        found = inverse(PSM, PSM.forward(q), q)
+        assert np.allclose(PSM.forward(found), PSM.forward(q), rtol=0.0, atol=1e-9)
+
+
+def test_where_the_wrist_yaw_axis_passes_the_rcm_the_wrist_yaw_stays():
+    q = np.array([0.3, -0.2, 0.4318 - 0.4162 - 0.0091, 0.5, 0.0, 0.25])
+    assert np.linalg.norm(PSM.forward(q)[:3, 3]) < 1e-15
+    assert np.allclose(inverse(PSM, PSM.forward(q), q), q, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ([0, 0, 0.2, 0, 0, 0], r"cannot be reached: joint insertion at 0.32 m, allowed are 0 .. 0.24$"),
+        ([0, 1.0, 0, 0, 0, 0], "joint pitch at 1 rad, allowed are -0.925025 .. 0.925025$"),
+        ([0, 0, 0, 0, -1.5, 0], "joint wrist_pitch at -1.5 rad, allowed are -1.39626 .. 1.39626$"),
+        ([0, 0, 0, 0, 0, 1.5], "joint wrist_yaw at 1.5 rad, allowed are -1.39626 .. 1.39626$"),
+        ([1.65, 0, 0, 0, 0, 0], "joint yaw at 1.65 rad, allowed are -1.588 .. 1.588$"),
+    ],
+)
+def test_a_pose_out_of_reach_names_the_joint_and_its_range(change, reason):
+    with pytest.raises(MotionError, match=reason):
+        inverse(PSM, PSM.forward(HOME + change), HOME)
+
+
+def test_of_many_poses_the_first_out_of_reach_is_named():
+    poses = PSM.forward(np.add(HOME, [[0, 0, 0, 0, 0, 0], [0, 0, 0.2, 0, 0, 0], [0, 0, 0.3, 0, 0, 0]]))
+    with pytest.raises(MotionError, match=r"pose 1 cannot be reached: joint insertion at 0.32 m"):
+        inverse(PSM, poses, HOME)
+
+
+@pytest.mark.parametrize(("chain", "near"), [(PSM, HOME), (ECM, LOOK)])
+def test_what_is_not_finite_is_refused(chain, near):
+    pose = chain.forward(near)
+    pose[1, 3] = np.nan
+    with pytest.raises(MotionError, match="not finite"):
+        inverse(chain, pose, near)
+
+
+@pytest.mark.parametrize(("arm", "tool"), [("MTML", None), ("SUJ/PSM1", None), ("PSM1", "400117")])
+def test_chains_of_another_kind_are_refused(arm, tool):
+    chain = arms.chain(arm, tool)
+    with pytest.raises(MotionError, match="no closed form for the joints"):
+        inverse(chain, np.eye(4), np.zeros(len(chain.joints)))
+
+
+def test_the_endoscope_takes_a_step_aside_with_the_orientation_nearest_to_the_one_asked_for():
+    pose = ECM.forward(LOOK)
+    pose[:3, 3] += [0.01, -0.005, 0.0]
+    q = inverse(ECM, pose, LOOK)
+    reached = ECM.forward(q)
+    assert np.allclose(reached[:3, 3], pose[:3, 3], rtol=0.0, atol=1e-12)
+
+    def apart(roll):
+        other = q.copy()
+        other[3] = roll
+        return np.linalg.norm(ECM.forward(other)[:3, :3] - pose[:3, :3])
+
+    assert apart(q[3]) < min(apart(q[3] - 1e-3), apart(q[3] + 1e-3))
+
+
+def test_an_orientation_that_the_endoscope_cannot_have_is_refused():
+    turn = np.eye(4)
+    for angle, refused in ((ORIENTATION_TOLERANCE - 1e-6, False), (ORIENTATION_TOLERANCE + 1e-6, True)):
+        turn[:3, :3] = Joint("", "revolute", angle, 0.0, 0.0, 0.0, 0.0, 0.0).transform(0.0)[:3, :3]
+        pose = ECM.forward(LOOK) @ turn
+        if refused:
+            with pytest.raises(MotionError, match=r"orientation 20.0 degrees away at this position, allowed are 20"):
+                inverse(ECM, pose, LOOK)
+        else:
+            assert np.allclose(inverse(ECM, pose, LOOK), LOOK, rtol=0.0, atol=1e-9)
