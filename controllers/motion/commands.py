@@ -12,7 +12,8 @@ import numpy as np
 
 from controllers.motion import goals
 from controllers.motion.drives import Drives, WrenchFrame
-from controllers.motion.frames import Frames, inverse
+from controllers.motion.frames import Frames
+from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
@@ -102,7 +103,7 @@ class Commands:
         frame = goals.check_frame(message.header.frame_id, self._frames.names[self._arm], local)
         tip = goals.tip_frame(message)
         if frame != local:
-            tip = inverse(self._frames.of(self._arm, self._camera())) @ tip
+            tip = inverse_pose(self._frames.of(self._arm, self._camera())) @ tip
         return inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
 
     def _jaw_servo_jp(self, message: JointState) -> None:

@@ -15,7 +15,7 @@ from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["ENDOSCOPE_PITCH", "HOME", "JOINTS", "JOINT_NAMES", "MOUNTING_PITCH", "Endoscope", "chain", "tip"]
+__all__ = ["ENDOSCOPE_PITCH", "HOME", "JOINTS", "JOINT_NAMES", "Endoscope", "chain", "tip"]
 
 Endoscope = Literal["straight", "up", "down"]
 """Where an endoscope looks: along its shaft, or 30 degrees up or down."""
@@ -39,9 +39,6 @@ JOINT_NAMES = tuple(joint.name for joint in JOINTS)
 
 HOME = (0.0, 0.0, 0.12, 0.0)
 """Where the real controller homes a simulated arm (SAW mtsIntuitiveResearchKitECM.cpp): straight, insertion 0.12 m."""
-
-MOUNTING_PITCH = radians(-45.0)
-"""Of the arm on its setup joint (SAW share/arm/ECM_KIN_SIMULATED.json, Classic)."""
 
 ENDOSCOPE_PITCH = {"straight": 0.0, "up": radians(-30.0), "down": radians(30.0)}
 """Rotation of the tip about its x axis by the kind of endoscope, rad (SAW mtsIntuitiveResearchKitECM.cpp)."""

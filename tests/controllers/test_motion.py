@@ -358,7 +358,16 @@ def test_restore_returns_to_the_same_bits_in_the_middle_of_a_move():
 
 @pytest.mark.parametrize(
     ("arms", "reason"),
-    [({}, "name at least one"), ({"PSM1": {"instrument": "400999"}}, "400999"), ({"PSM1": {"start": [3, 0, 0.1, 0, 0, 0]}}, "yaw 3 is out of its range")],
+    [
+        ({}, "name at least one"),
+        ({"PSM1": {"instrument": "400999"}}, "no instrument '400999'. Did you mean"),
+        ({"PSM1": {"instrument": "400117"}}, "'400117' has a snake wrist"),
+        ({"PSM1": {"start": [3, 0, 0.1, 0, 0, 0]}}, r"joint yaw at 3 rad, allowed are -1\.588 \.\. 1\.588"),
+        ({"PSM1": {"instrument": "420006", "start": [0, 0, 0.1, 0, 1.4, 0]}}, "joint wrist_pitch at 1.4 rad, allowed are"),
+        ({"PSM1": {"instrument": "400006", "jaw": 2.0}}, r"jaw at 2 rad, allowed are -0\.698132 \.\. 1\.39626"),
+        ({"PSM1": {"instrument": "palpation-probe", "jaw": 0.1}}, "has no jaw; leave it out"),
+        ({"ECM": {"start": [0, 0, 0.3, 0]}}, r"joint insertion at 0\.3 m, allowed are 0 \.\. 0\.255"),
+    ],
 )
 def test_parameters_that_make_no_sense_are_refused(arms, reason):
     with pytest.raises(ValidationError, match=reason):
