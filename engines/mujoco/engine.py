@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
+from engines.mujoco import opengl
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.ports import bond_sides, scene_ports
 from hub.inputs import Inputs
@@ -70,6 +71,7 @@ class MujocoEngine(Stepped):
             raise ScenarioError(problem, path=("participants", self.name, "timestep"))
         if find_spec("mujoco") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind mujoco)", "mujoco", "mujoco")
+        opengl.import_mujoco()
         import mujoco
 
         from engines.mujoco import holding, model
@@ -115,7 +117,7 @@ class MujocoEngine(Stepped):
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
         model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
         self._servos.begin(inputs)
-        self._brakes.set(on=self._servos.is_off("ECM"))
+        self._brakes.set(on="ECM" in self._servos.off)
         for probe in self._probes:
             probe.begin(inputs)
         for tau in range(0, h, self.params.timestep):

@@ -126,7 +126,7 @@ def test_positions_are_numbers_in_a_row(written):
 def test_first_position_may_be_negative():
     result = run("fk", "--json", "ECM", "--q", "-0.4", "-0.3", ".1", "-0.5")
     assert result.exit_code == 0
-    assert list(json.loads(result.stdout)["q"].values()) == [-0.4, -0.3, 0.1, -0.5]
+    assert json.loads(result.stdout)["q"] == [-0.4, -0.3, 0.1, -0.5]
 
 
 def test_dynamics_are_those_of_the_model():
@@ -161,9 +161,12 @@ def test_dynamics_for_a_person():
         (("dynamics", "MTML", "--q", "0"), "no arm 'MTML' in the model"),
         (("dynamics", "PSM1", "--instrument", "12", "--q", "0,0,0,0,0,0"), "no instrument '12'"),
         (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0"), "1 joint velocities, expected 6"),
+        (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0,0,0,0,0,inf"), "not all joint velocities are finite"),
         (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "one place"),
         (("export", "x", "--instrument", "PSM1"), "ARM=N"),
         (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
+        (("export", "x", "--arms", ""), "at least one of PSM1, PSM2, PSM3, ECM"),
+        (("export", "/dev/null/x"), "Invalid value for PATH: cannot write there"),
         (("export", "x", "--instrument", "PSM1=400143"), "snake"),
     ],
 )
