@@ -202,6 +202,7 @@ class MjModel:
     actuator_gainprm: _Array
     actuator_trnid: NDArray[np.int32]
     body_gravcomp: _Array
+    geom_bodyid: NDArray[np.int32]
     eq_active0: NDArray[np.uint8]
     eq_data: _Array
     eq_obj1id: NDArray[np.int32]
@@ -223,7 +224,12 @@ class MjModel:
 class _Warnings:
     number: NDArray[np.int32]
 
+class _Contacts:
+    geom: NDArray[np.int32]
+    pos: _Array
+
 class MjData:
+    contact: _Contacts
     eq_active: NDArray[np.uint8]
     qfrc_bias: _Array
     xpos: _Array
