@@ -55,10 +55,10 @@ def test_every_mesh_is_closed_and_faces_outward(what: str) -> None:
 
 
 def test_the_whole_cart_has_about_ten_thousand_triangles() -> None:
-    """Column, setup joints, endoscope arm and two arms with needle drivers."""
-    arms = 2 * (triangles("psm") + triangles("instrument/400006")) + triangles("ecm")
-    setup = triangles("cart") + sum(triangles(f"suj/{arm}") for arm in ("PSM1", "PSM2", "ECM"))
-    assert 8_000 < arms + setup < 12_500
+    """Column, setup joints, endoscope arm and three arms with needle drivers."""
+    arms = 3 * (triangles("psm") + triangles("instrument/400006")) + triangles("ecm")
+    setup = triangles("cart") + sum(triangles(f"suj/{arm}") for arm in get_args(CartArm))
+    assert 8_000 < arms + setup < 11_500
 
 
 @pytest.mark.parametrize(
