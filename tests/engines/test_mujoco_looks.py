@@ -122,7 +122,7 @@ def test_pads_meet_in_the_plane_of_the_axis_and_the_tip(what: str) -> None:
         assert end == pytest.approx(bounds(what, name)[0, 2], abs=1e-7)
 
 
-@pytest.mark.parametrize("what", ["psm", "ecm", *GRASPING, "instrument/palpation-probe"])
+@pytest.mark.parametrize("what", [*FIXED, *GRASPING, "instrument/palpation-probe"])
 def test_what_collides_is_convex_and_belongs_to_a_body_with_a_look(what: str) -> None:
     """No vertex of a hull lies outside any of its faces."""
     for body, shapes in collision(what).items():
@@ -159,7 +159,8 @@ def test_an_unknown_look_is_refused_by_name(what: str) -> None:
         parts(what)
 
 
-def test_only_arms_and_instruments_collide() -> None:
-    """The cart is for the eye."""
-    with pytest.raises(MotionError, match="cart"):
-        collision("cart")
+@pytest.mark.parametrize("what", [*FIXED, *GRASPING, "instrument/400183", "instrument/palpation-probe"])
+def test_whatever_is_seen_collides(what: str) -> None:
+    """Every body with a look has a shape for contact."""
+    assert set(collision(what)) == {body for body, shown in parts(what).items() if shown}
+    assert all(collision(what).values())
