@@ -21,8 +21,8 @@ _SETTLED = 0.1
 """s; a jaw that closes at its greatest speed has come to rest on the object by then."""
 _RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 _BRAKED = "ECM"
-_W_LAST = [1, 2, 3, 0]
-"""MuJoCo's quaternion as ROS has it."""
+_POSE = np.array([0, 1, 2, 4, 5, 6, 3])
+"""Where a pose (x, y, z, qx, qy, qz, qw) stands in the position of a free joint, with the quaternion w first."""
 
 
 def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
@@ -94,8 +94,7 @@ class Holding:
         self._fingers = [model.body(f"{arm}/{FINGERS[0]}").id for arm in arms]
         self._wrists = [model.body(f"{arm}/wrist_yaw").id for arm in arms]
         shape = (len(things), len(arms))
-        self._thing_of = _index_by_geom(model, things)
-        self._finger_of = _index_by_geom(model, [f"{arm}/{finger}" for arm in arms for finger in FINGERS])
+        self._ends = _ends(model, things, [f"{arm}/{finger}" for arm in arms for finger in FINGERS])
         self._contacts = np.zeros((*shape, 2, 4))  # per finger: how many, sum of their positions
         welds = [model.equality(f"{thing}/{arm}/weld").id for thing in things for arm in arms] if scene.grasp == "weld" else []
         self._welds = np.array(welds, int).reshape(shape) if welds else None
@@ -106,6 +105,8 @@ class Holding:
         self._holder[:] = -1.0  # index of an arm
         self._grip = grip.reshape(*shape, 6)  # where the fingers took hold: in the object, and in the left finger
         self._weld_data = weld_data.reshape(-1, model.eq_data.shape[1])
+        joints = [int(model.joint(thing).qposadr[0]) + _POSE for thing in things]
+        self._where, self._positions = np.array(joints, int).reshape(-1, 7), data.qpos
         self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 3))
         self._height = data.xpos[self._bodies, 2].copy()
         self.outputs: dict[str, Vector] = {}
@@ -115,43 +116,40 @@ class Holding:
 
     def update(self) -> None:
         """Look at the contacts, set welds, and bring the outputs up to date."""
-        if not self._bodies:
-            return
-        self._look()
-        touch = (self._contacts[..., 0] > 0.0).all(axis=-1)
-        self._touched += 1.0
-        self._touched *= touch
-        if touch.any() or self._holder.max() >= 0.0:
+        if self._look() or self._touched.any():  # an object is held no longer than it is touched
+            touch = (self._contacts[..., 0] > 0.0).all(axis=-1)
+            self._touched += 1.0
+            self._touched *= touch
             for i, j in np.argwhere(self._touched == self._settled):
                 self._take(i, j)
+            if self._welds is not None:
+                self._data.eq_active[self._welds[~touch]] = 0
             for i in range(len(self._bodies)):
                 self._choose_holder(i)
-        if self._welds is not None:
-            self._data.eq_active[self._welds[~touch]] = 0
         self.refresh()
 
-    def _look(self) -> None:
-        """Count the contacts of every finger with every object, and sum their positions.
+    def _look(self) -> bool:
+        """Count the contacts of every finger with every object, and sum their positions; say whether there are any.
 
         Once per look and in Python: 36 contact sensors of a full cart with six objects cost MuJoCo a twentieth of every sub-step.
         """
         self._contacts[:] = 0.0
         contact = self._data.contact
-        things, fingers = self._thing_of[contact.geom], self._finger_of[contact.geom[:, ::-1]]
-        for at, end in np.argwhere((things >= 0) & (fingers >= 0)):
-            arm, side = divmod(fingers[at, end], 2)
-            self._contacts[things[at, end], arm, side] += (1.0, *contact.pos[at])
+        ends = self._ends[contact.geom]
+        found = (ends[:, 0] * ends[:, 1] < 0).nonzero()[0].tolist()
+        for at in found:
+            finger, thing = sorted(ends[at].tolist())
+            self._contacts[thing - 1, *divmod(-finger - 1, 2)] += (1.0, *contact.pos[at])
+        return bool(found)
 
     def refresh(self) -> None:
         """Bring the outputs up to the model's present state."""
-        data = self._data
-        self._poses[:, :3] = data.xpos[self._bodies]
-        self._poses[:, 3:] = data.xquat[self._bodies][:, _W_LAST]
-        self._values[:, :2] = 0.0
+        self._positions.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
         np.subtract(self._poses[:, 2], self._height, out=self._values[:, 2])
-        for i in map(int, np.flatnonzero(self._holder >= 0.0)):
-            holder = int(self._holder[i])
-            self._values[i, :2] = self._numbers[holder], self._slip(i, holder)
+        self._values[:, :2] = 0.0
+        for i, holder in enumerate(map(int, self._holder.tolist())):
+            if holder >= 0:
+                self._values[i, :2] = self._numbers[holder], self._slip(i, holder)
 
     def _choose_holder(self, i: int) -> None:
         """Keep the arm that holds object `i` as long as it does; then take the first that does."""
@@ -193,8 +191,10 @@ class Holding:
             self._model.eq_data[self._welds.ravel()] = self._weld_data
 
 
-def _index_by_geom(model: mujoco.MjModel, bodies: list[str]) -> NDArray[np.intp]:
-    """Return for every geom of `model` the place in `bodies` of the one it is of, else -1."""
-    index = np.full(model.nbody, -1)
-    index[[model.body(body).id for body in bodies]] = range(len(bodies))
-    return index[model.geom_bodyid]
+def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> NDArray[np.intp]:
+    """Return for every geom of `model` i + 1 if it is of the object i, -(i + 1) if it is of the finger i, else 0."""
+    ends = np.zeros(model.nbody, int)
+    for sign, bodies in (1, things), (-1, fingers):
+        for i, body in enumerate(bodies, 1):
+            ends[model.body(body).id] = sign * i
+    return ends[model.geom_bodyid]

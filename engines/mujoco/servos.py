@@ -62,7 +62,7 @@ class Servos:
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
         self.setpoint, self._previous, self._effort = np.split(self._inputs, 3)
-        self._command, self._least, self._most, self._way = start.copy(), np.empty(n), np.empty(n), speed * period
+        self._command, self._reach, self._ways = start.copy(), np.empty((2, n)), np.outer((-1.0, 1.0), speed * period)
         self._layout, self._measure = self._matrices(shares, n, period)
         self._springs, self._rest = self._elasticity(shares, n)
         self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
@@ -116,14 +116,14 @@ class Servos:
         np.concatenate([inputs[port] for port in self._mode_ports.values()], out=self._wanted)
         if self._wanted.tobytes() != self._modes.tobytes():
             self._set_modes(self._wanted)
-        command, setpoint, least, most = self._command, self.setpoint, self._least, self._most
+        command, setpoint, reach = self._command, self.setpoint, self._reach
         np.concatenate([inputs[port] for port in self._command_ports], out=command)
         np.maximum(command, self._lower, out=command)
         np.minimum(command, self._upper, out=command)
-        np.maximum(command, np.subtract(setpoint, self._way, out=least), out=command)
-        np.minimum(command, np.add(setpoint, self._way, out=most), out=command)
+        np.add(setpoint, self._ways, out=reach)
         self._previous[:] = setpoint
-        setpoint[:] = command
+        np.maximum(command, reach[0], out=command)
+        np.minimum(command, reach[1], out=setpoint)
         np.multiply(self._springs, np.subtract(setpoint, self._rest, out=self._effort), out=self._effort)  # what holds against the springs there
         if not self._holding:
             self._let_go(inputs)
