@@ -12,7 +12,7 @@ from robots import rotation
 from robots.dvrk import arms
 from schemas.crtk import StringStamped
 from schemas.errors import StateError
-from schemas.ros import JointState
+from schemas.ros import Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
 from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, jf, jp, ratio
 
 CHAIN = arms.chain("PSM1")
@@ -230,7 +230,74 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("command", "bad", "reason"), BAD)
+NAN, TOP_DOWN = float("nan"), (0.70710678, 0.70710678, 0.0, 0.0)
+
+
+def raw_pose(position, orientation, frame="PSM1_base"):
+    x, y, z = position
+    point, quaternion = Point.model_construct(x=x, y=y, z=z), Quaternion.model_construct(**dict(zip("xyzw", orientation, strict=True)))
+    return PoseStamped.model_construct(header=Header(frame_id=frame), pose=Pose.model_construct(position=point, orientation=quaternion))
+
+
+def raw_wrench(x, frame):
+    vectors = {"force": Vector3.model_construct(x=x, y=0.0, z=0.0), "torque": Vector3()}
+    return WrenchStamped.model_construct(header=Header(frame_id=frame), wrench=Wrench.model_construct(**vectors))
+
+
+EVERY = [
+    *(
+        (command, bad, reason)
+        for command in ("servo_jp", "servo_jr", "move_jp", "move_jr")
+        for bad, reason in [
+            (construct("position", [0.0, NAN, 0.0, 0.0, 0.0, 0.0]), "every number must be finite"),
+            (construct("position", [0.0, 0.0, -np.inf, 0.0, 0.0, 0.0]), "every number must be finite"),
+            (jp(), "0 values of position, expected 6: yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw"),
+            (jp(*[0.0] * 5), "5 values of position, expected 6"),
+            (jp(0, 0, 0, 0, 2.0, 0), "joint wrist_pitch at 2 rad, allowed are -1.39626 .. 1.39626"),
+            (jp(*HOME, names=["yaw"] * 6), "joints yaw, yaw, yaw, yaw, yaw, yaw, expected yaw, pitch"),
+        ]
+    ),
+    *(
+        (command, bad, reason)
+        for command in ("servo_cp", "move_cp")
+        for bad, reason in [
+            (raw_pose((0.0, NAN, -0.1), TOP_DOWN), "position [0.0, nan, -0.1]: every number must be finite"),
+            (raw_pose((0.0, 0.0, -0.1), (NAN, 0.0, 0.0, 1.0)), "every number must be finite"),
+            (raw_pose((0.0, 0.0, -0.1), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
+            (raw_pose((0.0, 0.0, -0.1), TOP_DOWN, "world"), "frame 'world', allowed are PSM1_base"),
+            (raw_pose((0.0, 0.0, -0.5), TOP_DOWN), "pose cannot be reached: joint insertion at"),
+            (raw_pose((0.3, 0.0, 0.3), TOP_DOWN), "allowed are"),
+        ]
+    ),
+    *(
+        (command, bad, reason)
+        for command, size in (("servo_jf", 6), ("jaw__servo_jf", 1))
+        for bad, reason in [
+            (construct("effort", [NAN] * size), "every number must be finite"),
+            (jf(*[0.0] * (size + 1)), f"{size + 1} values of effort, expected {size}"),
+            (jf(*[99.0] * size), "at 99 N m, allowed are"),
+        ]
+    ),
+    *((f"{kind}__servo_cf", raw_wrench(NAN, frame), "every number must be finite") for kind, frame in (("body", "PSM1_tip"), ("spatial", "PSM1_base"))),
+    ("spatial__servo_cf", raw_wrench(0.0, "PSM1_tip"), "frame 'PSM1_tip', allowed are PSM1_base"),
+    *(
+        (command, bad, reason)
+        for command in ("jaw__servo_jp", "jaw__move_jp")
+        for bad, reason in [
+            (construct("position", [NAN]), "every number must be finite"),
+            (jp(0.0, 0.0), "2 values of position, expected 1: jaw"),
+            (jp(2.0), "joint jaw at 2 rad, allowed are -0.698132 .. 1.39626"),
+        ]
+    ),
+    *(("trajectory_j__set_ratio", Float64Message.model_construct(data=bad), "allowed are over 0 to 1") for bad in (NAN, -1.0, 1.1, np.inf)),
+]
+
+
+def test_every_command_has_bad_input_that_is_tried():
+    assert {command for command, *_ in BAD + EVERY} >= set(MOTIONS) - {"hold", "free"}
+
+
+@pytest.mark.parametrize(("command", "bad", "reason"), [*BAD, *EVERY])
 def test_bad_input_is_refused_with_the_reason_and_changes_nothing(command, bad, reason):
     rig, twin = Rig().step(5), Rig().step(5)
     rig.step(1, **{command: bad})
