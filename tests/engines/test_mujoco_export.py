@@ -11,6 +11,7 @@ from engines.mujoco.command_line import app
 from engines.mujoco.export import write
 from engines.mujoco.model import build, spec
 from engines.mujoco.params import SceneParams
+from robots.dvrk import setup_joints
 from robots.dvrk.linkage import LINKAGES
 
 SCENE = SceneParams.model_validate(
@@ -102,6 +103,21 @@ def test_urdf_has_the_masses_of_the_model(robot):
     masses = {link.name: link.inertial.mass for link in robot.robot.links if link.inertial is not None}
     assert sum(masses.values()) == pytest.approx(model.body_mass.sum())
     assert masses["PSM1_pitch_link"] == pytest.approx(model.body("PSM1/pitch").mass[0])
+
+
+def test_mujoco_reads_the_urdf(folder):
+    """It refuses moving links without mass, looks for meshes beside the file, and makes equalities of the mimics."""
+    model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.urdf"))
+    params = SCENE.arms["PSM1"]
+    q = np.random.default_rng(3).uniform(params.chain.lower, params.chain.upper)
+    data = mujoco.MjData(model)
+    for joint, value in zip(params.chain.joints, q, strict=True):
+        data.joint(f"PSM1_{joint.name}").qpos = value
+    mujoco.mj_kinematics(model, data)
+    expected = setup_joints.base_pose("PSM1", np.array(SCENE.setup_joints["PSM1"])) @ params.chain.frames(q)[5]
+    assert np.allclose(data.body("PSM1_wrist_yaw_link").xpos, expected[:3, 3], atol=1e-9)
+    assert model.neq == 2 * 7 + 4
+    assert model.nmesh
 
 
 def test_urdf_meshes_are_beside_it(folder, robot):
