@@ -17,7 +17,7 @@ from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
-from schemas.ros import EmptyMessage, Float64Message, JointState, PoseStamped, WrenchStamped
+from schemas.ros import BoolMessage, EmptyMessage, Float64Message, JointState, PoseStamped, WrenchStamped
 from schemas.vectors import Vector
 
 __all__ = ["Commands"]
@@ -33,7 +33,10 @@ class Commands:
         self._joints, self._chain = drives.joints, drives.joints.chain
         self.ratio = np.ones(1)
         """Share of the limits that moves use."""
+        self.gravity_compensation = np.ones(1)
+        """1: the drives bear the weight that the controller knows, 0: they do not."""
         self.handlers: Mapping[str, Callable[[Any], None]] = {
+            "use_gravity_compensation": self._use_gravity_compensation,
             "trajectory_j/set_ratio": self._set_ratio,
             "hold": self._hold,
             "free": self._free,
@@ -50,6 +53,9 @@ class Commands:
             "jaw/servo_jf": self._jaw_servo_jf,
             "jaw/move_jp": self._jaw_move_jp,
         }
+
+    def _use_gravity_compensation(self, message: BoolMessage) -> None:
+        self.gravity_compensation[0] = message.data
 
     def _set_ratio(self, message: Float64Message) -> None:
         if not 0.0 < message.data <= 1.0:

@@ -23,6 +23,8 @@ __all__ = ["Servos"]
 
 _OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
 """Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
+_BARE = 2.0
+"""Added to the latter two: without the gravity compensation that the real controller can switch off, see docs/decisions/0010."""
 
 
 @dataclass
@@ -37,6 +39,8 @@ class _Group:
     """Whose weight its controller bears."""
     ports: str
     """Its ports' names up to `servo_jp` and `servo_jf`."""
+    weighed: list[int]
+    """Those of `bodies` whose weight the real controller bears: the endoscope. Springs and weights balance all else."""
     mode: float = _POSITION
 
 
@@ -84,7 +88,8 @@ class Servos:
         fingers = {f"{arm}/{finger}" for finger in FINGERS}
         own = fingers if joints == list(FINGERS) else {name for i in range(model.nbody) if (name := model.body(i).name).startswith(f"{arm}/")} - fingers
         bodies = [i for i in range(model.nbody) if model.body(i).name in own]
-        self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports))
+        weighed = [i for i in bodies if model.body(i).name == "ECM/roll"]
+        self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports, weighed))
 
     def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
         """Return what makes `ctrl` of (setpoint, setpoint one step ago, effort), and what makes the drives' positions of `qpos`."""
@@ -142,12 +147,15 @@ class Servos:
         """Switch the drives; `modes`, shape (2 arms,), are those of the joints and the jaw of every arm."""
         gain, bias = self._gains
         for (arm, port), wanted in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
-            if not np.isin(wanted, (_OFF, _POSITION, _EFFORT)).all():
-                raise SessionError(f"input '{port}' is {wanted}; each of [arm, jaw] is 0 (off), 1 (position servo) or 2 (effort)")
-            for group, mode in zip([group for group in self._groups if group.arm == arm], wanted.tolist(), strict=False):
+            if not np.isin(wanted, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
+                modes_there_are = "0 (off), 1 (position servo) or 2 (effort), 3 and 4 the last two without gravity compensation"
+                raise SessionError(f"input '{port}' is {wanted}; each of [arm, jaw] is {modes_there_are}")
+            for group, asked in zip([group for group in self._groups if group.arm == arm], wanted.tolist(), strict=False):
+                mode = asked - _BARE if asked > _EFFORT else asked
                 self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
                 self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
                 self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (mode != _OFF)
+                self._model.body_gravcomp[group.weighed] *= asked == mode
                 group.mode = mode
         self._modes[:] = modes
         self.off = frozenset(arm for arm, mode in zip(self._mode_ports, modes[::2].tolist(), strict=True) if mode == _OFF)

@@ -12,7 +12,7 @@ from robots import rotation
 from robots.dvrk import arms
 from schemas.crtk import StringStamped
 from schemas.errors import StateError
-from schemas.ros import Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
+from schemas.ros import BoolMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
 from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, jf, jp, ratio
 
 CHAIN = arms.chain("PSM1")
@@ -123,6 +123,20 @@ def test_motion_in_the_wrong_state_is_refused_with_a_warning(state, command):
     assert rig.mode == mode
     if state != "homing":
         assert (rig.step(20).setpoint == before).all()
+
+
+@pytest.mark.parametrize("state", ["disable", "pause", "enable"])
+def test_gravity_compensation_is_switched_whatever_the_state_and_kept_over_a_checkpoint(state):
+    rig = Rig().step().command(state)
+    mode = rig.mode[0]
+    rig.step(2, use_gravity_compensation=BoolMessage(data=False))
+    assert not rig.said("warning")
+    assert rig.mode[0] == (mode + 2 if mode else 0)
+    saved = rig.motion.save()
+    rig.step(1, use_gravity_compensation=BoolMessage(data=True))
+    assert rig.mode[0] == mode
+    rig.motion.restore(saved)
+    assert rig.mode[0] == (mode + 2 if mode else 0)
 
 
 @pytest.mark.parametrize("command", MOTIONS)

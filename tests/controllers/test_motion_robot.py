@@ -11,9 +11,12 @@ from hub.inputs import Inputs
 from hub.participant import Setup
 from robots import rotation
 from robots.dvrk import arms, cart
+from robots.dvrk.dynamics import STANDARD_GRAVITY
+from robots.dvrk.inertia import ENDOSCOPE_MASS
 from robots.dvrk.setup_joints import SIMULATED
 from schemas.crtk import StringStamped
 from schemas.ports import Port
+from schemas.ros import BoolMessage
 from tests.controllers.motion_rig import EMPTY, HOME, H, cp, jf, jp
 
 pytest.importorskip("mujoco")
@@ -153,3 +156,26 @@ def test_efforts_come_on_top_of_gravity_compensation():
     moved = bench.position("PSM1") - there
     assert moved[0] > 0.05
     assert np.abs(moved[1:3]).max() < 0.02
+
+
+def test_gravity_compensation_of_the_endoscope_can_be_switched_off_and_on():
+    def insertion_after(count, **orders):
+        bench.step(count, **orders)
+        return bench.position("ECM")[2]
+
+    bench = Bench(SEVERAL, "cart")
+    there = insertion_after(500)
+    sagged = insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=False))
+    assert bench.told["drive/ECM/control_mode"][0] == 3
+    assert 5e-4 < sagged - there < 1.5 * ENDOSCOPE_MASS["Classic_SD"] * STANDARD_GRAVITY / 10_000.0
+    assert insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=True)) == pytest.approx(there, abs=2e-4)  # friction lets it back slowly
+    there = insertion_after(300, ECM__free=EMPTY)
+    assert insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=False)) - there > 0.01
+    assert not bench.complaints
+
+
+def test_a_psm_has_no_gravity_compensation_to_switch_off():
+    bench, twin = Bench(), Bench()
+    bench.step(200, use_gravity_compensation=BoolMessage(data=False))
+    twin.step(200)
+    assert (bench.position("PSM1") == twin.position("PSM1")).all()
