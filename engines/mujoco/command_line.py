@@ -135,7 +135,6 @@ def export(
     """Write the robot's model as MJCF or URDF with its meshes."""
     _need_mujoco("export")
     from engines.mujoco.export import FORMATS, write
-    from engines.mujoco.model import spec
 
     known = FORMATS.get(path.suffix)
     form = form or known or "mjcf"
@@ -146,7 +145,7 @@ def export(
         raise typer.BadParameter(f"name at least one of {', '.join(_CART)}", param_hint="--arms")
     scene = _scene(named, instrument or [], mounting)
     try:
-        files = write(spec(scene), path, form)
+        files = write(scene, path, form)
     except OSError as error:
         raise typer.BadParameter(f"cannot write there: {error}", param_hint="PATH") from error
     typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")

@@ -8,8 +8,8 @@ import yourdfpy
 from typer.testing import CliRunner
 
 from engines.mujoco.command_line import app
-from engines.mujoco.export import write
-from engines.mujoco.model import build, spec
+from engines.mujoco.export import START, write
+from engines.mujoco.model import build
 from engines.mujoco.params import SceneParams
 from robots.dvrk import setup_joints
 from robots.dvrk.linkage import LINKAGES
@@ -26,8 +26,8 @@ SCENE = SceneParams.model_validate(
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     where = tmp_path_factory.mktemp("export")
-    write(spec(SCENE), where / "dvrk.xml", "mjcf")
-    write(spec(SCENE), where / "dvrk.urdf", "urdf")
+    write(SCENE, where / "dvrk.xml", "mjcf")
+    write(SCENE, where / "dvrk.urdf", "urdf")
     return where
 
 
@@ -50,6 +50,17 @@ def test_mjcf_reads_back_as_it_was(folder):
     mujoco.mj_forward(back, other)
     assert np.allclose(data.site_xpos, other.site_xpos, atol=1e-12)
     assert np.allclose(data.xmat, other.xmat, atol=1e-12)
+
+
+def test_a_keyframe_holds_the_arms_where_they_start(folder):
+    model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(START).id)
+    start = data.qpos.copy()
+    assert data.joint("PSM1/insertion").qpos[0] == SCENE.arms["PSM1"].start[2] > 0.1
+    assert data.joint("PSM1/counterweight").qpos[0] == -SCENE.arms["PSM1"].start[2]
+    mujoco.mj_step(model, data, nstep=1000)
+    assert np.abs(data.qpos - start).max() < 5e-3  # no more than the springs of roll and pitch pull their servos away
 
 
 def test_meshes_read_back_where_they_were(folder):
