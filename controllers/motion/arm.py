@@ -48,14 +48,7 @@ class Arm:
         names = [*(command for command in COMMANDS if command != "state_command"), *(JAW_COMMANDS if self._drives.jaw else ())]
         self._ports = [(command, f"{name}/{command}", heeding[command]) for command in names]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
-        self.state = (
-            self._started,
-            self._commands.ratio,
-            self._commands.gravity_compensation,
-            self._lifecycle.flags,
-            self._messages.state,
-            *self._drives.state,
-        )
+        self.state = (self._started, *self._commands.state, self._lifecycle.flags, self._messages.state, *self._drives.state)
         self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip((name, f"{name}/jaw"), self._drives.groups, strict=False)]
         self._jaw_setpoint = np.zeros(3)
         self.events = self._messages.outputs

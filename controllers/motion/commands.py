@@ -35,6 +35,7 @@ class Commands:
         """Share of the limits that moves use."""
         self.gravity_compensation = np.ones(1)
         """1: the drives bear the weight that the controller knows, 0: they do not."""
+        self.state = (self.ratio, self.gravity_compensation)
         self.handlers: Mapping[str, Callable[[Any], None]] = {
             "use_gravity_compensation": self._use_gravity_compensation,
             "trajectory_j/set_ratio": self._set_ratio,
