@@ -46,6 +46,10 @@ class mjtEq(IntEnum):
     mjEQ_WELD = ...
     mjEQ_JOINT = ...
 
+class mjtDisableBit(IntEnum):
+    mjDSBL_ISLAND = ...
+    mjDSBL_MIDPHASE = ...
+
 class mjtCone(IntEnum):
     mjCONE_ELLIPTIC = ...
 
@@ -76,6 +80,7 @@ class MjOption:
     integrator: mjtIntegrator
     cone: mjtCone
     impratio: float
+    disableflags: int
 
 class MjsElement:
     name: str
