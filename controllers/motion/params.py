@@ -57,6 +57,9 @@ class EcmParams(ArmParams):
     """The endoscope camera manipulator: which endoscope it holds, and where it is until it is measured."""
 
     endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    )
     start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
 
     @model_validator(mode="after")
@@ -67,7 +70,7 @@ class EcmParams(ArmParams):
     @property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope)
+        return ecm.chain(self.endoscope, self.tip_frame)
 
     @property
     def gripper(self) -> Jaw | None:

@@ -61,7 +61,10 @@ class PsmParams(ArmParams):
 class EcmParams(ArmParams):
     """The endoscope camera manipulator: which endoscope it holds and where it starts."""
 
-    endoscope: Literal["straight", "up", "down"] = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
+    endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    )
     start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
 
     @model_validator(mode="after")
@@ -72,7 +75,7 @@ class EcmParams(ArmParams):
     @cached_property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope)
+        return ecm.chain(self.endoscope, self.tip_frame)
 
 
 @with_config(ConfigDict(extra="forbid"))
@@ -121,6 +124,15 @@ class SceneParams(Params):
         default="friction", description="what holds an object between two jaws: friction alone, or a weld as long as both touch it"
     )
     looks: bool = Field(default=True, description="give the robot its meshes; without, only what collides is there")
+
+    @model_validator(mode="after")
+    def _stands_in_one_place(self) -> Self:
+        if self.mounting == "free" and self.setup_joints:
+            raise ValueError("setup_joints are those of the cart; say 'mounting: cart' or leave them out")
+        placed = [name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}]
+        if self.mounting == "cart" and placed:
+            raise ValueError(f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart setup_joints say where an arm stands")
+        return self
 
 
 class MujocoParams(SceneParams):

@@ -368,6 +368,12 @@ def test_the_tip_is_seen_from_the_camera_through_the_setup_joints(arm):
     assert frames[f"{arm}/local/measured_cp"] == f"{arm}_base"
 
 
+def test_with_the_frame_of_the_view_the_tip_is_seen_a_quarter_turned_about_the_line_of_sight():
+    kinematic, view = (Rig({**CART, "ECM": {"tip_frame": frame}}).step(10).outputs["PSM1/measured_cp"] for frame in ("kinematic", "view"))
+    x, y, z = kinematic[:3]
+    assert np.allclose(view[:3], [-y, x, z], rtol=0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("frame", ["", "ECM", "PSM1_base"])
 def test_a_pose_is_taken_in_the_frame_it_names(frame):
     rig = Rig(CART).step(10)

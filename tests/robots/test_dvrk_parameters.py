@@ -36,3 +36,15 @@ def test_a_setup_joint_is_set_inside_its_range(kind, arm, positions, message):
     assert kind.model_validate({**scene, "setup_joints": {"PSM1": ["0.8 m", "3 rad", 0, 0, 0, 0]}})
     with pytest.raises(ValidationError, match=message):
         kind.model_validate({**scene, "setup_joints": {arm: positions}})
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        ({"arms": {"PSM1": {}}, "setup_joints": {"PSM1": [0, 0, 0, 0, 0, 0]}}, "say 'mounting: cart'"),
+        ({"arms": {"PSM1": {}, "ECM": {"position": [0, 0, 0]}}, "mounting": "cart"}, "ECM: position and orientation are for 'mounting: free'"),
+    ],
+)
+def test_where_an_arm_stands_is_said_once(scene, message):
+    with pytest.raises(ValidationError, match=message):
+        SceneParams.model_validate(scene)
