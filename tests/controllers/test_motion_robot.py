@@ -116,14 +116,14 @@ def test_several_arms_work_at_once():
     assert np.allclose(seen, base[:3, :3] @ bench.tip("PSM2") + base[:3, 3], rtol=0.0, atol=1e-4)
 
 
-@pytest.mark.parametrize(("arm", "body", "force"), [("PSM1", "PSM1/insertion", 6.0), ("ECM", "ECM/roll", 150.0)])
-def test_an_arm_that_is_free_is_held_against_gravity_gives_way_to_a_push_and_stays_where_it_is_held(arm, body, force):
+@pytest.mark.parametrize(("arm", "body", "force", "drift"), [("PSM1", "PSM1/insertion", 6.0, 5e-4), ("ECM", "ECM/roll", 150.0, 1e-9)])
+def test_an_arm_that_is_free_is_held_against_gravity_gives_way_to_a_push_and_stays_where_it_is_held(arm, body, force, drift):
     bench = Bench(SEVERAL, "cart")
     bench.step(100)
     there = bench.tip(arm)
     bench.step(1000, **{f"{arm}__free": EMPTY})
     assert bench.told[f"drive/{arm}/control_mode"][0] == 2
-    assert np.linalg.norm(bench.tip(arm) - there) < 2e-3
+    assert np.linalg.norm(bench.tip(arm) - there) < drift
     there = bench.tip(arm)
     bench.push(body, [force, 0.0, 0.0])
     bench.step(500)
