@@ -66,16 +66,17 @@ class Servos:
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
         self.setpoint, self._previous, self._effort = np.split(self._inputs, 3)
-        self._command, self._reach, self._ways = start.copy(), np.empty((2, n)), np.outer((-1.0, 1.0), speed * period)
+        self._reach, self._ways = np.empty((2, n)), np.outer((-1.0, 1.0), speed * period)
         self._layout, self._measure = self._matrices(shares, n, period)
         self._springs, self._rest = self._elasticity(shares, n)
         self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
         self._gravity_compensation = model.body_gravcomp.copy()
-        self._command_ports = tuple(f"{group.ports}servo_jp" for group in self._groups)
         self._mode_ports = {arm: f"{arm}/control_mode" for arm in arms}
+        self._ports = *self._mode_ports.values(), *(f"{group.ports}servo_jp" for group in self._groups)
         self._state = np.concatenate([start, np.full(2 * len(arms), _POSITION)])
         self._modes = self._state[n:]  # per arm those of its joints and its jaw
-        self._wanted = self._modes.copy()
+        self._taken = np.concatenate([self._modes, start])
+        self._wanted, self._command = np.split(self._taken, [2 * len(arms)])
         self.off: frozenset[str] = frozenset()
         """The arms whose joints have no torque."""
         self._holding = True
@@ -118,11 +119,10 @@ class Servos:
 
     def begin(self, inputs: Inputs) -> None:
         """Take commands and modes for the step that begins. Raises SessionError for a mode that there is none of."""
-        np.concatenate([inputs[port] for port in self._mode_ports.values()], out=self._wanted)
+        np.concatenate([inputs[port] for port in self._ports], out=self._taken)
         if self._wanted.tobytes() != self._modes.tobytes():
             self._set_modes(self._wanted)
         command, setpoint, reach = self._command, self.setpoint, self._reach
-        np.concatenate([inputs[port] for port in self._command_ports], out=command)
         np.maximum(command, self._lower, out=command)
         np.minimum(command, self._upper, out=command)
         np.add(setpoint, self._ways, out=reach)
