@@ -110,7 +110,7 @@ class SerialChain:
         """
         n = len(self.joints)
         if q.shape[-1:] != (n,):
-            raise MotionError(f"positions of shape {q.shape}, expected {self._expected}")
+            self.check_form(q)
         if q.ndim > 1:
             return self._frames_of_many(q)
         factors = self._factors
@@ -145,11 +145,20 @@ class SerialChain:
             if not joint.lower - slack <= value <= joint.upper + slack
         ]
 
+    def check_form(self, q: Vector) -> None:
+        """Raise MotionError if `q`, shape (..., n), is not n finite numbers for every configuration."""
+        names = ", ".join(joint.name for joint in self.joints)
+        if q.shape[-1:] != (len(self.joints),):
+            raise MotionError(f"positions of shape {q.shape}, expected {len(self.joints)}: {names}")
+        if not (finite := np.isfinite(q)).all():
+            wrong = q[~finite.all(axis=-1)][0] if q.ndim > 1 else q
+            raise MotionError(f"not all positions are finite: {wrong.tolist()} of {names}")
+
     def check(self, q: Vector) -> None:
         """Raise MotionError if `q` is not n finite numbers, each inside the range of its joint."""
-        if q.shape != (len(self.joints),):
-            raise MotionError(f"positions of shape {q.shape}, expected {self._expected}")
-        self._check_finite(q)
+        self.check_form(q)
+        if q.ndim > 1:
+            raise MotionError(f"positions of shape {q.shape}, expected those of one configuration, ({len(self.joints)},)")
         if wrong := self.out_of_range(q):
             raise MotionError("; ".join(wrong))
 
@@ -158,18 +167,8 @@ class SerialChain:
 
         Raises MotionError for another number of joints, or a position that is not finite.
         """
-        tip = self.frames(q)[..., -1, :, :]
-        self._check_finite(q)
-        return tip
-
-    @property
-    def _expected(self) -> str:
-        return f"{len(self.joints)}: {', '.join(joint.name for joint in self.joints)}"
-
-    def _check_finite(self, q: Vector) -> None:
-        if not np.isfinite(q).all():
-            wrong = q[~np.isfinite(q).all(axis=-1)][0] if q.ndim > 1 else q
-            raise MotionError(f"not all positions are finite: {wrong.tolist()} of {', '.join(joint.name for joint in self.joints)}")
+        self.check_form(q)
+        return self.frames(q)[..., -1, :, :]
 
     def jacobian(self, frames: Vector, *, frame: Literal["base", "tip"] = "base") -> Vector:
         """Return J, shape (..., 6, n), with twist of the tip (m/s, rad/s) = J dq, from `frames(q)`.
