@@ -40,6 +40,8 @@ _SLACK = 1e-9
 """rad and m by which rounding may carry a joint past its limit."""
 _RIGID = 1e-6
 """Largest entry of R^T R - 1 that is taken for rounding, of a pose that was written with 7 digits."""
+_FAR = 1e3
+"""m: no arm reaches so far, and the squares of what is much further are no numbers."""
 _POINT = 1e-9
 """m: two axes that pass each other so closely meet."""
 _RCM_ROWS = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in psm.ARM_JOINTS)
@@ -97,6 +99,8 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
     start = np.broadcast_to(np.asarray(near, np.float64), (*many, n)).reshape(-1, n)
     if not (np.isfinite(poses).all() and np.isfinite(start).all()):
         raise MotionError("a pose or a joint position that is not finite cannot be reached")
+    if (np.abs(poses[:, :3, 3]) > _FAR).any():
+        raise MotionError(f"a position more than {_FAR:g} m away from the base cannot be reached")
     rotation = poses[:, :3, :3]
     unrigid = np.abs(rotation.swapaxes(-1, -2) @ rotation - np.eye(3)).max(axis=(-2, -1))
     unrigid = np.maximum(unrigid, np.abs(poses[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=-1))

@@ -133,6 +133,7 @@ SEVERAL = np.broadcast_to(np.eye(4), (2, 4, 4))
         (np.eye(4), 0.0, r"`near` of shape \(\), expected \(6,\): yaw, pitch"),
         (SEVERAL, np.zeros((3, 6)), r"`near` of shape \(3, 6\), expected \(6,\) or \(2, 6\): yaw, pitch"),
         (np.eye(4), HOME + np.inf, "not finite"),
+        (np.eye(4) + 1e300 * np.eye(4, k=3), HOME, "more than 1000 m away"),
         (MIRROR, HOME, "is no rigid transform: .*rotation matrix"),
         (np.eye(4) * 2.0, HOME, "is no rigid transform"),
         (np.stack([PSM.forward(HOME), np.zeros((4, 4))]), HOME, "pose 1 is no rigid transform"),
