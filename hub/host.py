@@ -100,6 +100,8 @@ class Host:
         self._slots = [self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name]
         self._by_name = {slot.member.name: slot for slot in self._slots}
         self._remote: dict[tuple[str, str], RemoteCell] = {}
+        self.step = INITIAL
+        """The step in which it is or was last."""
         self._stepping: str | None = None
         self._inlets: dict[tuple[str, str], list[tuple[_Slot, str, PortCodec]]] = {}
         self._initial: list[tuple[PortPublisher, Any]] = []
@@ -251,6 +253,7 @@ class Host:
         for slot in self._slots:
             slot.hashes, slot.compute_ns, slot.work_j = [], [], []
         for step in range(grant.step, end):
+            self.step = step
             for slot in self._slots:
                 period = slot.member.period
                 if not step % period:

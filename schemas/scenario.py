@@ -137,7 +137,7 @@ class Scenario(_Part):
     duration: Duration | None = Field(default=None, gt=0, description="simulated time; without it the session runs until it is stopped")
     pace: Literal["fast", "realtime"] = "fast"
     window: int | None = Field(
-        default=None, ge=1, le=1000, description="most steps that one grant may cover; without it 10 ms in pace fast, one step in pace realtime"
+        default=None, ge=1, le=1000, description="most steps that one grant may cover; without it 10 ms in pace fast with one host, else one step"
     )
     algorithm: Literal["gauss-seidel", "jacobi"] = Field(default="gauss-seidel", description="for connections that belong to no bond")
     order: list[str] | None = Field(default=None, description="the order in which participants step; needed where connections form a cycle")
