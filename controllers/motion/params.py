@@ -118,7 +118,7 @@ class MotionParams(Params):
 
     arms: Arms
     mounting: Literal["free", "cart"] = Field(
-        default="cart", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
+        default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
     )
     setup_joints: SetupJoints = SetupJoints()
     reference: Literal["camera", "base"] = Field(

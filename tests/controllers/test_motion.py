@@ -38,7 +38,7 @@ MOTIONS = {
 
 @pytest.mark.parametrize("state", ["disabled", "homed"])
 def test_the_contract_of_participants_is_kept(state):
-    params = MotionParams.model_validate({"arms": CART, "initial_state": state})
+    params = MotionParams.model_validate({"mounting": "cart", "arms": CART, "initial_state": state})
     at_home = {f"sense/{arm}/measured_js": [*HOME, *[0.0] * 12] for arm in ("PSM1", "PSM2", "PSM3")}
     orders = {"PSM1/move_jp": (jp(*GOAL),), "PSM2/state_command": (StringStamped(string="home"),)}
     check_engine(lambda: MotionController("motion", params), period_ns=H, inputs={**at_home, **orders})

@@ -27,6 +27,7 @@ participants:
           - {do: jaw, arm: PSM1, angle: 30 deg}
   motion:
     kind: motion
+    mounting: cart
     initial_state: homed
     arms: &arms
       PSM1: {instrument: "400006"}
