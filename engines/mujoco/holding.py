@@ -116,6 +116,8 @@ class Holding:
 
     def update(self) -> None:
         """Look at the contacts, set welds, and bring the outputs up to date."""
+        if not self._bodies:
+            return
         if self._look() or self._touched.any():  # an object is held no longer than it is touched
             touch = (self._contacts[..., 0] > 0.0).all(axis=-1)
             self._touched += 1.0
