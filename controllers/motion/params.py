@@ -5,25 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Jaw, instrument
-from robots.dvrk.parameters import PsmPositions, UnitQuaternion
+from robots.dvrk.parameters import EcmPositions, InstrumentName, PsmPositions, SetupPositions, UnitQuaternion, check_start, settable
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import SerialChain
-from schemas.errors import MotionError
 from schemas.quantity import Angle, Duration, Length
 
 __all__ = ["ArmParams", "Arms", "EcmParams", "MotionParams", "PsmParams", "SetupJoints"]
-
-
-def _known(name: str) -> str:
-    try:
-        return instrument(name).name
-    except MotionError as error:
-        raise ValueError(str(error)) from error
 
 
 class ArmParams(Params):
@@ -36,9 +28,14 @@ class ArmParams(Params):
 class PsmParams(ArmParams):
     """A patient-side manipulator: what it holds, and where it is until it is measured."""
 
-    instrument: Annotated[str, AfterValidator(_known)] = Field(default="palpation-probe", description="name or number, such as 400006")
+    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
     start: PsmPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(self.chain, self.start, self.gripper, self.jaw)
+        return self
 
     @property
     def chain(self) -> SerialChain:
@@ -60,12 +57,20 @@ class EcmParams(ArmParams):
     """The endoscope camera manipulator: which endoscope it holds, and where it is until it is measured."""
 
     endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    start: tuple[Angle, Angle, Length, Angle] = Field(default=(0.0, 0.0, 0.0, 0.0), description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    )
+    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(self.chain, self.start)
+        return self
 
     @property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope)
+        return ecm.chain(self.endoscope, self.tip_frame)
 
     @property
     def gripper(self) -> Jaw | None:
@@ -99,16 +104,13 @@ class Arms(Params):
         return {name: arm for name, arm in named.items() if arm is not None}
 
 
-SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
-
-
 class SetupJoints(Params):
     """Where the braked setup joints are set: the lift (m), then five angles; None: the simulated positions."""
 
-    PSM1: SetupPositions | None = None
-    PSM2: SetupPositions | None = None
-    PSM3: SetupPositions | None = None
-    ECM: SetupPositions | None = None
+    PSM1: Annotated[SetupPositions, settable("PSM1")] | None = None
+    PSM2: Annotated[SetupPositions, settable("PSM2")] | None = None
+    PSM3: Annotated[SetupPositions, settable("PSM3")] | None = None
+    ECM: Annotated[SetupPositions, settable("ECM")] | None = None
 
 
 class MotionParams(Params):
@@ -116,7 +118,7 @@ class MotionParams(Params):
 
     arms: Arms
     mounting: Literal["free", "cart"] = Field(
-        default="cart", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
+        default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
     )
     setup_joints: SetupJoints = SetupJoints()
     reference: Literal["camera", "base"] = Field(

@@ -12,7 +12,7 @@ __all__ = ["bond_sides", "has_jaw", "has_probe", "scene_ports"]
 
 _JOINT_STATE, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 _ALL = ("position", "velocity", "effort")
-_MODES = "[arm, jaw]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
+_MODES = "[arm, jaw]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort; 3 and 4 the last two without gravity compensation"
 
 
 def has_jaw(params: PsmParams | EcmParams) -> bool:
