@@ -7,10 +7,12 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from engines.mujoco.params import SceneParams
+from engines.mujoco.skin_params import SkinParams
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
 from schemas.quantity import Angle, Length
+from schemas.scenario import Name
 
 __all__ = ["EndoscopeParams", "ViewParams"]
 
@@ -42,6 +44,9 @@ class EndoscopeParams(SceneParams):
     far: Length | None = Field(default=None, gt=0.0, description="what is farther is not seen; 2 m from the endoscope's tip, all of the scene from elsewhere")
     view: ViewParams | None = Field(
         default=None, description="cameras that stand in the world; without it they are at the ECM's tip or, in a scene without ECM, look at all of it"
+    )
+    skins: dict[Name, SkinParams] = Field(
+        default_factory=dict[Name, SkinParams], description="soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
     )
     images: Literal["raw", "compressed", "both"] = Field(default="raw", description="what is published of each picture")
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
