@@ -8,9 +8,9 @@ from engines.mujoco.params import EcmParams, MujocoParams, PsmParams
 from engines.mujoco.positions import position_count
 from schemas.ports import BondSide, Port
 
-__all__ = ["bond_sides", "has_jaw", "has_probe", "scene_ports"]
+__all__ = ["bond_sides", "has_jaw", "has_probe", "has_spheres", "scene_ports"]
 
-_JOINT_STATE, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
+_JOINT_STATE, _POSE, _WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"
 _ALL = ("position", "velocity", "effort")
 _MODES = "[arm, jaw]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
 
@@ -18,6 +18,11 @@ _MODES = "[arm, jaw]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
 def has_jaw(params: PsmParams | EcmParams) -> bool:
     """Say whether the arm holds an instrument that opens and closes."""
     return isinstance(params, PsmParams) and params.tool.jaw is not None
+
+
+def has_spheres(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds an instrument with contact spheres."""
+    return isinstance(params, PsmParams) and bool(params.tool.spheres)
 
 
 def has_probe(params: PsmParams | EcmParams) -> bool:
@@ -35,8 +40,15 @@ def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
 
 
 def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
-    """Return per palpation probe the bond `<arm>/probe`, in the world."""
-    return tuple(BondSide(name=f"{name}/probe", side="motion", frame="world") for name, arm in params.arms.items() if has_probe(arm))
+    """Return per palpation probe the bond `<arm>/probe`, and per instrument with contact spheres `<arm>/contact`, all in the world."""
+    return tuple(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm))
+
+
+def _arm_bonds(name: str, arm: PsmParams | EcmParams) -> Iterator[BondSide]:
+    if has_probe(arm):
+        yield BondSide(name=f"{name}/probe", side="motion", frame="world")
+    if isinstance(arm, PsmParams) and (spheres := arm.tool.spheres):
+        yield BondSide(name=f"{name}/contact", side="motion", dof=3, points=len(spheres), frame="world")
 
 
 def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[Port]:
@@ -48,6 +60,9 @@ def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[P
     yield Port(name=f"{arm}/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
     yield Port(name=f"{arm}/setpoint_js", causality="output", type=_JOINT_STATE, names=names, period_ns=slow)
     yield Port(name=f"{arm}/measured_cp", causality="output", type=_POSE, frame=f"{arm}_base", period_ns=slow)
+    if has_probe(params) or has_spheres(params):
+        felt = "mean over the last step of the force through the bonds on the instrument, with its moment about the tip: what a haptic device feels"
+        yield Port(name=f"{arm}/tip_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt)
 
 
 def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:

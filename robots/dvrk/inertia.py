@@ -20,6 +20,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from robots.dvrk.contact_spheres import FINGER_HALF_WIDTH
 from robots.dvrk.ecm import chain as ecm_chain
 from robots.dvrk.instruments import SHAFT_RADIUS, STEEL_DENSITY, WRIST_RADIUS, Instrument
 from robots.dvrk.psm import chain as psm_chain
@@ -66,8 +67,6 @@ _YAW_LINK_MASS = 6.63661e-6
 """kg of what turns with the wrist yaw beside the fingers (dvrk_env tool_lnd.urdf.xacro, CAD of the large needle driver, for all)."""
 _FINGER_MASS = 3.90696e-5
 """kg of one finger (same file)."""
-_FINGER_RADIUS = 0.0024
-"""m (dvrk_env, bounds of tool_gripper1_link.STL)."""
 
 PROBE_RADIUS = 5e-3
 """m, of the sphere of a palpation probe unless a scene says otherwise."""
@@ -105,7 +104,7 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
         mass = STEEL_DENSITY * 4.0 / 3.0 * pi * probe_radius**3
         return {**bodies, last: Inertia(mass, end, 0.4 * mass * probe_radius**2 * np.eye(3))}
     bodies[last] = Inertia(_YAW_LINK_MASS, end, 0.4 * _YAW_LINK_MASS * WRIST_RADIUS**2 * np.eye(3))
-    finger = Inertia.of_rod(_FINGER_MASS, end, end + tool.jaw.length * ahead, _FINGER_RADIUS)
+    finger = Inertia.of_rod(_FINGER_MASS, end, end + tool.jaw.length * ahead, FINGER_HALF_WIDTH)
     return {**bodies, "jaw_left": finger, "jaw_right": finger}
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from math import radians
 from types import MappingProxyType
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from robots.dvrk.contact_spheres import ContactSphere, on_jaw
 from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint
 from schemas.errors import MotionError, did_you_mean
@@ -88,6 +89,11 @@ class Instrument:
     def has_snake_wrist(self) -> bool:
         """Whether the wrist is that of a 5 mm instrument: four bending joints in place of wrist pitch and wrist yaw."""
         return len(self.joints) != 3
+
+    @cached_property
+    def spheres(self) -> tuple[ContactSphere, ...]:
+        """What touches tissue; empty for a palpation probe, which is a sphere itself, and for what has no jaw."""
+        return () if self.jaw is None else on_jaw(self.jaw.length, self.tip[:3, 2])
 
 
 def instrument(name: str) -> Instrument:

@@ -35,6 +35,8 @@ def urdf(spec: mujoco.MjSpec) -> Element:
         _add_link(robot, spec, model, body)
         _add_joint(robot, spec, model, body)
         for site in body.sites:
+            if "/contact/" in site.name:
+                continue  # where tissue is touched concerns no one who reads a URDF
             _add_frame(robot, model, body, site)
     for arm in sorted({body.name.split("/")[0] for body in spec.bodies if body.name.endswith(FINGERS)}):
         _add_jaw(robot, spec, arm)

@@ -6,12 +6,13 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import transform
-from engines.mujoco.model.names import FINGERS
+from engines.mujoco.model.names import FINGERS, sphere_site
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
 from engines.mujoco.params import EcmParams, PsmParams
 from robots.dvrk import drives, inertia
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.contact_spheres import ContactSphere
 from robots.dvrk.drives import Drive
 from schemas.vectors import Vector
 
@@ -41,6 +42,8 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     chain = params.chain
     bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip))
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
+    if isinstance(params, PsmParams):
+        _add_spheres(spec, name, params.tool.spheres, bodies)
     return bodies
 
 
@@ -96,6 +99,16 @@ def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
         body.mass, body.explicitinertial = given.mass, True
         body.ipos = (turn.T @ (given.centre - pose[:3, 3])).tolist()
         body.fullinertia = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+
+
+def _add_spheres(spec: mujoco.MjSpec, arm: str, spheres: tuple[ContactSphere, ...], bodies: Bodies) -> None:
+    """Mark the contact spheres by sites, and let MuJoCo lay out their positions and velocities in the world."""
+    for sphere in spheres:
+        bodies[sphere.link][0].add_site(name=sphere_site(arm, sphere.name), pos=sphere.position, size=[sphere.radius, 0.0, 0.0], group=_HIDDEN)
+    for kind, what in ((mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"), (mujoco.mjtSensor.mjSENS_FRAMELINVEL, "velocity")):
+        for sphere in spheres:
+            site = sphere_site(arm, sphere.name)
+            spec.add_sensor(name=f"{site}/{what}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
 
 
 def _add_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str], has_jaw: bool) -> None:
