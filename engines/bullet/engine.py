@@ -10,7 +10,7 @@ from pydantic import Field
 from engines.bullet.client import connect, disconnect
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
-from engines.bullet.proxy import ProbeParams, Proxy
+from engines.bullet.proxy import Coupling, Probe, ProbeParams
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError
@@ -56,7 +56,7 @@ class BulletEngine(Stepped):
         super().__init__(name, params)
         self._client = _NO_CLIENT
         self._organs: list[Organ] = []
-        self._proxies: list[Proxy] = []
+        self._probes: list[Probe] = []
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -75,20 +75,8 @@ class BulletEngine(Stepped):
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Every probe, with its virtual coupling and the contact stiffness of the stiffest organ."""
-        return tuple(
-            BondSide(
-                name=name,
-                side="force",
-                dof=6,
-                frame="world",
-                stiffness=probe.stiffness,
-                damping=probe.damping,
-                proxy_mass=probe.mass,
-                contact_stiffness=max(organ.contact_stiffness(probe.radius) for organ in self.params.organs.values()),
-            )
-            for name, probe in self.params.probes.items()
-        )
+        """Every probe: a frame, or the points that are its spheres."""
+        return tuple(self._bond(name, probe) for name, probe in self.params.probes.items())
 
     def configure(self, setup: Setup) -> Outputs:
         """Load the organs, let them settle, and add a proxy for every bond. Raises ScenarioError where a step is too long."""
@@ -106,24 +94,25 @@ class BulletEngine(Stepped):
             self._simulate(physicsClientId=client)
         for bond in self.bonds:
             if bond.name in setup.bonds:
-                self._proxies.append(Proxy(self.params.probes[bond.name], bond, setup.bonds[bond.name], self.params.gravity, client))
+                probe = self.params.probes[bond.name]
+                self._probes.append(Probe(probe, self._coupling(probe), bond, setup.bonds[bond.name], self.params.gravity, client))
         self._read_nodes(0)
         outputs = self._nodes(0)
-        for proxy in self._proxies:
-            outputs.update(proxy.idle)
+        for probe in self._probes:
+            outputs.update(probe.idle)
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the probes along their predicted motion; return their reactions, and the nodes where they are due."""
-        seconds, dt, proxies = h * 1e-9, self._dt, self._proxies
-        for proxy in proxies:
-            proxy.begin(inputs, seconds)
+        seconds, dt, probes = h * 1e-9, self._dt, self._probes
+        for probe in probes:
+            probe.begin(inputs, seconds)
         for i in range(h // self.params.timestep):
-            for proxy in proxies:
-                proxy.push((i + 0.5) * dt, dt)
+            for probe in probes:
+                probe.push((i + 0.5) * dt, dt)
             self._simulate(physicsClientId=self._client)
-            for proxy in proxies:
-                proxy.read()
+            for probe in probes:
+                probe.read()
         end = t + h
         due, touch = end % self.params.node_period == 0, end // _CONTACT_PERIOD_NS != t // _CONTACT_PERIOD_NS
         if due or touch:
@@ -131,13 +120,13 @@ class BulletEngine(Stepped):
         if touch:
             self._update_gains()
         outputs = self._nodes(end) if due else {}
-        for proxy in proxies:
-            outputs.update(proxy.result(end, seconds))
+        for probe in probes:
+            outputs.update(probe.result(end, seconds))
         return outputs
 
     def state_hash(self) -> int:
         """Return 64 bits of the probes' positions, velocities and bonds, and of the nodes as last read."""
-        return state_hash(*(part for proxy in self._proxies for part in proxy.state), *(organ.nodes for organ in self._organs))
+        return state_hash(*(part for probe in self._probes for part in probe.state), *(organ.nodes for organ in self._organs))
 
     def save(self) -> bytes:
         """Raise StateError: Bullet cannot."""
@@ -153,11 +142,32 @@ class BulletEngine(Stepped):
             disconnect(self._client)
         self._client = _NO_CLIENT
         self._organs.clear()
-        self._proxies.clear()
+        self._probes.clear()
 
     @property
     def _no_state(self) -> str:
         return f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies. Re-simulate from the recorded grants instead"
+
+    def _contact_stiffness(self, probe: ProbeParams) -> float:
+        """Return the largest stiffness (N/m) that one of the spheres may meet."""
+        return max(organ.contact_stiffness(radius) for organ in self.params.organs.values() for radius in probe.radii.tolist())
+
+    def _coupling(self, probe: ProbeParams) -> Coupling:
+        return probe.coupling(self._contact_stiffness(probe), self.params.timestep * 1e-9)
+
+    def _bond(self, name: str, probe: ProbeParams) -> BondSide:
+        coupling = self._coupling(probe)
+        return BondSide(
+            name=name,
+            side="force",
+            dof=6 if probe.spheres is None else 3,
+            points=probe.spheres or 1,
+            frame="world",
+            stiffness=coupling.stiffness,
+            damping=coupling.damping,
+            proxy_mass=coupling.mass,
+            contact_stiffness=self._contact_stiffness(probe),
+        )
 
     def _nodes(self, t: int) -> dict[str, Value]:
         header = Header(stamp=Time.from_ns(t), frame_id="world")
@@ -172,8 +182,9 @@ class BulletEngine(Stepped):
             organ.sample(t)
 
     def _update_gains(self) -> None:
-        for proxy in self._proxies:
-            proxy.gain = max(organ.contact_gain(proxy.position, proxy.radius) for organ in self._organs)
+        for probe in self._probes:
+            for i, (position, radius) in enumerate(zip(probe.positions, probe.radii.tolist(), strict=True)):
+                probe.gains[i] = 1.0 if probe.held[i] else max(organ.contact_gain(position, radius) for organ in self._organs)
 
     def _check_steps(self, period_ns: int) -> None:
         params, where = self.params, f"participant '{self.name}'"
@@ -182,9 +193,10 @@ class BulletEngine(Stepped):
         if params.node_period % period_ns:
             raise ScenarioError(f"{where}: node_period {params.node_period} ns is no multiple of the period {period_ns} ns")
         for name, probe in params.probes.items():
-            if params.timestep * 1e-9 > probe.longest_step:
+            longest = self._coupling(probe).longest_step * 1e9
+            if params.timestep > longest * (1.0 + 1e-9):
                 raise ScenarioError(
-                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass / stiffness) = {probe.longest_step * 1e9:.0f} ns, "
+                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass / stiffness) = {longest:.0f} ns, "
                     f"up to which the virtual coupling is stable. Shorten it, or take a heavier or softer probe"
                 )
 

@@ -118,7 +118,7 @@ def test_unphysical_organs_are_refused(wrong):
     [
         (params(timestep="0.3 ms"), "does not divide the period"),
         (params(node_period="2.5 ms"), "no multiple of the period"),
-        (params(probe={"stiffness": "10 kN/m"}), "0.5 sqrt\\(mass / stiffness\\)"),
+        (params(probe={"stiffness": "10 kN/m", "mass": "20 g"}), "0.5 sqrt\\(mass / stiffness\\)"),
         (params({**BLOCK, "young_modulus": "200 kPa"}), "organ 'block'.*highest natural frequency"),
         (params({**BLOCK, "young_modulus": "30 kPa", "damping": 0}), "raise the damping"),
     ],
