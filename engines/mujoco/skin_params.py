@@ -1,4 +1,4 @@
-"""What a scenario may say about how an organ looks."""
+"""What a scenario may say about how a soft body looks."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from pydantic import Field
 
 from hub.participant import Params
 
-__all__ = ["COLOURS", "Rgb", "SkinParams"]
+__all__ = ["Rgb", "SkinParams"]
 
 Rgb = tuple[Annotated[float, Field(ge=0.0, le=1.0)], Annotated[float, Field(ge=0.0, le=1.0)], Annotated[float, Field(ge=0.0, le=1.0)]]
 """Red, green and blue, each from 0 to 1."""
 
-Tissue = Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"]
-
-COLOURS: dict[Tissue, Rgb] = {
+_COLOURS: dict[str, Rgb] = {
     "tissue": (0.80, 0.38, 0.33),
     "adrenal": (0.83, 0.60, 0.28),
     "colon": (0.86, 0.55, 0.48),
@@ -23,16 +21,19 @@ COLOURS: dict[Tissue, Rgb] = {
     "kidney": (0.56, 0.22, 0.18),
     "liver": (0.45, 0.17, 0.13),
 }
-"""Chosen by eye, for a white lamp at the camera, after what textbooks of anatomy say of the living organ: liver and kidney red-brown, the
-liver darker; colon greyish pink; the adrenal gland the yellow of its cortex; `tissue` the pink of muscle."""
+"""Chosen by eye for a white lamp at the camera, after what anatomy says of the living organs: liver and kidney red-brown, the liver
+darker; the colon a greyish pink; the adrenal gland the yellow of its cortex; `tissue`, which is all else, the pink of muscle."""
 
 
 class SkinParams(Params):
-    """The look of one organ."""
+    """The look of one soft body."""
 
-    colour: Tissue | Rgb = Field(default="tissue", description="name of a tissue, or red, green and blue from 0 to 1")
+    colour: Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"] | Rgb | None = Field(
+        default=None, description="name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue whose name the body has, if there is one"
+    )
 
-    @property
-    def rgb(self) -> Rgb:
-        """Red, green and blue, each from 0 to 1."""
-        return COLOURS[self.colour] if isinstance(self.colour, str) else self.colour
+    def rgb(self, name: str) -> Rgb:
+        """Return red, green and blue, each from 0 to 1, of the body `name`."""
+        if isinstance(self.colour, tuple):
+            return self.colour
+        return _COLOURS[self.colour or (name if name in _COLOURS else "tissue")]

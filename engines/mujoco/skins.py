@@ -91,7 +91,7 @@ class Skins:
         self._meshes = {name: SkinMesh(body.rest.astype(np.float64), body.triangles.astype(np.int64)) for name, body in bodies.items()}
         for name, mesh in self._meshes.items():
             vertices = mesh.vertices(bodies[name].rest.astype(np.float64))
-            material = scene.add_material(name=f"{name}/skin", rgba=[*params[name].rgb, 1.0], specular=_SPECULAR, shininess=_SHININESS)
+            material = scene.add_material(name=f"{name}/skin", rgba=[*params[name].rgb(name), 1.0], specular=_SPECULAR, shininess=_SHININESS)
             scene.add_skin(
                 name=name,
                 material=material.name,
