@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from engines.bullet.client import connect, disconnect
+from engines.bullet.grasp import Grasp, grasp_ports
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
 from engines.bullet.proxy import Coupling, Probe, ProbeParams
@@ -57,11 +58,12 @@ class BulletEngine(Stepped):
         self._client = _NO_CLIENT
         self._organs: list[Organ] = []
         self._probes: list[Probe] = []
+        self._grasps: list[Grasp] = []
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The nodes of every organ."""
-        return tuple(
+        """The nodes of every organ; of every probe with fingers, what they hold."""
+        nodes = tuple(
             Port(
                 name=f"{organ}/nodes",
                 causality="output",
@@ -72,6 +74,7 @@ class BulletEngine(Stepped):
             )
             for organ in self.params.organs
         )
+        return nodes + tuple(port for name, probe in self.params.probes.items() if probe.grasp for port in grasp_ports(name))
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -100,6 +103,9 @@ class BulletEngine(Stepped):
         outputs = self._nodes(0)
         for probe in self._probes:
             outputs.update(probe.idle)
+            if grasp := self.params.probes[probe.name].grasp:
+                self._grasps.append(Grasp(grasp, probe, self._organs))
+                outputs.update(self._grasps[-1].outputs)
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
@@ -122,11 +128,15 @@ class BulletEngine(Stepped):
         outputs = self._nodes(end) if due else {}
         for probe in probes:
             outputs.update(probe.result(end, seconds))
+        for grasp in self._grasps:
+            grasp.update(end, looked=touch)
+            outputs.update(grasp.outputs)
         return outputs
 
     def state_hash(self) -> int:
         """Return 64 bits of the probes' positions, velocities and bonds, and of the nodes as last read."""
-        return state_hash(*(part for probe in self._probes for part in probe.state), *(organ.nodes for organ in self._organs))
+        keepers = (*self._probes, *self._grasps)
+        return state_hash(*(part for keeper in keepers for part in keeper.state), *(organ.nodes for organ in self._organs))
 
     def save(self) -> bytes:
         """Raise StateError: Bullet cannot."""
@@ -143,6 +153,7 @@ class BulletEngine(Stepped):
         self._client = _NO_CLIENT
         self._organs.clear()
         self._probes.clear()
+        self._grasps.clear()
 
     @property
     def _no_state(self) -> str:

@@ -68,7 +68,12 @@ class Organ:
         self.name = name
         self.mesh = mesh = params.mesh
         self.anchored = mesh.nodes[:, 2] == mesh.nodes[:, 2].min()
-        self._touchable = mesh.triangles[~self.anchored[mesh.triangles].all(axis=1)]
+        self.touchable = mesh.triangles[~self.anchored[mesh.triangles].all(axis=1)]
+        self.held = np.zeros(len(mesh.nodes), dtype=np.bool_)
+        """Which nodes are held by a grasp, shape (n,)."""
+        edges = mesh.nodes[mesh.triangles] - mesh.nodes[np.roll(mesh.triangles, 1, axis=1)]
+        self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
+        """Mean length of an edge of the surface, m."""
         self.frequency = highest_frequency(mesh, np.where(self.anchored, 0.0, 1.0), params.material)
         """Highest natural frequency, rad/s."""
         self._client = client
@@ -99,7 +104,27 @@ class Organ:
 
     def contact_gain(self, centre: Vector, radius: float) -> float:
         """Return `contact.contact_gain` for a sphere at `centre` (m), shape (3,), of `radius` (m), on the nodes as last read."""
-        return contact_gain(centre, radius, self.nodes, self._touchable)
+        return contact_gain(centre, radius, self.nodes, self.touchable)
+
+    def anchor(self, node: int, body: int) -> int:
+        """Tie a node to a rigid body of Bullet, where both are now; return the number of the anchor."""
+        import pybullet as bullet
+
+        self.held[node] = True
+        return bullet.createSoftBodyAnchor(self._body, node, body, -1, physicsClientId=self._client)
+
+    def release(self, node: int, anchor: int) -> None:
+        """Undo `anchor`."""
+        import pybullet as bullet
+
+        bullet.removeConstraint(anchor, physicsClientId=self._client)
+        self.held[node] = False
+
+    def let_touch(self, body: int, *, on: bool) -> None:
+        """Say whether a rigid body of Bullet meets the organ, or passes through it."""
+        import pybullet as bullet
+
+        bullet.setCollisionFilterPair(self._body, body, -1, -1, int(on), physicsClientId=self._client)
 
     def sample(self, time_ns: int) -> None:
         """Read the nodes into `nodes`, shape (n, 3), metres, frame `world`.

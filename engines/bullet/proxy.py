@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from engines.bullet.grasp import GraspParams
 from hub.bond import ForceSide
 from hub.inputs import Inputs
 from hub.participant import BondPlan
@@ -63,11 +64,18 @@ class ProbeParams(BaseModel):
     )
     mass: Mass | None = Field(default=None, gt=0, description="m of each proxy; default: the least for which the sub-step is at most 0.5 sqrt(m / k)")
     damping: Damping | None = Field(default=None, gt=0, description="b of the virtual coupling; default: critical, 2 sqrt(k m)")
+    grasp: GraspParams | None = Field(default=None, description="lets the spheres take hold of tissue, as fingers")
 
     @model_validator(mode="after")
     def _a_radius_for_each(self) -> ProbeParams:
         if isinstance(self.radius, tuple) and len(self.radius) != (self.spheres or 1):
             raise ValueError(f"{len(self.radius)} radii for {self.spheres or 1} spheres: state one radius for all, or one for each")
+        return self
+
+    @model_validator(mode="after")
+    def _spheres_for_each_finger(self) -> ProbeParams:
+        if self.grasp is not None and (self.spheres or 1) % self.grasp.fingers:
+            raise ValueError(f"{self.spheres or 1} spheres on {self.grasp.fingers} fingers: every finger needs the same number of them")
         return self
 
     @property
@@ -106,9 +114,11 @@ class Probe:
         self._weight = np.array([0.0, 0.0, coupling.mass * gravity])
         self._spring, self._damper = np.zeros(bond.size), np.zeros(bond.size)
         self._springs, self._dampers = (forces[: 3 * n].reshape(n, 3) for forces in (self._spring, self._damper))  # (n, 3), views
+        self.targets = self.positions
+        """Centres of the spheres on the instrument at the end of the step, as predicted, m, frame `world`, shape (n, 3)."""
         self._placed = False
         self._client = client
-        self.bodies = [self._sphere(radius) for radius in self.radii.tolist()]
+        self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
         """Bullet's number of every proxy."""
         self._read_pose, self._read_velocity, self._apply, self._frame = (
             bullet.getBasePositionAndOrientation,
@@ -168,11 +178,11 @@ class Probe:
 
     def _stretch(self, tau: float, ahead: float) -> None:
         """Set spring and damper `tau` seconds into the step, with the proxies where they will be `ahead` seconds from now."""
-        positions, velocities = self._targets(tau)
-        self._springs[:] = self._coupling.stiffness * (positions - self.positions - ahead * self.velocities)
+        self.targets, velocities = self._motion(tau)
+        self._springs[:] = self._coupling.stiffness * (self.targets - self.positions - ahead * self.velocities)
         self._dampers[:] = self._coupling.damping * (velocities - self.velocities)
 
-    def _targets(self, tau: float) -> tuple[Vector, Vector]:
+    def _motion(self, tau: float) -> tuple[Vector, Vector]:
         """Return where the spheres of the instrument are (m) and their velocities (m/s), shapes (n, 3), `tau` seconds into the step."""
         shape = self.positions.shape
         return self._side.position(tau).reshape(shape), self._side.velocity(tau)[: self.positions.size].reshape(shape)
@@ -180,7 +190,7 @@ class Probe:
     def _place(self) -> None:
         import pybullet as bullet
 
-        positions, velocities = self._targets(0.0)
+        positions, velocities = self._motion(0.0)
         self.positions, self.velocities = positions.copy(), velocities.copy()
         for body, position, velocity in zip(self.bodies, positions.tolist(), velocities.tolist(), strict=True):
             bullet.resetBasePositionAndOrientation(body, position, [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client)
