@@ -41,4 +41,5 @@ def mount(app: typer.Typer) -> None:
             app.add_typer(loaded, name=entry.name)
         else:
             (only,) = loaded.registered_commands
-            app.command(entry.name, cls=only.cls)(only.callback)
+            only.name = entry.name
+            app.registered_commands.append(only)
