@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from engines.bullet.mesh import block
+from engines.bullet.organs.grid import block
 from engines.mujoco.skin_mesh import SkinMesh
 from schemas.vectors import Vector
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engines.bullet.mesh import block
+from engines.bullet.organs.grid import block
 from engines.mujoco import opengl
 from engines.mujoco.endoscope import Endoscope
 from engines.mujoco.endoscope_params import EndoscopeParams
