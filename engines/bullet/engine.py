@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from engines.bullet.anchor import WORLD, RigidParams, add_rigid
 from engines.bullet.client import connect, disconnect
 from engines.bullet.grasp import Grasp, grasp_ports
 from engines.bullet.material import longest_step
@@ -14,7 +15,7 @@ from engines.bullet.organ import Organ, OrganParams
 from engines.bullet.proxy import Coupling, Probe, ProbeParams
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
-from schemas.errors import ScenarioError, StateError
+from schemas.errors import ScenarioError, StateError, did_you_mean
 from schemas.ports import BondSide, Port
 from schemas.quantity import Acceleration, Duration
 from schemas.ros import Header, Time
@@ -36,10 +37,19 @@ class BulletParams(Params):
     """Organs, the probes that may touch them, and the numerics."""
 
     organs: dict[Name, OrganParams] = Field(min_length=1)
+    rigid: dict[Name, RigidParams] = Field(default_factory=dict[Name, RigidParams], description="parts that do not move, and to which organs may be anchored")
     probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
     timestep: Duration = Field(default=1_000_000, gt=0, description="sub-step; the period is a multiple of it")
     node_period: Duration = Field(default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period")
     gravity: Acceleration = Field(default=9.80665, ge=0, description="along -z of `world`; default: standard gravity")
+
+    @model_validator(mode="after")
+    def _known_parts(self) -> Self:
+        for name, organ in self.organs.items():
+            for part in organ.anchored_nodes:
+                if part != WORLD and part not in self.rigid:
+                    raise ValueError(f"organ '{name}' is anchored to '{part}', which is no rigid part.{did_you_mean(part, [WORLD, *self.rigid])}")
+        return self
 
 
 class BulletEngine(Stepped):
@@ -90,8 +100,9 @@ class BulletEngine(Stepped):
         import pybullet as bullet
 
         self._simulate = bullet.stepSimulation
+        parts = {name: add_rigid(part, client) for name, part in self.params.rigid.items()}
         for name, organ in self.params.organs.items():
-            self._organs.append(Organ(name, organ, client))
+            self._organs.append(Organ(name, organ, client, parts))
         self._check_tissue()
         for _ in range(_SETTLING_NS // self.params.timestep):
             self._simulate(physicsClientId=client)

@@ -16,8 +16,8 @@ TRIANGLES = arrays(float, (5, 3, 3), elements=st.floats(-1, 1))
 def reaction(rig, model):
     """Return the force (N) of the anchors on the tissue, shape (3,)."""
     organ = model.organs["block"]
-    rest = organ.mesh.nodes
-    forces = internal_forces(rest, organ.mesh.tetrahedra, rig.nodes, *organ.material.bullet_lame)
+    rest = organ.rest.nodes
+    forces = internal_forces(rest, organ.rest.tetrahedra, rig.nodes, *organ.elastic.bullet_lame)
     return -forces[rest[:, 2] == rest[:, 2].min()].sum(axis=0)
 
 

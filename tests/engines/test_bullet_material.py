@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engines.bullet.material import Material, highest_frequency, longest_step
-from engines.bullet.mesh import block
+from engines.bullet.organs.grid import block
 from tests.engines.finite_elements import energy, internal_forces
 
 MATERIALS = st.builds(Material, st.floats(1e2, 1e6), st.floats(0.01, 0.495), st.just(1000.0), st.just(0.0))

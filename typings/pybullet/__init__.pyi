@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 ACTIVATION_STATE_DISABLE_SLEEPING: int
 DIRECT: int
+GEOM_BOX: int
 GEOM_SPHERE: int
 MESH_DATA_SIMULATION_MESH: int
 RESET_USE_DEFORMABLE_WORLD: int
@@ -27,11 +28,12 @@ def changeDynamics(
     physicsClientId: int = ...,
 ) -> None: ...
 def connect(method: int) -> int: ...
-def createCollisionShape(shapeType: int, radius: float = ..., physicsClientId: int = ...) -> int: ...
+def createCollisionShape(shapeType: int, radius: float = ..., halfExtents: Sequence[float] = ..., physicsClientId: int = ...) -> int: ...
 def createMultiBody(
     baseMass: float = ...,
     baseCollisionShapeIndex: int = ...,
     basePosition: Sequence[float] = ...,
+    baseOrientation: Sequence[float] = ...,
     useMaximalCoordinates: bool = ...,
     physicsClientId: int = ...,
 ) -> int: ...
