@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engines.bullet.organs.shape import Shape, stuffed
 from schemas.vectors import Vector
@@ -39,20 +40,34 @@ def _field(points: Vector) -> Vector:
 def _formed(points: Vector) -> Vector:
     """Thin the lobe towards its edge, and dome it."""
     x, y, z = points.T
-    along = 0.5 * (1.0 + x / _HALF_M[0])
-    thinned = (_HALF_M[2] + (0.5 * _EDGE_M - _HALF_M[2]) * along) / _THICK_M
-    sunk = _DOME_M * (along**2 + (y / _HALF_M[1]) ** 2)
-    return np.stack([x, y, z * thinned - sunk], axis=1)
+    thinned = (_HALF_M[2] + (0.5 * _EDGE_M - _HALF_M[2]) * _along(x)) / _THICK_M
+    return np.stack([x, y, z * thinned + _middle(x, y)], axis=1)
+
+
+def _along(x: Vector) -> Vector:
+    """Return the way from the diaphragm (0) to the edge (1)."""
+    return 0.5 * (1.0 + x / _HALF_M[0])
+
+
+def _middle(x: Vector, y: Vector) -> Vector:
+    """Return the height (m) half-way between the upper and the lower surface."""
+    return -_DOME_M * (_along(x) ** 2 + (y / _HALF_M[1]) ** 2)
+
+
+def _on_diaphragm(nodes: Vector) -> NDArray[np.bool_]:
+    """The upper surface of the half that lies under the diaphragm, to which ligaments hold it."""
+    x, y, z = nodes.T
+    return (x < 0.0) & (z > _middle(x, y))
 
 
 LIVER_LOBE = Shape(
     description=(
         "the left lobe of a liver, 100 mm from the diaphragm to its free edge, 125 mm broad, 42 mm thick and 14 mm at the edge, 0.2 kg: a seventh of a liver "
-        "(Gray, Anatomy of the Human Body, 20th edition, 1918). It hangs at the diaphragm, its middle at the origin: +x points to the free edge, +z is anterior"
+        "(Gray, Anatomy of the Human Body, 20th edition, 1918). It hangs under the diaphragm, its middle at the origin: +x points to the free edge, +z is anterior"
     ),
     mesh=stuffed(_field, _formed, low=(-0.050, -0.066, -0.030), high=(0.050, 0.066, 0.030)),
     surfaces={
-        "diaphragm": lambda nodes: nodes[:, 0] < -0.6 * _HALF_M[0],
+        "diaphragm": _on_diaphragm,
         "edge": lambda nodes: nodes[:, 0] > 0.7 * _HALF_M[0],
     },
     anchors=("diaphragm",),
