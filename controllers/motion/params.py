@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk import ecm, psm
-from robots.dvrk.instruments import Jaw, instrument
-from robots.dvrk.parameters import PsmPositions, UnitQuaternion
+from robots.dvrk.instruments import instrument
+from robots.dvrk.parameters import MountedPositions, UnitQuaternion, home
 from robots.dvrk.setup_joints import CartArm
-from robots.serial_chain import SerialChain
+from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.quantity import Angle, Duration, Length
 
-__all__ = ["ArmParams", "Arms", "EcmParams", "MotionParams", "PsmParams", "SetupJoints"]
+__all__ = ["ArmParams", "Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJoints"]
 
 
 def _known(name: str) -> str:
@@ -24,6 +25,17 @@ def _known(name: str) -> str:
         return instrument(name).name
     except MotionError as error:
         raise ValueError(str(error)) from error
+
+
+class Gripper(NamedTuple):
+    """What an instrument grasps with."""
+
+    name: str
+    """Second part of its ports' names: `jaw` or `hand`."""
+    joints: tuple[Joint, ...]
+    """What is commanded: the jaw's angle, or the closings of the fingers."""
+    start: tuple[float, ...]
+    """Positions at time 0, rad."""
 
 
 class ArmParams(Params):
@@ -37,8 +49,17 @@ class PsmParams(ArmParams):
     """A patient-side manipulator: what it holds, and where it is until it is measured."""
 
     instrument: Annotated[str, AfterValidator(_known)] = Field(default="palpation-probe", description="name or number, such as 400006")
-    start: PsmPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
+    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
+    hand: tuple[Angle, Angle, Angle] = Field(default=(0.0, 0.0, 0.0), description="closings of the fingers of a hand at time 0; default: folded")
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        try:
+            self.chain.check(np.array(self.start, np.float64))
+        except MotionError as error:
+            raise ValueError(str(error)) from error
+        return self
 
     @property
     def chain(self) -> SerialChain:
@@ -46,14 +67,17 @@ class PsmParams(ArmParams):
         return psm.chain(instrument(self.instrument))
 
     @property
-    def gripper(self) -> Jaw | None:
-        """The instrument's jaw, if it has one."""
-        return instrument(self.instrument).jaw
+    def gripper(self) -> Gripper | None:
+        """What the instrument grasps with, if anything."""
+        tool = instrument(self.instrument)
+        if tool.jaw is not None:
+            return Gripper("jaw", (tool.jaw.joint,), (self.jaw,))
+        return None if tool.hand is None else Gripper("hand", tool.hand.joints, self.hand)
 
     @property
     def home(self) -> tuple[float, ...]:
         """Where the arm goes to be homed."""
-        return psm.HOME
+        return psm.home(instrument(self.instrument))
 
 
 class EcmParams(ArmParams):
@@ -68,8 +92,8 @@ class EcmParams(ArmParams):
         return ecm.chain(self.endoscope)
 
     @property
-    def gripper(self) -> Jaw | None:
-        """None: an endoscope has no jaw."""
+    def gripper(self) -> Gripper | None:
+        """None: an endoscope does not grasp."""
         return None
 
     @property

@@ -16,8 +16,8 @@ from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import UnitQuaternion
-from robots.serial_chain import SerialChain
+from robots.dvrk.parameters import MountedPositions, UnitQuaternion, home
+from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.keys import valid_name
 from schemas.quantity import Angle, Duration, Length
@@ -31,8 +31,10 @@ SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
 """Of the setup joints that carry one arm: the lift (m), then five angles."""
 
 
-def _check_range(q: tuple[float, ...], chain: SerialChain) -> None:
-    for joint, value in zip(chain.joints, q, strict=True):
+def _check_range(q: tuple[float, ...], joints: tuple[Joint, ...]) -> None:
+    if len(q) != len(joints):
+        raise ValueError(f"{len(q)} joint positions, expected {len(joints)}: {', '.join(joint.name for joint in joints)}")
+    for joint, value in zip(joints, q, strict=True):
         if not joint.lower <= value <= joint.upper:
             raise ValueError(f"{joint.name} {value:g} is out of its range {joint.lower:g} .. {joint.upper:g}")
 
@@ -49,8 +51,9 @@ class PsmParams(ArmParams):
 
     instrument: str = Field(default="palpation-probe", description="name or number, such as 400006")
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
-    start: tuple[Angle, Angle, Length, Angle, Angle, Angle] = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
+    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
+    hand: tuple[Angle, Angle, Angle] = Field(default=(0.0, 0.0, 0.0), description="closings of the fingers of a hand at time 0; default: folded")
 
     @cached_property
     def tool(self) -> Instrument:
@@ -75,10 +78,12 @@ class PsmParams(ArmParams):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        _check_range(self.start, self.chain)
+        _check_range(self.start, self.chain.joints)
         jaw = self.tool.jaw
         if jaw is not None and not jaw.lower <= self.jaw <= jaw.upper:
             raise ValueError(f"jaw {self.jaw:g} is out of its range {jaw.lower:g} .. {jaw.upper:g}")
+        if self.tool.hand is not None:
+            _check_range(self.hand, self.tool.hand.joints)
         return self
 
 
@@ -90,7 +95,7 @@ class EcmParams(ArmParams):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        _check_range(self.start, self.chain)
+        _check_range(self.start, self.chain.joints)
         return self
 
     @cached_property

@@ -8,16 +8,21 @@ from engines.mujoco.params import EcmParams, MujocoParams, PsmParams
 from engines.mujoco.positions import position_count
 from schemas.ports import BondSide, Port
 
-__all__ = ["bond_sides", "has_jaw", "has_probe", "has_spheres", "scene_ports"]
+__all__ = ["bond_sides", "has_hand", "has_jaw", "has_probe", "has_spheres", "scene_ports"]
 
 _JOINT_STATE, _POSE, _WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"
 _ALL = ("position", "velocity", "effort")
-_MODES = "[arm, jaw]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
+_MODES = "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
 
 
 def has_jaw(params: PsmParams | EcmParams) -> bool:
     """Say whether the arm holds an instrument that opens and closes."""
     return isinstance(params, PsmParams) and params.tool.jaw is not None
+
+
+def has_hand(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds a hand."""
+    return isinstance(params, PsmParams) and params.tool.hand is not None
 
 
 def has_spheres(params: PsmParams | EcmParams) -> bool:
@@ -33,7 +38,7 @@ def has_probe(params: PsmParams | EcmParams) -> bool:
 def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
     """Return all ports but those of bonds."""
     slow = params.publish_period
-    ports = [port for name, arm in params.arms.items() for port in (*_arm_ports(name, arm, slow), *_jaw_ports(name, arm))]
+    ports = [port for name, arm in params.arms.items() for port in (*_arm_ports(name, arm, slow), *_jaw_ports(name, arm), *_hand_ports(name, arm))]
     size = position_count(params)
     ports.append(Port(name="qpos", causality="output", size=size, period_ns=slow, description="joint positions of the whole model, as MuJoCo has them"))
     return (*ports, *(port for name in params.objects for port in _object_ports(name, slow)))
@@ -73,6 +78,19 @@ def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
             name=f"{arm}/jaw/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=(0.0,), description="acts in effort mode"
         )
         yield Port(name=f"{arm}/jaw/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
+
+
+def _hand_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
+    if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+        names, still = hand.fingers, (0.0,) * len(hand.fingers)
+        yield Port(name=f"{arm}/hand/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=params.hand, description="goal of their closings")
+        yield Port(
+            name=f"{arm}/hand/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode"
+        )
+        closing = "closings of the fingers, and the torques of their motors"
+        yield Port(name=f"{arm}/hand/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL, description=closing)
+        bones = tuple(link.name for link in hand.links)
+        yield Port(name=f"{arm}/hand/phalanges/measured_js", causality="output", type=_JOINT_STATE, names=bones, fields=_ALL, description="of each joint")
 
 
 def _object_ports(thing: str, slow: int) -> Iterator[Port]:

@@ -27,6 +27,8 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, Ps
     """Put the joints of `arms`, with linkages and fingers, where they start."""
     for arm, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
+        if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+            start |= dict(zip((link.name for link in hand.links), hand.unloaded(np.array(params.hand)).ravel().tolist(), strict=True))
         for link in links(arm, params):
             if link.follow is not None:
                 q = link.follow.ratio * start[link.follow.joint]
@@ -58,6 +60,10 @@ class Readings:
                 fingers = int(model.sensor(f"{arm}/position/{FINGERS[0]}").adr[0])
                 jaw = self.outputs[f"{arm}/jaw/measured_js"] = np.empty(3)
                 self._jaws.append((self._sensors[fingers : fingers + 6], jaw))
+            elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+                fingers, k, m = int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]), 3 * len(hand.fingers), 3 * len(hand.links)
+                self.outputs[f"{arm}/hand/measured_js"] = self._sensors[fingers : fingers + k]
+                self.outputs[f"{arm}/hand/phalanges/measured_js"] = self._sensors[fingers + k : fingers + k + m]
         self._where = np.concatenate(poses)
         self.update()
 

@@ -18,7 +18,9 @@ import numpy as np
 
 from robots.dvrk import ecm
 from robots.dvrk import psm as psm_arm
+from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import Instrument
+from robots.serial_chain import Joint
 
 __all__ = ["ECM", "FINGERS", "SMOOTHING", "Disc", "Drive", "discs", "friction", "psm"]
 
@@ -83,7 +85,7 @@ _ECM_GAINS = {"yaw": (400.0, 30.0), "pitch": (1000.0, 80.0), "insertion": (10000
 
 
 def psm(tool: Instrument) -> Mapping[str, Drive]:
-    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw included."""
+    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw or hand included."""
     chain = psm_arm.chain(tool)
     drives = {joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity) for joint in chain.joints[:3]}
     square = {name: sum(disc.shares.get(name, 0.0) ** 2 for disc in discs(tool)) for name in _moved(tool)}
@@ -95,18 +97,27 @@ def psm(tool: Instrument) -> Mapping[str, Drive]:
     for name, share in square.items():
         elastic = (_ROLL_ELASTICITY, _ROLL_OFFSET) if name == "roll" else (0.0, 0.0)
         drives[name] = Drive(_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, *elastic, _DISC_INERTIA * share, *limits[name])
+    if tool.hand is not None:
+        drives |= {finger.name: _finger(finger, tool.hand) for finger in tool.hand.joints}
     return MappingProxyType(drives)
 
 
+def _finger(finger: Joint, hand: Hand) -> Drive:
+    """Return the drive of a finger of `hand`, over its closing: a disc that winds the tendon up and lets it go.
+
+    Its friction stays with the motor: the springs that open the finger do not turn it.
+    """
+    first = hand.phalanges[0]
+    return Drive(_DISC_STIFFNESS, _DISC_DAMPING, 0.0, 0.0, first.stiffness, -first.stiffness * first.rest, _DISC_INERTIA, finger.effort, finger.velocity)
+
+
 def discs(tool: Instrument) -> tuple[Disc, ...]:
-    """Return the four discs that turn `tool`; the inverse of SAW's matrix from discs to joints says by how much."""
+    """Return the discs that turn roll, wrist and jaw of `tool`; the inverse of SAW's matrix from discs to joints says by how much."""
     shares = np.linalg.inv(tool.actuator_to_joint)  # (disc, joint)
     names = _moved(tool)
     columns = [_column(name) for name in names]
-    return tuple(
-        Disc({name: float(row[column]) for name, column in zip(names, columns, strict=True) if abs(row[column]) > 1e-9}, *losses)
-        for row, losses in zip(shares, _DISC_FRICTION, strict=True)
-    )
+    turned = [{name: float(row[column]) for name, column in zip(names, columns, strict=True) if abs(row[column]) > 1e-9} for row in shares]
+    return tuple(Disc(moved, *losses) for moved, losses in zip(turned, _DISC_FRICTION, strict=True) if moved)
 
 
 def _moved(tool: Instrument) -> tuple[str, ...]:

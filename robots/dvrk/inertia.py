@@ -22,6 +22,7 @@ import numpy as np
 
 from robots.dvrk.contact_spheres import FINGER_HALF_WIDTH
 from robots.dvrk.ecm import chain as ecm_chain
+from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import SHAFT_RADIUS, STEEL_DENSITY, WRIST_RADIUS, Instrument
 from robots.dvrk.psm import chain as psm_chain
 from schemas.vectors import Vector
@@ -91,7 +92,7 @@ def _arm_of_psm() -> Mapping[str, Inertia]:
 
 
 def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[str, Inertia]:
-    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe."""
+    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe; or shaft and phalanges (straight)."""
     chain = psm_chain(tool)
     frames = chain.frames(np.zeros(len(chain.joints)))
     origins, ahead = frames[:-1, :3, 3], frames[-1, :3, 2]  # (n, 3), (3,)
@@ -99,6 +100,8 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
     bodies = {"roll": Inertia.of_rod(tool.roll_mass + SHAFT_MASS, origins[first - 1], origins[first], SHAFT_RADIUS)}
     for i in range(first + 1, len(chain.joints) - 1):
         bodies[chain.joints[i].name] = Inertia.of_rod(tool.pitch_mass, origins[i], origins[i + 1], WRIST_RADIUS)
+    if tool.hand is not None:
+        return {**bodies, **_hand(tool.hand, frames[-2])}
     last, end = chain.joints[-1].name, origins[-1]
     if tool.jaw is None:
         mass = STEEL_DENSITY * 4.0 / 3.0 * pi * probe_radius**3
@@ -106,6 +109,15 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
     bodies[last] = Inertia(_YAW_LINK_MASS, end, 0.4 * _YAW_LINK_MASS * WRIST_RADIUS**2 * np.eye(3))
     finger = Inertia.of_rod(_FINGER_MASS, end, end + tool.jaw.length * ahead, FINGER_HALF_WIDTH)
     return {**bodies, "jaw_left": finger, "jaw_right": finger}
+
+
+def _hand(hand: Hand, shaft: Vector) -> Mapping[str, Inertia]:
+    """Return the phalanges of `hand`, its frame being `shaft`, shape (4, 4)."""
+    bodies: dict[str, Inertia] = {}
+    for link, mass in zip(hand.links, np.tile(hand.masses, len(hand.fingers)).tolist(), strict=True):
+        pose = shaft @ link.pose
+        bodies[link.name] = Inertia.of_rod(mass, pose[:3, 3], pose[:3, 3] + link.phalanx.length * pose[:3, 0], hand.radius)
+    return bodies
 
 
 _ECM_CAD = {

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import AfterValidator
 
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
+from schemas.errors import MotionError
 from schemas.quantity import Angle, Length
 
-__all__ = ["ArmName", "PsmPositions", "UnitQuaternion"]
+__all__ = ["ArmName", "MountedPositions", "PsmPositions", "UnitQuaternion", "home"]
 
 ArmName = Literal["PSM1", "PSM2", "PSM3"]
 
@@ -33,5 +34,16 @@ def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
 PsmPositions = Annotated[tuple[Angle, Angle, Length, Angle, Angle, Angle], AfterValidator(_in_range)]
 """Positions of a PSM's six joints (rad, m), inside their ranges."""
 
+MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Length, Angle, Angle, Angle]
+"""Positions of a PSM's joints (rad, m), as many as it has with its instrument: four with a hand, else six."""
+
 UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
 """A rotation as quaternion (x, y, z, w)."""
+
+
+def home(arm: dict[str, Any]) -> MountedPositions:
+    """Return `psm.home` for the `instrument` of an arm whose fields are being validated; any where that is none."""
+    try:
+        return cast("MountedPositions", psm.home(instrument(arm.get("instrument", ""))))
+    except MotionError:
+        return psm.HOME  # not looked at: the instrument has been refused

@@ -12,7 +12,7 @@ from robots.dvrk.instruments import Instrument
 from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 
-__all__ = ["ARM_JOINTS", "CANNULA_DEPTH", "HOME", "JOINT_NAMES", "SAFE_DISTANCE", "chain"]
+__all__ = ["ARM_JOINTS", "CANNULA_DEPTH", "HOME", "JOINT_NAMES", "SAFE_DISTANCE", "chain", "home"]
 
 _RCM_TO_CARRIAGE = 0.4318
 """Distance (m) of the instrument carriage from the RCM at insertion 0 (SAW share/kinematic/PSM.json, offset of joint 3)."""
@@ -39,6 +39,12 @@ CANNULA_DEPTH = 0.025
 SAFE_DISTANCE = 0.045 + 0.002
 """From the RCM to the wrist pitch axis (m), beyond which the real controller lets the wrist and Cartesian motion go (same file: distance
 and buffer)."""
+
+
+def home(instrument: Instrument) -> tuple[float, ...]:
+    """Return `HOME` for the joints of the arm with `instrument`: what is beyond stands at 0."""
+    joints = len(ARM_JOINTS) + len(instrument.joints)
+    return (*HOME, *(0.0,) * joints)[:joints]
 
 
 def chain(instrument: Instrument) -> SerialChain:

@@ -112,6 +112,7 @@ def _leader(spec: mujoco.MjSpec, joint: str) -> tuple[str, float]:
 
 def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str) -> None:
     servo = spec.actuator(f"{driven.rpartition('/')[0]}/{FINGERS[0]}" if driven.endswith("/jaw") else driven)
+    servo = servo or spec.actuator(driven.rpartition("_")[0])  # that of the finger, for a phalanx
     lower, upper = (repr(float(end)) for end in span)
     SubElement(joint, "limit", lower=lower, upper=upper, effort=repr(float(servo.forcerange[1])), velocity=repr(float(servo.velrange[1])))
 

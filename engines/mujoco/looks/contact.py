@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engines.mujoco.looks import ecm as ecm_look
-from engines.mujoco.looks import fingers, instruments
+from engines.mujoco.looks import fingers, instruments, musha
 from engines.mujoco.looks import psm as psm_look
 from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
 from engines.mujoco.looks.solids import hull, part
@@ -36,6 +36,10 @@ def instrument(tool: Instrument) -> Collisions:
     """Return what collides of an instrument in its PSM: housing, shaft, wrist and fingers."""
     looks: Looks = instruments.parts(tool)
     frames = psm_arm.chain(tool).frames(np.zeros(3 + len(tool.joints)))
+    if tool.hand is not None:
+        housing, shaft = looks["insertion"], looks["roll"][0].vertices[:, 2]
+        tube = _upright("shaft", SHAFT_RADIUS, float(shaft.min()), float(shaft.max()))
+        return {"insertion": (_hull("housing", housing),), "roll": (tube,), **musha.capsules(tool.hand, frames[3])}
     pitch, yaw = frames[4][2, 3], frames[-2][2, 3]
     collisions: dict[str, tuple[Part | Primitive, ...]] = {
         "insertion": (_hull("housing", looks["insertion"]),),

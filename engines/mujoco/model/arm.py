@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from engines.mujoco.model import hand as hands
 from engines.mujoco.model import transform
 from engines.mujoco.model.names import FINGERS, sphere_site
 from engines.mujoco.model.shapes import Bodies
@@ -43,6 +44,9 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip))
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
     if isinstance(params, PsmParams):
+        if (hand := params.tool.hand) is not None:
+            hands.add_sensors(spec, name, hand)
+            _add_joint_sensors(spec, name, [link.name for link in hand.links])
         _add_spheres(spec, name, params.tool.spheres, bodies)
     return bodies
 
@@ -59,8 +63,14 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
 def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
     """Give each independent joint its drive, and an instrument's discs the friction that wrist and jaw share."""
     is_psm = isinstance(params, PsmParams)
-    for name, drive in (drives.psm(params.tool) if is_psm else drives.ECM).items():
-        _add_drive(spec, f"{arm}/{name}", drive)
+    driven = drives.psm(params.tool) if is_psm else drives.ECM
+    hand = params.tool.hand if is_psm else None
+    for name, drive in driven.items():
+        if hand is None or name not in hand.fingers:
+            _add_drive(spec, f"{arm}/{name}", drive)
+    if hand is not None:
+        hands.add_drives(spec, arm, hand, driven[hand.fingers[0]])
+        hands.add_contacts(spec, arm, hand)
     for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
         tendon = spec.add_tendon(name=f"{arm}/disc_{i}", damping=[disc.viscous_friction, 0.0, 0.0], frictionloss=disc.coulomb_friction)
         for name, share in disc.shares.items():

@@ -45,7 +45,7 @@ class Link:
 
 
 def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
-    """Return all moving links of `arm`, parents before children: its joints, then the linkage, then the fingers."""
+    """Return all moving links of `arm`, parents before children: its joints, then the linkage, then the fingers of a jaw or the phalanges of a hand."""
     chain = params.chain
     poses = chain.frames(np.zeros(len(chain.joints)))
     parents = (BASE, *(joint.name for joint in chain.joints[:-1]))
@@ -63,6 +63,10 @@ def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
         wrist = tree[chain.joints[-1].name]
         for name, turn in zip(FINGERS, (np.eye(4), _HALF_TURN), strict=True):
             tree[name] = Link(name, wrist.name, "revolute", wrist.pose @ turn, jaw.lower / 2, jaw.upper / 2)
+    if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+        shaft = tree[chain.joints[-1].name].pose
+        for bone in hand.links:
+            tree[bone.name] = Link(bone.name, bone.parent, "revolute", shaft @ bone.pose, bone.phalanx.lower, bone.phalanx.upper)
     return tuple(tree.values())
 
 
