@@ -78,7 +78,7 @@ class OrganParams(BaseModel):
             raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
         if self.material is not None and self.young_modulus is not None:
             raise ValueError("an organ has a material or a young_modulus, not both")
-        _ = self.elastic, self.anchored_nodes
+        _ = self.elastic, self.local, self.anchored_nodes
         return self
 
     @cached_property
@@ -128,7 +128,7 @@ class OrganParams(BaseModel):
         """Return which nodes belong to a part of the surface, shape (n,). Raises ValueError where it is unknown or has no node."""
         nodes, chosen = np.unique(self.local.triangles), np.zeros(len(self.local.nodes), np.bool_)
         points = self.local.nodes[nodes]
-        chosen[nodes] = self.body.surface(part.surface, points) if part.box is None else part.box.depth(points) >= 0.0
+        chosen[nodes] = part.box.depth(points) >= 0.0 if part.box else self.body.surface(part.surface or "", points)
         if not chosen.any():
             raise ValueError(
                 f"no node of the surface lies in {part.surface or 'the box'}; the organ reaches from {points.min(axis=0)} to {points.max(axis=0)} m"

@@ -75,9 +75,7 @@ COLON = Shape(
     surfaces={
         "oral-end": lambda nodes: nodes[:, 0] < -0.5 * _LENGTH_M + _NANOMETRE,
         "anal-end": lambda nodes: nodes[:, 0] > 0.5 * _LENGTH_M - _NANOMETRE,
-        "mesentery": lambda nodes: (
-            (np.arctan2(np.abs(nodes[:, 1]), -nodes[:, 2]) < _MESENTERY_RAD) & (np.hypot(nodes[:, 1], nodes[:, 2]) > _RADIUS_M - 0.5 * _WALL_M)
-        ),
+        "mesentery": _on_mesentery,
     },
     anchors=("oral-end", "anal-end", "mesentery"),
     material="colon",

@@ -63,7 +63,7 @@ def _on_diaphragm(nodes: Vector) -> NDArray[np.bool_]:
 LIVER_LOBE = Shape(
     description=(
         "the left lobe of a liver, 100 mm from the diaphragm to its free edge, 125 mm broad, 42 mm thick and 14 mm at the edge, 0.2 kg: a seventh of a liver "
-        "(Gray, Anatomy of the Human Body, 20th edition, 1918). It hangs under the diaphragm, its middle at the origin: +x points to the free edge, +z is anterior"
+        "(Gray, Anatomy of the Human Body, 20th edition, 1918). It hangs under the diaphragm, its middle at the origin: +x is towards the edge, +z anterior"
     ),
     mesh=stuffed(_field, _formed, low=(-0.050, -0.066, -0.030), high=(0.050, 0.066, 0.030)),
     surfaces={

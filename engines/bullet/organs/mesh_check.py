@@ -30,7 +30,7 @@ def checked_mesh(nodes: Vector, tetrahedra: Indices) -> TetMesh:
         nodes: shape (n, 3), m.
         tetrahedra: shape (m, 4).
     """
-    problems = _numbers(nodes, tetrahedra) or [*_size(nodes), *_shapes(nodes, tetrahedra), *_surface(nodes, TetMesh(nodes, tetrahedra))]
+    problems = _numbers(nodes, tetrahedra) or _size(nodes) or [*_shapes(nodes, tetrahedra), *_surface(nodes, TetMesh(nodes, tetrahedra))]
     if problems:
         raise ValueError("the mesh cannot be used: " + "; ".join(problems))
     return TetMesh(nodes, tetrahedra)
@@ -91,8 +91,9 @@ def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
     open_edges = edges[counts != 2]
     if len(open_edges):
         problems.append(f"the surface is not watertight: {len(open_edges)} edges have not two triangles, for instance between nodes {open_edges[0].tolist()}")
-    order = np.lexsort(np.round(nodes / (_SAME_PLACE * max(float(np.ptp(nodes, axis=0).max()), 1e-30))).T)
-    near = np.linalg.norm(np.diff(nodes[order], axis=0), axis=1) < _SAME_PLACE * np.ptp(nodes, axis=0).max()
+    apart = _SAME_PLACE * np.ptp(nodes, axis=0).max()
+    order = np.lexsort(np.round(nodes / apart).T)
+    near = np.linalg.norm(np.diff(nodes[order], axis=0), axis=1) < apart
     if near.any():
         pairs = np.sort(order[1:][near])
         problems.append(f"{len(pairs)} nodes lie where others are, so the mesh is cracked there; merge them: {_some(pairs)}")

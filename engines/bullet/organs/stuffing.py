@@ -52,9 +52,9 @@ def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices
     cubes = np.ceil((high - low) / spacing).astype(np.int64) + 2
     shape = 2 * cubes + 1  # places at half the spacing; corners of cubes are at even, centres at odd ones
     strides = np.array([shape[1] * shape[2], shape[2], 1])
-    places = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1).reshape(-1, 3)
+    places = _grid(np.zeros(3, np.int64), shape, 1)
     points = (places - cubes) * (0.5 * spacing) + 0.5 * (low + high)
-    centres = np.stack(np.meshgrid(*(np.arange(1, n - 1, 2) for n in shape), indexing="ij"), axis=-1).reshape(-1, 3)
+    centres = _grid(np.ones(3, np.int64), shape - 1, 2)
     parts: list[Indices] = []
     for axis in range(3):
         step, one, other = np.roll(np.eye(3, dtype=np.int64), axis, axis=1)  # towards the next centre, and along the square between
@@ -64,6 +64,12 @@ def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices
             corners = [pairs, pairs + 2 * step, pairs + step + first, pairs + step + second]
             parts.append(np.stack([corner @ strides for corner in corners], axis=1))
     return points, np.concatenate(parts)
+
+
+def _grid(start: Indices, stop: Indices, step: int) -> Indices:
+    """Return all (i, j, k) from `start` to before `stop`, shape (n, 3), k the fastest."""
+    i, j, k = (np.arange(int(start[axis]), int(stop[axis]), step) for axis in range(3))
+    return np.stack(np.meshgrid(i, j, k, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _snapped(field: Field, points: Vector, signs: Indices, tetrahedra: Indices, spacing: float) -> tuple[Vector, Indices, Indices, Vector]:

@@ -73,7 +73,7 @@ class _Reader:
             elif keyword == "CELLS":
                 cells = self._cells(words)
             elif keyword == "CELL_TYPES":
-                types = self._numbers(self._count(words, 1), "int").astype(np.int64)
+                types = self._integers(self._count(words, 1), "int")
         if nodes is None or cells is None or types is None:
             missing = [name for name, part in (("POINTS", nodes), ("CELLS", cells), ("CELL_TYPES", types)) if part is None]
             raise ValueError(f"has no {', '.join(missing)}")
@@ -86,12 +86,10 @@ class _Reader:
     def _cells(self, words: list[str]) -> list[Indices]:
         """Return the nodes of every cell; since version 5 a list of where they begin stands before them."""
         count, size = self._count(words, 1), self._count(words, 2)
-        peek = self._content[self._at : self._at + 40].split()
-        if peek[:1] == [b"OFFSETS"]:
-            offsets = self._numbers(count, self._line().split()[-1].lower()).astype(np.int64)
-            nodes = self._numbers(size, self._line().split()[-1].lower()).astype(np.int64)
-            return np.split(nodes, offsets[1:-1])
-        flat, cells, at = self._numbers(size, "int").astype(np.int64), list[Indices](), 0
+        if self._content[self._at : self._at + 40].lstrip().startswith(b"OFFSETS"):
+            offsets = self._integers(count, self._kind("OFFSETS"))
+            return np.split(self._integers(size, self._kind("CONNECTIVITY")), offsets[1:-1])
+        flat, cells, at = self._integers(size, "int"), list[Indices](), 0
         while at < size and len(cells) < count:
             cells.append(flat[at + 1 : at + 1 + flat[at]])
             at += 1 + max(int(flat[at]), 0)
@@ -103,10 +101,26 @@ class _Reader:
         line, self._at = self._content[self._at : end], end + 1
         return line.decode("ascii", "replace").strip()
 
+    def _kind(self, keyword: str) -> str:
+        """Return the type of the numbers that follow the next line, which begins with `keyword`; blank lines may stand before it."""
+        while self._at < len(self._content):
+            words = self._line().split()
+            if len(words) == 2 and words[0] == keyword:
+                return words[1].lower()
+            if words:
+                break
+        raise ValueError(f"has no {keyword} where it should")
+
     def _count(self, words: list[str], place: int) -> int:
         if len(words) <= place or not words[place].isdigit():
             raise ValueError(f"the line '{' '.join(words)[:60]}' does not say how many numbers follow")
         return int(words[place])
+
+    def _integers(self, count: int, kind: str) -> Indices:
+        numbers = self._numbers(count, kind)
+        if not (np.abs(numbers) < _LARGEST_FILE).all():
+            raise ValueError("holds something else where numbers of nodes should be")
+        return numbers.astype(np.int64)
 
     def _numbers(self, count: int, kind: str) -> NDArray[np.float64]:
         if self._binary:
