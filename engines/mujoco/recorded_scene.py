@@ -31,6 +31,7 @@ _ASIDE = np.array([0.5, -0.72, 0.48])
 """Direction from which the overview looks: between the axes and from above, so that three sides of a box are seen."""
 _DISTANCE, _LEAST = 1.8, 0.08
 """Of the overview, in diagonals of what is looked at; the least diagonal, m."""
+_LENS = ("field_of_view", "baseline", "near", "far")
 _OVERSAMPLING = 2
 """Pixels drawn for each one of the picture, along either side: smooths edges."""
 
@@ -49,8 +50,8 @@ class RecordedScene:
         name = robot or robots[0]
         self._scene = MujocoParams.model_validate(participants[name].params).model_dump(include=set(SceneParams.model_fields))
         self._qpos = f"/engine/{name}/out/qpos"
-        self._looks = _looks(participants)
-        self._nodes = {topic.split("/")[-2]: topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type}
+        self._looks, self._lens = _looks(participants), _lens(participants)
+        self._nodes = _by_body([topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type])
 
     def picture(self, time_ns: int, camera: Camera, size: tuple[int, int], position: Point | None = None, target: Point | None = None) -> NDArray[np.uint8]:
         """Return what is seen at `time_ns`, shape (height, width, 3), RGB.
@@ -75,6 +76,8 @@ class RecordedScene:
             shown |= {"view": self._overview(bodies, position, target), "baseline": 0.0}
         elif "ECM" not in self._scene["arms"]:
             raise RecordingError(f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an endoscope; take the overview")
+        else:
+            shown |= self._lens
         scene = EndoscopeScene(EndoscopeParams.model_validate(self._scene | shown), gl.name, bodies)
         try:
             left, right = scene.draw(positions)
@@ -125,9 +128,24 @@ class RecordedScene:
         return ViewParams(position=position or tuple(centre + away), target=tuple(centre))
 
 
+def _by_body(topics: list[str]) -> dict[str, str]:
+    """Return the topics of soft bodies by name: `<organ>`, or `<engine>_<organ>` where several engines have one of that name."""
+    ends = [topic.split("/") for topic in topics]  # /engine/<participant>/out/<organ>/nodes
+    organs = [end[-2] for end in ends]
+    return {end[-2] if organs.count(end[-2]) == 1 else f"{end[2]}_{end[-2]}": topic for end, topic in zip(ends, topics, strict=True)}
+
+
 def _looks(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
-    """Return how the scenario's own endoscopes show each soft body."""
+    """Return how the scenario's own cameras show each soft body."""
     return {name: look for spec in participants.values() if spec.kind == "endoscope" for name, look in spec.params.get("skins", {}).items()}
+
+
+def _lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
+    """Return what the scenario says of the cameras of its endoscope, if it has one."""
+    for spec in participants.values():
+        if spec.kind == "endoscope" and "view" not in spec.params:
+            return {name: value for name, value in spec.params.items() if name in _LENS}
+    return {}
 
 
 def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:

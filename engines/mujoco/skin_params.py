@@ -29,11 +29,12 @@ class SkinParams(Params):
     """The look of one soft body."""
 
     colour: Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"] | Rgb | None = Field(
-        default=None, description="name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue whose name the body has, if there is one"
+        default=None,
+        description="name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue with whose name the body's ends, if there is one",
     )
 
     def rgb(self, name: str) -> Rgb:
         """Return red, green and blue, each from 0 to 1, of the body `name`."""
         if isinstance(self.colour, tuple):
             return self.colour
-        return _COLOURS[self.colour or (name if name in _COLOURS else "tissue")]
+        return _COLOURS[self.colour or next(filter(name.endswith, _COLOURS), "tissue")]

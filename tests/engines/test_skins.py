@@ -119,7 +119,7 @@ def test_a_dent_turns_the_normals_towards_it() -> None:
 
 
 def test_the_colour_is_that_of_the_tissue_whose_name_the_body_has() -> None:
-    assert SkinParams().rgb("liver") == SkinParams.model_validate({"colour": "liver"}).rgb("organ")
+    assert SkinParams().rgb("liver") == SkinParams().rgb("upper_liver") == SkinParams.model_validate({"colour": "liver"}).rgb("organ")
     assert SkinParams().rgb("organ") == SkinParams.model_validate({"colour": "tissue"}).rgb("liver")
     assert SkinParams.model_validate({"colour": [0.1, 0.2, 0.3]}).rgb("liver") == (0.1, 0.2, 0.3)
     with pytest.raises(ValueError, match="less than or equal to 1"):
