@@ -32,7 +32,8 @@ class _Meter:
     def take(self, value: Vector) -> None:
         part = value[self._part]
         self.now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
-        self._peak = self.now if self._peak is None else max(self._peak, self.now)
+        if self._peak is None or self.now > self._peak:
+            self._peak, self._drop = self.now, 0.0
         self._drop = max(self._drop, self._peak - self.now)
         if self._level is not None:
             self._above = self._above + 1 if self.now >= self._level else 0

@@ -119,7 +119,7 @@ class Measure(_Part):
     """A number for the summary, from the values of one output port: `participant.port` or `participant.port.field`."""
 
     kind: Literal["peak-norm", "peak", "mean", "final", "drop", "time-above"] = Field(
-        description="drop: the largest fall from the peak so far; time-above: the longest time (s) at `level` or above; of several numbers the norm is taken"
+        description="drop: the largest fall after the peak; time-above: the longest time (s) at `level` or above; of several numbers the norm is taken"
     )
     of: Endpoint
     level: float | None = Field(default=None, description="for time-above, in the unit of the port")
