@@ -1,4 +1,4 @@
-"""From the coarse triangles of a soft body to a surface that looks smooth: sharp edges kept, every triangle curved into four.
+"""From the coarse triangles of a soft body to a surface that looks smooth: sharp edges kept, triangles curved.
 
 The nodes stay where they are; between them the surface follows the cubic edge of a curved point-normal triangle (Vlachos, Peters, Boyd,
 Mitchell: Curved PN Triangles, I3D 2001): the middle of the edge from a to b with unit normals n and m there, and d = b - a, is
@@ -18,9 +18,12 @@ __all__ = ["SkinMesh"]
 
 Indices = NDArray[np.int64]
 
-_CREASE = radians(60.0)
-"""Faces that meet at a greater angle at rest (0: in one plane) meet at a sharp edge, as those of a box do. A curved organ of few nodes
-(10 mm apart at 20 mm radius of curvature) has 30 degrees between its faces."""
+_CREASE = radians(80.0)
+"""Faces that meet at a greater angle at rest (0: in one plane) meet at a sharp edge, as those of a box do. The curved parts of the
+organs in `engines.bullet.organs`, of 150 to 3000 nodes, stay below, all but some rims; the ends of the colon are above."""
+
+_ENOUGH = 12_000
+"""Triangles are divided once, and again while there are no more than these: MuJoCo takes its light at vertices, so large triangles show."""
 
 
 class SkinMesh:
@@ -28,28 +31,49 @@ class SkinMesh:
 
     def __init__(self, rest: Vector, triangles: Indices) -> None:
         """Take the nodes at rest, shape (n, 3), m, and the surface, node indices of shape (f, 3), counter-clockwise from outside."""
-        corners, self._node = _split(rest, triangles)  # (f, 3), (v,)
-        self._corners = corners
-        by_vertex = np.argsort(corners.ravel(), kind="stable")
-        self._around = by_vertex // 3
-        self._first = np.searchsorted(corners.ravel()[by_vertex], np.arange(len(self._node)))
-        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)  # (3 f, 2)
-        self._edges, edge_of, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-        self._curved = (count == 2)[:, None] / 8.0
-        middles = len(self._node) + edge_of.reshape(-1, 3)  # of the sides 01, 12, 20
-        a, b, c = corners.T
-        ab, bc, ca = middles.T
-        self.faces: Indices = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca], axis=1).reshape(-1, 3)
-        """Vertex indices, shape (4 f, 3), counter-clockwise from outside."""
+        faces, self._node = _split(rest, triangles)
+        self._divisions: list[_Division] = []
+        while not self._divisions or 4 * len(faces) <= _ENOUGH:
+            division = _Division(faces)
+            self._divisions.append(division)
+            faces = division.faces
+        self.faces: Indices = faces
+        """Vertex indices, shape (m, 3), counter-clockwise from outside."""
 
     def vertices(self, nodes: Vector) -> Vector:
         """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: first those at nodes, then those between them."""
         points = nodes[self._node]
+        for division in self._divisions:
+            points = division.refined(points)
+        return points
+
+
+class _Division:
+    """Every triangle becomes four."""
+
+    def __init__(self, corners: Indices) -> None:
+        """Take the triangles, vertex indices of shape (f, 3)."""
+        self._corners = corners
+        by_vertex = np.argsort(corners.ravel(), kind="stable")
+        count = int(corners.max()) + 1
+        self._around = by_vertex // 3
+        self._first = np.searchsorted(corners.ravel()[by_vertex], np.arange(count))
+        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)  # (3 f, 2)
+        edges, edge_of, sharing = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+        self._ends = edges.T.copy()
+        self._curved = (sharing == 2)[:, None] / 8.0
+        a, b, c = corners.T
+        ab, bc, ca = (count + edge_of.reshape(-1, 3)).T
+        self.faces: Indices = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca], axis=1).reshape(-1, 3)
+        """Shape (4 f, 3): the old vertices, then one for each edge."""
+
+    def refined(self, points: Vector) -> Vector:
+        """Return `points`, shape (v, 3), m, and after them the middles of the curved edges."""
         a, b, c = (points[self._corners[:, i]] for i in range(3))
         areas = np.cross(b - a, c - a)
         normals = np.add.reduceat(areas[self._around], self._first, axis=0)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-        start, end = self._edges.T
+        start, end = self._ends
         n, m, way = normals[start], normals[end], points[end] - points[start]
         bend = np.einsum("ij,ij->i", way, n)[:, None] * n - np.einsum("ij,ij->i", way, m)[:, None] * m
         return np.concatenate([points, 0.5 * (points[start] + points[end]) - self._curved * bend])

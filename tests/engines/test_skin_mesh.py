@@ -80,12 +80,12 @@ def test_a_sphere_becomes_rounder_and_keeps_its_nodes() -> None:
     nodes, triangles = icosphere(0.02)
     skin = SkinMesh(nodes, triangles)
     vertices = skin.vertices(nodes)
-    assert len(skin.faces) == 4 * len(triangles)
-    assert len(vertices) == 42 + 120
+    assert len(skin.faces) == 4**3 * len(triangles)
+    assert len(vertices) == len(skin.faces) / 2 + 2  # Euler, for a closed surface whose vertices are all smooth
     assert set(map(tuple, vertices[:42].tolist())) == set(map(tuple, nodes.tolist()))
     flat = 0.5 * (nodes[triangles] + nodes[np.roll(triangles, -1, axis=1)])
     sag = 0.02 - np.linalg.norm(flat, axis=-1).min()
-    assert np.abs(np.linalg.norm(vertices, axis=1) - 0.02).max() < 0.1 * sag
+    assert np.abs(np.linalg.norm(vertices, axis=1) - 0.02).max() < 0.15 * sag
 
 
 def test_where_a_sharp_edge_ends_the_surface_is_closed() -> None:
