@@ -19,8 +19,8 @@ __all__ = ["ROUNDING_DIGITS", "SIDES", "Shape", "Surface", "on_side", "smooth_un
 Surface = Callable[[Vector], NDArray[np.bool_]]
 """Of nodes on the surface at rest, shape (n, 3), m, in the organ's own frame: which of them belong to a named part, shape (n,)."""
 
-ROUNDING_DIGITS = 9
-"""Nodes are rounded to a nanometre: sine, root and power differ in their last bit between processors, the meshes must not."""
+ROUNDING_DIGITS = 6
+"""Nodes are rounded to a micrometre: sine, root and power differ in their last bit between processors, which smoothing makes 1e-13 m of. Meshes must not differ."""
 
 _COUNT_TOLERANCE = 0.02
 _SEARCHES = 8
