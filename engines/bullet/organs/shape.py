@@ -20,7 +20,7 @@ Surface = Callable[[Vector], NDArray[np.bool_]]
 """Of nodes on the surface at rest, shape (n, 3), m, in the organ's own frame: which of them belong to a named part, shape (n,)."""
 
 ROUNDING_DIGITS = 6
-"""Nodes are rounded to a micrometre: sine, root and power differ in their last bit between processors, which smoothing makes 1e-13 m of. Meshes must not differ."""
+"""Nodes are rounded to a micrometre: sine and root differ in their last bit between processors, of which smoothing makes 1e-13 m; meshes must not differ."""
 
 _COUNT_TOLERANCE = 0.02
 _SEARCHES = 8
