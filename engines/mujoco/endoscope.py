@@ -48,10 +48,10 @@ class Endoscope(Stepped):
         self._positions = np.zeros(position_count(params))
         self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.skins}
         self._frame = f"{name}_left_optical"
-        kinds: dict[str, type[Message]] = {"camera_info": CameraInfo}
-        if params.images != "compressed":
+        kinds: dict[str, type[Message]] = {} if params.images == "none" else {"camera_info": CameraInfo}
+        if params.images in ("raw", "both"):
             kinds["image_raw"] = Image
-        if params.images != "raw":
+        if params.images in ("compressed", "both"):
             kinds["image_raw/compressed"] = CompressedImage
         self._pictures = tuple(
             Port(name=f"{eye}/{kind}", causality="output", type=model.ros_type, variability="event", frame=self._frame)
@@ -74,6 +74,8 @@ class Endoscope(Stepped):
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Build the scene, unless soft bodies are missing from it. Where there is no OpenGL, say so once and publish no pictures."""
+        if not self._pictures:
+            return {}
         for package in ("mujoco", "PIL"):
             if find_spec(package) is None:
                 raise MissingExtraError(f"participant '{self.name}' (kind endoscope)", "mujoco", "pillow" if package == "PIL" else package)

@@ -48,7 +48,7 @@ class EndoscopeParams(SceneParams):
     skins: dict[Name, SkinParams] = Field(
         default_factory=dict[Name, SkinParams], description="soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
     )
-    images: Literal["raw", "compressed", "both"] = Field(default="raw", description="what is published of each picture")
+    images: Literal["raw", "compressed", "both", "none"] = Field(default="raw", description="what is published of each picture; none: the camera is off")
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
     quality: int = Field(default=95, ge=1, le=95, description="of a JPEG; beyond 95 files grow and pictures do not get better")
     shadows: bool = Field(default=False, description="draw shadows and reflections: without a GPU several times as slow")
