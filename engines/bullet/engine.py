@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from engines.bullet.anchor import WORLD, RigidParams, add_rigid
 from engines.bullet.client import connect, disconnect
+from engines.bullet.contact import CONTACT_PERIOD_NS, Contacts, Tissue
 from engines.bullet.grasp import Grasp, grasp_ports
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
@@ -24,11 +25,8 @@ from schemas.trocar_msgs import SoftBodyState
 
 __all__ = ["BulletEngine", "BulletParams"]
 
-_SETTLING_NS = 300_000_000
-"""Simulated before time 0, so that the organs have come to rest under their own weight."""
-
-_CONTACT_PERIOD_NS = 8_000_000
-"""How often the nodes are read to see where probes touch."""
+_SETTLING_NS = 450_000_000
+"""Simulated before time 0, so that the organs have come to rest under their own weight; gravity is whole after two thirds."""
 
 _NO_CLIENT = -1
 
@@ -104,13 +102,13 @@ class BulletEngine(Stepped):
         for name, organ in self.params.organs.items():
             self._organs.append(Organ(name, organ, client, parts))
         self._check_tissue()
-        for _ in range(_SETTLING_NS // self.params.timestep):
-            self._simulate(physicsClientId=client)
+        self._settle()
         for bond in self.bonds:
             if bond.name in setup.bonds:
                 probe = self.params.probes[bond.name]
                 self._probes.append(Probe(probe, self._coupling(probe), bond, setup.bonds[bond.name], self.params.gravity, client))
         self._read_nodes(0)
+        self._contacts = Contacts([Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity) for organ in self._organs])
         outputs = self._nodes(0)
         for probe in self._probes:
             outputs.update(probe.idle)
@@ -129,13 +127,13 @@ class BulletEngine(Stepped):
                 probe.push((i + 0.5) * dt, dt)
             self._simulate(physicsClientId=self._client)
             for probe in probes:
-                probe.read()
+                probe.read(dt)
         end = t + h
-        due, touch = end % self.params.node_period == 0, end // _CONTACT_PERIOD_NS != t // _CONTACT_PERIOD_NS
+        due, touch = end % self.params.node_period == 0, end // CONTACT_PERIOD_NS != t // CONTACT_PERIOD_NS
         if due or touch:
             self._read_nodes(end)
         if touch:
-            self._update_gains()
+            self._contacts.update(self._probes)
         outputs = self._nodes(end) if due else {}
         for probe in probes:
             outputs.update(probe.result(end, seconds))
@@ -175,7 +173,8 @@ class BulletEngine(Stepped):
         return max(organ.contact_stiffness(radius) for organ in self.params.organs.values() for radius in probe.radii.tolist())
 
     def _coupling(self, probe: ProbeParams) -> Coupling:
-        return probe.coupling(self._contact_stiffness(probe), self.params.timestep * 1e-9)
+        damping = min(organ.elastic.damping for organ in self.params.organs.values())
+        return probe.coupling(self._contact_stiffness(probe), damping, self.params.timestep * 1e-9)
 
     def _bond(self, name: str, probe: ProbeParams) -> BondSide:
         coupling = self._coupling(probe)
@@ -203,10 +202,15 @@ class BulletEngine(Stepped):
         for organ in self._organs:
             organ.sample(t)
 
-    def _update_gains(self) -> None:
-        for probe in self._probes:
-            for i, (position, radius) in enumerate(zip(probe.positions, probe.radii.tolist(), strict=True)):
-                probe.gains[i] = 1.0 if probe.held[i] else max(organ.contact_gain(position, radius) for organ in self._organs)
+    def _settle(self) -> None:
+        """Let gravity grow slowly, as organs that it seized at once would swing for long."""
+        import pybullet as bullet
+
+        steps = _SETTLING_NS // self.params.timestep
+        for i in range(steps):
+            share = min(1.0, 1.5 * (i + 1) / steps)
+            bullet.setGravity(0.0, 0.0, -self.params.gravity * share * share * (3.0 - 2.0 * share), physicsClientId=self._client)
+            self._simulate(physicsClientId=self._client)
 
     def _check_steps(self, period_ns: int) -> None:
         params, where = self.params, f"participant '{self.name}'"

@@ -11,16 +11,13 @@ import numpy as np
 
 from engines.bullet.anchor import WORLD
 from engines.bullet.client import quiet
-from engines.bullet.contact import contact_gain
+from engines.bullet.contact import COLLISION_MARGIN_M
 from engines.bullet.material import highest_frequency
 from engines.bullet.organ_params import OrganParams
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
 __all__ = ["Organ", "OrganParams"]
-
-_COLLISION_MARGIN_M = 1e-4
-"""Distance at which Bullet lets contact begin; the force at a given depth is too high by about what this adds to the depth."""
 
 _WORLD_BODY = -1
 """Bullet's number for no body: what is anchored to it does not move."""
@@ -58,7 +55,7 @@ class Organ:
             self._body = bullet.loadSoftBody(
                 str(path),
                 mass=params.elastic.density * mesh.volume,
-                collisionMargin=_COLLISION_MARGIN_M,
+                collisionMargin=COLLISION_MARGIN_M,
                 useNeoHookean=True,
                 NeoHookeanMu=mu,
                 NeoHookeanLambda=lambda_,
@@ -74,10 +71,6 @@ class Organ:
             for node in np.flatnonzero(tied).tolist():
                 bullet.createSoftBodyAnchor(self._body, node, bodies[part], -1, physicsClientId=client)
         self.sample(0)
-
-    def contact_gain(self, centre: Vector, radius: float) -> float:
-        """Return `contact.contact_gain` for a sphere at `centre` (m), shape (3,), of `radius` (m), on the nodes as last read."""
-        return contact_gain(centre, radius, self.nodes, self.touchable)
 
     def anchor(self, node: int, body: int) -> int:
         """Tie a node to a rigid body of Bullet, where both are now; return the number of the anchor."""
@@ -109,6 +102,10 @@ class Organ:
         moved = np.abs(self.nodes - self.mesh.nodes).max()
         if not moved < self._reach:
             raise SessionError(
-                f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from its place. The likeliest cause is a probe driven "
-                f"deep into it; else shorten the tissue's timestep, raise its damping, or lower the probe's stiffness"
+                f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from its place. {self._likeliest(moved)}"
             )
+
+    def _likeliest(self, moved: float) -> str:
+        if np.isfinite(moved) and not self.anchored.any():
+            return "The likeliest cause is that it fell: nothing anchors it, and no rigid part lies under it"
+        return "The likeliest cause is a probe driven deep into it; else shorten the tissue's timestep, raise its damping, or lower the probe's stiffness"

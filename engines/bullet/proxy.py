@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from engines.bullet.contact import COLLISION_MARGIN_M
 from engines.bullet.grasp import GraspParams
 from hub.bond import ForceSide
 from hub.inputs import Inputs
@@ -21,10 +22,16 @@ from schemas.vectors import Vector
 __all__ = ["Coupling", "Probe", "ProbeParams"]
 
 _STIFFNESS_RATIO = 20.0
-"""Virtual coupling to tissue: of the way of the instrument at most 1/21, 5 %, is lost to the coupling."""
+"""Virtual coupling to contact: a quick press loses 1/21, 5 %, of its way to the coupling; what lasts loses nothing, see `Coupling.reset_time`."""
 
 _STEP_SHARE = 0.5
 """Sub-step times sqrt(k / m): keeps the explicit spring and damper of a proxy well inside stability (explicit limit with critical damping: 2 (sqrt(2) - 1))."""
+
+_RESET_SHARE = 4.0
+"""Reset time times sqrt(k / m): slow beside the proxy's own oscillation."""
+
+_PASSIVE_SHARE = 0.5
+"""Of the tissue's damping, what the reset may use up: contacts may be twice as stiff as estimated, and a scheme of finite steps lags too."""
 
 _LOCKED_INERTIA = 1e3
 """Moment of inertia (kg m^2) that keeps a sphere from rolling off on friction, which the instrument does not let it do."""
@@ -32,7 +39,7 @@ _LOCKED_INERTIA = 1e3
 _PROXY_GROUP, _ALL_BUT_PROXIES = 1 << 6, ~(1 << 6)
 """Collision filter: proxies pass through each other, as neighbours on an instrument overlap. Bullet's own groups end at 1 << 5."""
 
-Radius = Annotated[Length, Field(gt=0)]
+Radius = Annotated[Length, Field(ge=0.5e-3)]
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,11 @@ class Coupling:
     """m, kg."""
     damping: float
     """b, N s/m."""
+    reset_time: float | None
+    """T, s, of a spring that is proportional and integral: with it, the proxy of an instrument at rest stands where its sphere is, whatever the force.
+
+    None: the spring is proportional, and yields by force / k.
+    """
 
     @property
     def longest_step(self) -> float:
@@ -83,11 +95,18 @@ class ProbeParams(BaseModel):
         """Radius (m) of every sphere, shape (n,)."""
         return np.full(self.spheres or 1, self.radius, dtype=np.float64)
 
-    def coupling(self, contact_stiffness: float, timestep: float) -> Coupling:
-        """Return what is stated, and the rest by rule from the contact stiffness (N/m) of the tissue and the sub-step (s)."""
+    def coupling(self, contact_stiffness: float, contact_damping: float, timestep: float) -> Coupling:
+        """Return what is stated, and the rest by rule from the tissue and the sub-step (s).
+
+        contact_stiffness: k_c of the tissue, N/m. contact_damping: its ratio d of damping to stiffness, s. A spring with reset
+        gives back more than it took, in cycles of frequency w at most the share w T k_c / k; the tissue's damping takes up w d. So
+        there is a reset where T <= 0.5 d k / k_c.
+        """
         stiffness = self.stiffness or _STIFFNESS_RATIO * contact_stiffness
         mass = self.mass or stiffness * (timestep / _STEP_SHARE) ** 2
-        return Coupling(stiffness, mass, self.damping or 2.0 * sqrt(stiffness * mass))
+        reset = _RESET_SHARE * sqrt(mass / stiffness)
+        passive = reset <= _PASSIVE_SHARE * contact_damping * stiffness / contact_stiffness
+        return Coupling(stiffness, mass, self.damping or 2.0 * sqrt(stiffness * mass), reset if passive else None)
 
 
 class Probe:
@@ -107,8 +126,12 @@ class Probe:
         """m/s, frame `world`, shape (n, 3)."""
         self.gains = np.ones(n)
         """How much larger the force in Bullet is than that of the coupling, to make up for what contacts lose (see `contact`), shape (n,)."""
+        self.corrections = np.ones(n)
+        """How much the measured gains differ from those that the geometry of the contact suggests, shape (n,)."""
         self.held = np.zeros(n, dtype=np.bool_)
         """Which spheres have tissue anchored to them; anchors lose nothing of a force, so their gain is 1. Shape (n,)."""
+        self.contacts = np.zeros((n, 3))
+        """Force (N) with which each proxy pressed on what it touched in the last sub-step, as Bullet has it, shape (n, 3)."""
         self._side = ForceSide(bond, plan)
         self._coupling = coupling
         self._weight = np.array([0.0, 0.0, coupling.mass * gravity])
@@ -116,6 +139,8 @@ class Probe:
         self._springs, self._dampers = (forces[: 3 * n].reshape(n, 3) for forces in (self._spring, self._damper))  # (n, 3), views
         self.targets = self.positions
         """Centres of the spheres on the instrument at the end of the step, as predicted, m, frame `world`, shape (n, 3)."""
+        self._reset = np.zeros((n, 3))  # force of the spring when the proxy is at its target
+        self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
         self._placed = False
         self._client = client
         self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
@@ -142,15 +167,17 @@ class Probe:
         """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, taken at its middle."""
         self._stretch(tau, 0.5 * dt)
         self._side.add(self._spring, self._damper, tau, dt)
-        forces = self.gains[:, None] * (self._springs + self._dampers) + self._weight
-        for body, force, position in zip(self.bodies, forces.tolist(), self.positions.tolist(), strict=True):
+        self._reset += self._reset_rate * dt * (self._springs - self._reset)
+        self._applied = self.gains[:, None] * (self._springs + self._dampers)
+        for body, force, position in zip(self.bodies, (self._applied + self._weight).tolist(), self.positions.tolist(), strict=True):
             self._apply(body, -1, force, position, self._frame, physicsClientId=self._client)
 
-    def read(self) -> None:
-        """Take positions and velocities from Bullet after a sub-step."""
-        client = self._client
+    def read(self, dt: float) -> None:
+        """Take positions and velocities from Bullet after a sub-step of `dt` seconds."""
+        client, before = self._client, self.velocities
         self.positions = np.array([self._read_pose(body, physicsClientId=client)[0] for body in self.bodies])
         self.velocities = np.array([self._read_velocity(body, physicsClientId=client)[0] for body in self.bodies])
+        self.contacts = self._applied - self._coupling.mass / dt * (self.velocities - before)
 
     def result(self, t: int, h: float) -> dict[str, Vector]:
         """Return force or wrench, and work, at the end `t` (ns) of a step of `h` seconds. Raises SessionError if they are not finite.
@@ -174,12 +201,12 @@ class Probe:
     @property
     def state(self) -> tuple[Vector, ...]:
         """Positions, velocities, gains and what the bond remembers."""
-        return self.positions, self.velocities, self.gains, self._side.state
+        return self.positions, self.velocities, self.gains, self.corrections, self._reset, self._side.state
 
     def _stretch(self, tau: float, ahead: float) -> None:
         """Set spring and damper `tau` seconds into the step, with the proxies where they will be `ahead` seconds from now."""
         self.targets, velocities = self._motion(tau)
-        self._springs[:] = self._coupling.stiffness * (self.targets - self.positions - ahead * self.velocities)
+        self._springs[:] = self._coupling.stiffness * (self.targets - self.positions - ahead * self.velocities) + self._reset
         self._dampers[:] = self._coupling.damping * (velocities - self.velocities)
 
     def _motion(self, tau: float) -> tuple[Vector, Vector]:
@@ -202,7 +229,7 @@ class Probe:
         import pybullet as bullet
 
         client = self._client
-        shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
+        shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=radius - COLLISION_MARGIN_M, physicsClientId=client)
         # A multi-body: with maximal coordinates the sphere is not finite after its first step (pybullet 3.2.7).
         body = bullet.createMultiBody(self._coupling.mass, shape, basePosition=self.positions[0].tolist(), useMaximalCoordinates=False, physicsClientId=client)
         bullet.setCollisionFilterGroupMask(body, -1, _PROXY_GROUP, _ALL_BUT_PROXIES, physicsClientId=client)

@@ -90,7 +90,7 @@ def test_the_work_is_force_times_motion_and_a_cycle_loses_energy():
         pressed = rig.outputs["probe/work"][0]
         rig.hold(0.1)
         rig.move((0, 0, RADIUS + 1e-3), 0.2)
-        assert 0 < rig.outputs["probe/work"][0] < 0.5 * pressed
+        assert -0.01 * pressed < rig.outputs["probe/work"][0] < 0.5 * pressed
         booked, spent = rig.outputs["probe/work"][0], 1e-3 * sum(rig.power)
         assert booked == pytest.approx(spent, abs=0.02 * pressed)
 
