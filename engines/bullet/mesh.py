@@ -20,7 +20,7 @@ _FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 """Faces of a positively oriented tetrahedron, counter-clockwise seen from outside."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TetMesh:
     """A body of linear tetrahedra, each with positive volume."""
 

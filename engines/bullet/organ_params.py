@@ -115,7 +115,7 @@ class OrganParams(BaseModel):
         turned = np.einsum("ij,nj->ni", rotation.matrix(np.array(self.orientation)), self.local.nodes)
         return TetMesh(turned + np.array(self.position), self.local.tetrahedra)
 
-    @cached_property
+    @property
     def anchored_nodes(self) -> dict[str, NDArray[np.bool_]]:
         """Which nodes are tied to `world` and to rigid parts, shapes (n,). Raises ValueError where a surface is unknown or has no node."""
         anchors = [AnchorParams(surface=name) for name in self.body.anchors] if self.anchors is None else self.anchors

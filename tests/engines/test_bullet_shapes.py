@@ -161,6 +161,13 @@ def test_an_organ_anchored_to_a_part_that_there_is_not_is_refused():
         BulletParams.model_validate({"organs": {"o": tied}, "rigid": {"bed": {"box": [1, 1, 0.1]}}})
 
 
+def test_parameters_are_the_same_after_a_round_trip_through_json():
+    anchors = [{"surface": "mesentery", "to": "bed"}, {"box": {"low": [-1, -1, -1], "high": ["-50 mm", 1, 1]}}]
+    given = {"organs": {"tube": {"shape": "colon", "anchors": anchors}, "block": BLOCK}, "rigid": {"bed": {"box": [1, 1, 0.1]}}}
+    params = BulletParams.model_validate(given)
+    assert BulletParams.model_validate_json(params.model_dump_json()) == params
+
+
 GOOD = block(np.array([0.04, 0.03, 0.02]), 45)
 
 
