@@ -7,17 +7,17 @@ from where the hand and the command are at that moment, so the command never jum
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, Literal, Self, cast
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
 from robots import rotation
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
-from robots.dvrk.parameters import ArmName, PsmPositions, UnitQuaternion
+from robots.dvrk.parameters import ArmName, PsmPositions, UnitQuaternion, check_start
 from robots.inverse_kinematics import approach
 from schemas.errors import StateError
 from schemas.message import Message
@@ -29,6 +29,7 @@ from schemas.vectors import Vector
 __all__ = ["Teleoperation", "TeleoperationParams"]
 
 _JOINTS = len(psm.JOINT_NAMES)
+_TOOL = "palpation-probe"
 _POSE, _JOINT_STATE = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/JointState"
 
 
@@ -44,6 +45,11 @@ class TeleoperationParams(Params):
     start: PsmPositions = Field(default=psm.HOME, description=f"the command until measured_js is there: {', '.join(psm.JOINT_NAMES)}")
     max_age: Duration = Field(default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer")
 
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(psm.chain(instrument(_TOOL)), self.start)
+        return self
+
 
 class Teleoperation(Stepped):
     """One hand, one arm. The tip is goal = tip0 + scale R (hand - hand0); R turns from the master's frame to the arm's base.
@@ -58,7 +64,7 @@ class Teleoperation(Stepped):
     def __init__(self, name: str, params: TeleoperationParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._chain = psm.chain(instrument("palpation-probe"))
+        self._chain = psm.chain(instrument(_TOOL))
         self._registration = np.array(params.registration)
         self._to_base = rotation.matrix(self._registration)
         self._state = np.zeros(24)

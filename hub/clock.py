@@ -8,16 +8,25 @@ from hub.plan import Plan
 
 __all__ = ["Clock"]
 
+_WINDOW_NS = 10_000_000
+"""Simulated time that a grant covers where nothing enters and the scenario does not say: what is asked of the hub then takes effect at
+100 Hz of simulated time, and turning round costs a step of 1 ms a tenth."""
+
 
 class Clock:
     """Hands out horizons in steps. Pace `fast` never waits; `realtime` follows the wall clock and counts what comes late."""
 
-    def __init__(self, plan: Plan, *, window: int, realtime: bool, steps: int | None) -> None:
-        """Take the most steps of a grant, the pace, and the number of steps of the whole run (None: until stopped)."""
+    def __init__(self, plan: Plan, *, window: int | None, realtime: bool, steps: int | None) -> None:
+        """Take the most steps of a grant (None: as many as are of use), the pace, and the number of steps of the whole run (None: until stopped).
+
+        A window has to be asked for in real time, where every step waits for the wall clock, and with several hosts, of whose steps inside a
+        grant nothing is heard if one of them dies.
+        """
         self.step_ns = plan.step_ns
         self.step = 0
         self.late_steps = 0
-        self._window = window
+        alone = not realtime and len(plan.hosts()) == 1
+        self._window = window or (max(1, _WINDOW_NS // plan.step_ns) if alone else 1)
         self._realtime = realtime
         self.steps = steps
         self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets})

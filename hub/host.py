@@ -60,7 +60,6 @@ class _Sink:
     """An output port and everywhere its value goes."""
 
     port: Port
-    stride: int
     vector: VectorCodec | None
     shape: tuple[int, ...]
     cell: Cell | None
@@ -80,7 +79,8 @@ class _Slot:
     events: dict[str, tuple[Any, ...]]
     stale: set[str]
     readers: list[_Reader] = field(default_factory=list[_Reader])
-    sinks: list[_Sink] = field(default_factory=list[_Sink])
+    sinks: dict[int, list[_Sink]] = field(default_factory=dict[int, list[_Sink]])
+    """By stride, so that a step looks only at those that are due."""
     work_ports: tuple[str, ...] = ()
     hashes: list[int] = field(default_factory=list[int])
     compute_ns: list[int] = field(default_factory=list[int])
@@ -100,6 +100,8 @@ class Host:
         self._slots = [self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name]
         self._by_name = {slot.member.name: slot for slot in self._slots}
         self._remote: dict[tuple[str, str], RemoteCell] = {}
+        self.step = INITIAL
+        """The step in which it is or was last."""
         self._stepping: str | None = None
         self._inlets: dict[tuple[str, str], list[tuple[_Slot, str, PortCodec]]] = {}
         self._initial: list[tuple[PortPublisher, Any]] = []
@@ -141,8 +143,9 @@ class Host:
             publisher = self._wire.publisher(member, port, readers) if self._wire else None
             cell = Cell(member.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
-            sink = _Sink(port, stride, vector, () if vector is None else vector.neutral.shape, cell, publisher)
-            slot.sinks.insert(0 if readers else len(slot.sinks), sink)  # first what another host waits for
+            sink = _Sink(port, vector, () if vector is None else vector.neutral.shape, cell, publisher)
+            sinks = slot.sinks.setdefault(stride, [])
+            sinks.insert(0 if readers else len(sinks), sink)  # first what another host waits for
 
     def _lay_readers(self, slot: _Slot) -> None:
         for link in self.plan.links:
@@ -155,7 +158,8 @@ class Host:
 
     def _cell(self, source: str, port: str) -> Cell:
         if source in self._by_name:
-            return next(sink.cell for sink in self._by_name[source].sinks if sink.port.name == port and sink.cell is not None)
+            sinks = self._by_name[source].sinks[self.plan.stride(source, port)]
+            return next(sink.cell for sink in sinks if sink.port.name == port and sink.cell is not None)
         if (source, port) not in self._remote:
             if self._wire is None:
                 raise ValueError(f"'{source}' is in another process, and this host has no wire")
@@ -249,6 +253,7 @@ class Host:
         for slot in self._slots:
             slot.hashes, slot.compute_ns, slot.work_j = [], [], []
         for step in range(grant.step, end):
+            self.step = step
             for slot in self._slots:
                 period = slot.member.period
                 if not step % period:
@@ -300,23 +305,24 @@ class Host:
         slot.values[reader.port] = value
 
     def _hand_on(self, slot: _Slot, step: int, time_ns: int, outputs: Outputs) -> None:
-        for sink in slot.sinks:
-            if step > INITIAL and (step + slot.member.period) % sink.stride:
+        for stride, sinks in slot.sinks.items():
+            if step > INITIAL and (step + slot.member.period) % stride:
                 continue
-            name = sink.port.name
-            if name not in outputs:
-                raise ParticipantError(slot.member.name, step, f"output '{name}' is missing from what step() returned")
-            value: Any = outputs[name]
-            if sink.vector is not None and (value.shape != sink.shape or not isfinite(value @ value) or step == INITIAL):
-                sink.vector.checked(value)  # raises what is wrong, unless the numbers are only large
-            if sink.cell is not None:
-                sink.cell.put(step, value)
-            if sink.publisher is not None:
-                sink.publisher.put(step, time_ns, value)
-                if step == INITIAL:
-                    self._initial.append((sink.publisher, value if sink.vector is None else value.copy()))
-            if self._tap is not None:
-                self._tap(slot.member, sink.port, step, time_ns, value)
+            for sink in sinks:
+                name = sink.port.name
+                if name not in outputs:
+                    raise ParticipantError(slot.member.name, step, f"output '{name}' is missing from what step() returned")
+                value: Any = outputs[name]
+                if sink.vector is not None and (value.shape != sink.shape or not isfinite(value.dot(value)) or step == INITIAL):
+                    sink.vector.checked(value)  # raises what is wrong, unless the numbers are only large
+                if sink.cell is not None:
+                    sink.cell.put(step, value)
+                if sink.publisher is not None:
+                    sink.publisher.put(step, time_ns, value)
+                    if step == INITIAL:
+                        self._initial.append((sink.publisher, value if sink.vector is None else value.copy()))
+                if self._tap is not None:
+                    self._tap(slot.member, sink.port, step, time_ns, value)
 
     def _enter(self, slot: _Slot, port: str, codec: PortCodec, payload: bytes, *, stale: bool) -> None:
         if stale:

@@ -376,7 +376,8 @@ class Session:
 
     def _fail(self, participant: str, cause: str) -> None:
         """End the run because of `participant`; may be called from any thread."""
-        self._failures.report(participant, self._clock.step, cause)
+        here = self.plan.members[participant].host == "hub"  # of another host only the grant is known
+        self._failures.report(participant, max(self._clock.step, self._host.step) if here else self._clock.step, cause)
 
     def _wake(self, session: zenoh.Session) -> None:
         """Make the step loop look at the failures: it may wait for acks, or be inside a participant of this process."""

@@ -18,7 +18,8 @@ class TipPose(TypedDict):
 
     arm: str
     frame: str
-    q: dict[str, float]
+    joints: list[str]
+    q: list[float]
     """By joint, rad and m."""
     p: list[float]
     """Position, m."""
@@ -44,11 +45,11 @@ def fk(arm: str, tool: str | None, q: Sequence[float]) -> TipPose:
         raise MotionError(f"{arm}: {len(q)} joint positions, expected {len(names)}: {', '.join(names)}")
     kinematics.check(np.array(positions, np.float64))
     tip = kinematics.forward(np.array(positions, np.float64)) + 0.0  # no negative zeros
-    return TipPose(arm=arm, frame=base_frame(arm), q=dict(zip(names, positions, strict=True)), p=tip[:3, 3].tolist(), R=tip[:3, :3].tolist())
+    return TipPose(arm=arm, frame=base_frame(arm), joints=names, q=positions, p=tip[:3, 3].tolist(), R=tip[:3, :3].tolist())
 
 
 def table(pose: TipPose) -> str:
     """Return the pose as lines for a person: joints, position and rotation matrix."""
-    joints = ", ".join(f"{name} {value:g}" for name, value in pose["q"].items())
+    joints = ", ".join(f"{name} {value:g}" for name, value in zip(pose["joints"], pose["q"], strict=True))
     rows = (f"R row {i}  " + "  ".join(f"{cell: .9f}" for cell in row) for i, row in enumerate(pose["R"]))
     return "\n".join([f"{pose['arm']} at {joints} (rad, m)", f"tip in frame {pose['frame']}", "p (m)    " + "  ".join(f"{x: .9f}" for x in pose["p"]), *rows])

@@ -104,10 +104,15 @@ class SerialChain:
         return cls([replace(joint, alpha=alpha, a=a) for joint, (alpha, a) in zip(joints, before, strict=True)], last @ tip)
 
     def frames(self, q: Vector) -> Vector:
-        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4), at `q`, shape (..., n)."""
+        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4), at `q`, shape (..., n).
+
+        Raises MotionError for another number of joints.
+        """
+        n = len(self.joints)
+        if q.shape[-1:] != (n,):
+            self.check_form(q)
         if q.ndim > 1:
             return self._frames_of_many(q)
-        n = len(self.joints)
         factors = self._factors
         np.cos(q, out=factors[:, 0, 1])
         np.sin(q, out=factors[:, 0, 2])
@@ -140,18 +145,29 @@ class SerialChain:
             if not joint.lower - slack <= value <= joint.upper + slack
         ]
 
+    def check_form(self, q: Vector) -> None:
+        """Raise MotionError if `q`, shape (..., n), is not n finite numbers for every configuration."""
+        names = ", ".join(joint.name for joint in self.joints)
+        if q.shape[-1:] != (len(self.joints),):
+            raise MotionError(f"positions of shape {q.shape}, expected {len(self.joints)}: {names}")
+        if not (finite := np.isfinite(q)).all():
+            wrong = q[~finite.all(axis=-1)][0] if q.ndim > 1 else q
+            raise MotionError(f"not all positions are finite: {wrong.tolist()} of {names}")
+
     def check(self, q: Vector) -> None:
         """Raise MotionError if `q` is not n finite numbers, each inside the range of its joint."""
-        names = ", ".join(joint.name for joint in self.joints)
-        if q.shape != (len(self.joints),):
-            raise MotionError(f"positions of shape {q.shape}, expected {len(self.joints)}: {names}")
-        if not np.isfinite(q).all():
-            raise MotionError(f"not all positions are finite: {q.tolist()} of {names}")
+        self.check_form(q)
+        if q.ndim > 1:
+            raise MotionError(f"positions of shape {q.shape}, expected those of one configuration, ({len(self.joints)},)")
         if wrong := self.out_of_range(q):
             raise MotionError("; ".join(wrong))
 
     def forward(self, q: Vector) -> Vector:
-        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n)."""
+        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n), inside the joint ranges or not.
+
+        Raises MotionError for another number of joints, or a position that is not finite.
+        """
+        self.check_form(q)
         return self.frames(q)[..., -1, :, :]
 
     def jacobian(self, frames: Vector, *, frame: Literal["base", "tip"] = "base") -> Vector:
@@ -159,8 +175,9 @@ class SerialChain:
 
         Args:
             frames: what `frames(q)` returned.
-            frame: in which the twist is expressed; its point is the tip's origin either way (CRTK's spatial and body Jacobian
-                differ by this rotation).
+            frame: in which the twist is expressed; its point is the tip's origin either way. In the tip's frame it is the dVRK's
+                `body/jacobian`; its `spatial/jacobian` is the twist of the point at the base frame's origin instead
+                (jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp, JacobianSpatial).
         """
         axes = frames[..., :-1, :3, 2]  # (..., n, 3)
         arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]  # (..., n, 3)

@@ -145,7 +145,9 @@ class Scenario(_Part):
     step: Duration = Field(gt=0, description="communication step H")
     duration: Duration | None = Field(default=None, gt=0, description="simulated time; without it the session runs until it is stopped")
     pace: Literal["fast", "realtime"] = "fast"
-    window: int = Field(default=1, ge=1, le=1000, description="most steps that one grant may cover")
+    window: int | None = Field(
+        default=None, ge=1, le=1000, description="most steps that one grant may cover; without it 10 ms in pace fast with one host, else one step"
+    )
     algorithm: Literal["gauss-seidel", "jacobi"] = Field(default="gauss-seidel", description="for connections that belong to no bond")
     order: list[str] | None = Field(default=None, description="the order in which participants step; needed where connections form a cycle")
     answer_limit: Duration = Field(default=10**10, gt=0, description="wall time after which a silent participant ends the session")

@@ -24,8 +24,10 @@ from schemas.vectors import Vector
 
 __all__ = ["Arm"]
 
-_ANY_TIME = "trajectory_j/set_ratio"
-"""A command that is heeded whatever the operating state."""
+_ANY_TIME = ("trajectory_j/set_ratio", "use_gravity_compensation")
+"""Commands that are heeded whatever the operating state."""
+_BARE = 2.0
+"""What `control_mode` adds to position and effort without gravity compensation."""
 
 
 class Arm:
@@ -50,7 +52,7 @@ class Arm:
             commands = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
             self._ports += [(command, f"{name}/{command}", heed) for command, heed in commands]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
-        self.state = (self._started, self._commands.ratio, self._lifecycle.flags, self._messages.state, *self._drives.state)
+        self.state = (self._started, *self._commands.state, self._lifecycle.flags, self._messages.state, *self._drives.state)
         self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)]
         self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
         self.events = self._messages.outputs
@@ -91,7 +93,7 @@ class Arm:
         if heeded or self._condition() != before:
             state, homed, busy = self._condition()
             self._messages.operating_state(state, homed=homed, busy=busy)
-        self._modes[:] = self._drives.modes
+        self._tell_modes()
 
     def publish(self) -> None:
         """Bring the states that are not published at every step up to date."""
@@ -104,7 +106,12 @@ class Arm:
         """Bring what is not in `state` up to it."""
         for axes in self._drives.groups:
             axes.setpoint.restored()
+        self._tell_modes()
+
+    def _tell_modes(self) -> None:
         self._modes[:] = self._drives.modes
+        if self._modes[0] and not self._commands.gravity_compensation[0]:
+            self._modes[0] += _BARE
 
     def _condition(self) -> tuple[Any, bool, bool]:
         return self._lifecycle.state, self._lifecycle.is_homed, self._lifecycle.is_busy
@@ -121,7 +128,7 @@ class Arm:
         return awaited
 
     def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> bool:
-        if command != _ANY_TIME and (reason := self._lifecycle.not_ready()):
+        if command not in _ANY_TIME and (reason := self._lifecycle.not_ready()):
             self._messages.refuse(command, reason, ready=False)
             return False
         try:

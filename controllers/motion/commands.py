@@ -12,11 +12,12 @@ import numpy as np
 
 from controllers.motion import goals
 from controllers.motion.drives import Drives, WrenchFrame
-from controllers.motion.frames import Frames, inverse
+from controllers.motion.frames import Frames
+from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
-from schemas.ros import EmptyMessage, Float64Message, JointState, PoseStamped, WrenchStamped
+from schemas.ros import BoolMessage, EmptyMessage, Float64Message, JointState, PoseStamped, WrenchStamped
 from schemas.vectors import Vector
 
 __all__ = ["Commands"]
@@ -32,7 +33,11 @@ class Commands:
         self._joints, self._chain = drives.joints, drives.joints.chain
         self.ratio = np.ones(1)
         """Share of the limits that moves use."""
+        self.gravity_compensation = np.ones(1)
+        """1: the drives bear the weight that the controller knows, 0: they do not."""
+        self.state = (self.ratio, self.gravity_compensation)
         self.handlers: Mapping[str, Callable[[Any], None]] = {
+            "use_gravity_compensation": self._use_gravity_compensation,
             "trajectory_j/set_ratio": self._set_ratio,
             "hold": self._hold,
             "free": self._free,
@@ -49,6 +54,9 @@ class Commands:
             "gripper/servo_jf": self._gripper_servo_jf,
             "gripper/move_jp": self._gripper_move_jp,
         }
+
+    def _use_gravity_compensation(self, message: BoolMessage) -> None:
+        self.gravity_compensation[0] = message.data
 
     def _set_ratio(self, message: Float64Message) -> None:
         if not 0.0 < message.data <= 1.0:
@@ -102,7 +110,7 @@ class Commands:
         frame = goals.check_frame(message.header.frame_id, self._frames.names[self._arm], local)
         tip = goals.tip_frame(message)
         if frame != local:
-            tip = inverse(self._frames.of(self._arm, self._camera())) @ tip
+            tip = inverse_pose(self._frames.of(self._arm, self._camera())) @ tip
         return inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
 
     def _gripper_servo_jp(self, message: JointState) -> None:

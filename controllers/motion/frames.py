@@ -13,21 +13,14 @@ import numpy as np
 from controllers.motion.params import MotionParams
 from robots import rotation
 from robots.dvrk import setup_joints
+from robots.dvrk.cart import inverse_pose
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
-__all__ = ["CAMERA_FRAME", "CART_FRAME", "Frames", "inverse", "pose"]
+__all__ = ["CAMERA_FRAME", "CART_FRAME", "Frames", "pose"]
 
 CAMERA_FRAME, CART_FRAME = "ECM", "Cart"
 """As the da Vinci's own interface and the dVRK call them in `header.frame_id`."""
-
-
-def inverse(frame: Vector) -> Vector:
-    """Return the inverse, shape (4, 4), of a rigid transformation."""
-    back = np.eye(4)
-    back[:3, :3] = frame[:3, :3].T
-    back[:3, 3] = -frame[:3, :3].T @ frame[:3, 3]
-    return back
 
 
 def pose(frame: Vector) -> Vector:
@@ -57,7 +50,7 @@ class Frames:
             return np.eye(4)
         if arm == "ECM" or camera is None:
             return self._bases[arm]
-        return inverse(self._bases["ECM"] @ camera) @ self._bases[arm]
+        return inverse_pose(self._bases["ECM"] @ camera) @ self._bases[arm]
 
 
 def _base(arm: CartArm, params: MotionParams) -> Vector:

@@ -5,26 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal, NamedTuple, Self
 
-import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import instrument
-from robots.dvrk.parameters import MountedPositions, UnitQuaternion, home
+from robots.dvrk.parameters import EcmPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import Joint, SerialChain
-from schemas.errors import MotionError
 from schemas.quantity import Angle, Duration, Length
 
 __all__ = ["ArmParams", "Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJoints"]
-
-
-def _known(name: str) -> str:
-    try:
-        return instrument(name).name
-    except MotionError as error:
-        raise ValueError(str(error)) from error
 
 
 class Gripper(NamedTuple):
@@ -48,17 +39,14 @@ class ArmParams(Params):
 class PsmParams(ArmParams):
     """A patient-side manipulator: what it holds, and where it is until it is measured."""
 
-    instrument: Annotated[str, AfterValidator(_known)] = Field(default="palpation-probe", description="name or number, such as 400006")
+    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
     start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
     hand: tuple[Angle, Angle, Angle] = Field(default=(0.0, 0.0, 0.0), description="closings of the fingers of a hand at time 0; default: folded")
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        try:
-            self.chain.check(np.array(self.start, np.float64))
-        except MotionError as error:
-            raise ValueError(str(error)) from error
+        check_start(self.chain, self.start, instrument(self.instrument), self.jaw, self.hand)
         return self
 
     @property
@@ -84,12 +72,20 @@ class EcmParams(ArmParams):
     """The endoscope camera manipulator: which endoscope it holds, and where it is until it is measured."""
 
     endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    start: tuple[Angle, Angle, Length, Angle] = Field(default=(0.0, 0.0, 0.0, 0.0), description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    )
+    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(self.chain, self.start)
+        return self
 
     @property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope)
+        return ecm.chain(self.endoscope, self.tip_frame)
 
     @property
     def gripper(self) -> Gripper | None:
@@ -123,16 +119,13 @@ class Arms(Params):
         return {name: arm for name, arm in named.items() if arm is not None}
 
 
-SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
-
-
 class SetupJoints(Params):
     """Where the braked setup joints are set: the lift (m), then five angles; None: the simulated positions."""
 
-    PSM1: SetupPositions | None = None
-    PSM2: SetupPositions | None = None
-    PSM3: SetupPositions | None = None
-    ECM: SetupPositions | None = None
+    PSM1: Annotated[SetupPositions, settable("PSM1")] | None = None
+    PSM2: Annotated[SetupPositions, settable("PSM2")] | None = None
+    PSM3: Annotated[SetupPositions, settable("PSM3")] | None = None
+    ECM: Annotated[SetupPositions, settable("ECM")] | None = None
 
 
 class MotionParams(Params):
@@ -140,7 +133,7 @@ class MotionParams(Params):
 
     arms: Arms
     mounting: Literal["free", "cart"] = Field(
-        default="cart", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
+        default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
     )
     setup_joints: SetupJoints = SetupJoints()
     reference: Literal["camera", "base"] = Field(

@@ -22,6 +22,7 @@ _EMPTY, _STRING, _BOOL = "std_msgs/msg/Empty", "std_msgs/msg/String", "std_msgs/
 
 COMMANDS = {
     "state_command": ("crtk_msgs/msg/StringStamped", "enable, disable, home, unhome, pause or resume"),
+    "use_gravity_compensation": (_BOOL, "whether the drives bear the weight that the controller knows, the endoscope's; on at time 0"),
     "trajectory_j/set_ratio": ("std_msgs/msg/Float64", "share of the limits that moves from now on use, over 0 to 1"),
     "hold": (_EMPTY, "brake, and stay"),
     "free": (_EMPTY, "let go: no effort but gravity compensation"),
@@ -95,7 +96,7 @@ def _states(arm: str, names: tuple[str, ...], reference: str, period_ns: int) ->
 
 def _robot(arm: str, names: tuple[str, ...]) -> Iterator[Port]:
     yield from _servo(arm, names)
-    meaning = "of arm and gripper: 0 off, 1 position, 2 effort, both with gravity compensation"
+    meaning = "of arm and gripper: 0 off, 1 position, 2 effort; 3 and 4 the last two without gravity compensation"
     yield Port(name=f"drive/{arm}/control_mode", causality="output", size=2, description=meaning)
 
 

@@ -15,6 +15,7 @@ import typer
 from pydantic import ValidationError
 from typer.core import TyperCommand
 
+from engines.mujoco.opengl import import_mujoco
 from engines.mujoco.params import SceneArm, SceneParams
 from robots import command_line as kinematics
 from robots.dvrk.arms import ARMS, DEFAULT_INSTRUMENT
@@ -90,6 +91,8 @@ def dynamics(arm: CartArm, *, instrument: Tool = None, q: Positions, dq: Velocit
         kinematics.fk(arm, tool, positions)  # refuses what is out of range
         if len(velocities) != len(positions):
             raise MotionError(f"{arm}: {len(velocities)} joint velocities, expected {len(positions)}")
+        if not np.isfinite(velocities).all():
+            raise MotionError(f"{arm}: not all joint velocities are finite: {velocities}")
         from engines.mujoco.model.dynamics import dynamics as of
 
         found = of(name, tool, positions, velocities)
@@ -132,14 +135,19 @@ def export(
     """Write the robot's model as MJCF or URDF with its meshes."""
     _need_mujoco("export")
     from engines.mujoco.export import FORMATS, write
-    from engines.mujoco.model import spec
 
     known = FORMATS.get(path.suffix)
     form = form or known or "mjcf"
     if known is None:
         path = path / {"mjcf": "dvrk.xml", "urdf": "dvrk.urdf"}[form]
-    scene = _scene([_cart_arm(arm) for arm in arms.replace(",", " ").split()], instrument or [], mounting)
-    files = write(spec(scene), path, form)
+    named: list[SceneArm] = [_cart_arm(arm) for arm in arms.replace(",", " ").split()]
+    if not named:
+        raise typer.BadParameter(f"name at least one of {', '.join(_CART)}", param_hint="--arms")
+    scene = _scene(named, instrument or [], mounting)
+    try:
+        files = write(scene, path, form)
+    except OSError as error:
+        raise typer.BadParameter(f"cannot write there: {error}", param_hint="PATH") from error
     typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")
 
 
@@ -148,7 +156,8 @@ def _scene(arms: list[SceneArm], instruments: list[str], mounting: str) -> Scene
     for text in instruments:
         arm, _, tool = text.partition("=")
         if arm not in tools or not tool:
-            raise typer.BadParameter(f"'{text}' is no ARM=N with an arm of this model: {', '.join(tools)}", param_hint="--instrument")
+            problem = f"'{text}' is no ARM=N with an arm of this model: {', '.join(tools)}; write for instance {arms[0]}=400006"
+            raise typer.BadParameter(problem, param_hint="--instrument")
         tools[_cart_arm(arm)] = {"endoscope" if arm == "ECM" else "instrument": tool}
     if mounting == "free" and len(tools) > 1:
         raise typer.BadParameter(f"{len(tools)} arms would stand in one place; name one with --arms, or mount them on the cart", param_hint="--mounting")
@@ -158,7 +167,7 @@ def _scene(arms: list[SceneArm], instruments: list[str], mounting: str) -> Scene
 
 def _cart_arm(arm: str) -> SceneArm:
     if arm not in _CART:
-        raise typer.BadParameter(f"no arm '{arm}' in the model.{did_you_mean(arm, _CART)}", param_hint="ARM")
+        raise typer.BadParameter(f"no arm '{arm}' in the model.{did_you_mean(arm, _CART)}")
     return arm
 
 
@@ -170,9 +179,10 @@ def _refusing() -> Generator[None]:
     except MotionError as error:
         raise typer.BadParameter(str(error)) from error
     except ValidationError as error:
-        raise typer.BadParameter("; ".join(str(problem["msg"]) for problem in error.errors())) from error
+        raise typer.BadParameter("; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.errors())) from error
 
 
 def _need_mujoco(command: str) -> None:
     if find_spec("mujoco") is None:
         raise MissingExtraError(f"'trocar model {command}'", "mujoco", "mujoco")
+    import_mujoco()

@@ -79,6 +79,7 @@ class Endoscope(Stepped):
         for package in ("mujoco", "PIL"):
             if find_spec(package) is None:
                 raise MissingExtraError(f"participant '{self.name}' (kind endoscope)", "mujoco", "pillow" if package == "PIL" else package)
+        opengl.import_mujoco()
         found = opengl.find()
         self._gl = found.name
         if found.name and not self._bodies:

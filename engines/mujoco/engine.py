@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
+from engines.mujoco import opengl
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.ports import bond_sides, scene_ports
 from hub.inputs import Inputs
@@ -71,6 +72,7 @@ class MujocoEngine(Stepped):
             raise ScenarioError(problem, path=("participants", self.name, "timestep"))
         if find_spec("mujoco") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind mujoco)", "mujoco", "mujoco")
+        opengl.import_mujoco()
         import mujoco
 
         from engines.mujoco import holding, model
@@ -96,7 +98,8 @@ class MujocoEngine(Stepped):
         self._keepers = [self._servos, self._brakes, self._holding, *(touching.motion for touching in self._touching)]
         trouble = mujoco.mjtWarning
         self._trouble = self._data.warning.number.data[trouble.mjWARN_BADQPOS : trouble.mjWARN_BADCTRL + 1]
-        self._size = mujoco.mj_stateSize(self._model, mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._signature = self._what_is_state()
+        self._size = mujoco.mj_stateSize(self._model, self._signature)
         self._state = np.empty(self._size + sum(keeper.state.size for keeper in self._keepers))
         return self._outputs
 
@@ -116,11 +119,17 @@ class MujocoEngine(Stepped):
                 self._outputs.update(touching.outputs)
         self._renewed = [touching for touching in self._touching if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None]
 
+    def _what_is_state(self) -> int:
+        """Return which parts of MuJoCo's data are state: without a bond nothing ever applies a force, and half of its numbers stay 0."""
+        state = self._mujoco.mjtState
+        applied = int(state.mjSTATE_QFRC_APPLIED | state.mjSTATE_XFRC_APPLIED)
+        return int(state.mjSTATE_INTEGRATION) & ~(0 if self._touching else applied)
+
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
         model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
         self._servos.begin(inputs)
-        self._brakes.set(on=self._servos.is_off("ECM"))
+        self._brakes.set(on="ECM" in self._servos.off)
         for touching in self._touching:
             touching.begin(inputs)
         for tau in range(0, h, self.params.timestep):
@@ -151,7 +160,7 @@ class MujocoEngine(Stepped):
         )
 
     def _read_state(self) -> None:
-        self._mujoco.mj_getState(self._model, self._data, self._state[: self._size], self._mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._mujoco.mj_getState(self._model, self._data, self._state[: self._size], self._signature)
         at = self._size
         for keeper in self._keepers:
             state = keeper.state
@@ -164,7 +173,7 @@ class MujocoEngine(Stepped):
         return state_hash(self._state)
 
     def save(self) -> bytes:
-        """Return MuJoCo's integration state (`mjSTATE_INTEGRATION`) and what the other parts remember."""
+        """Return MuJoCo's integration state (`mjSTATE_INTEGRATION`, applied forces only where there are probes) and what the other parts remember."""
         self._read_state()
         return self._state.tobytes()
 
@@ -178,7 +187,7 @@ class MujocoEngine(Stepped):
             size = keeper.state.size
             keeper.state = values[at : at + size]
             at += size
-        self._mujoco.mj_setState(self._model, self._data, values[: self._size], self._mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._mujoco.mj_setState(self._model, self._data, values[: self._size], self._signature)
         self._mujoco.mj_step1(self._model, self._data)
         self._readings.update()
         self._readings.refresh()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from math import pi, radians
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk.instruments import STEEL_DENSITY
@@ -18,12 +18,28 @@ POLYAMIDE_DENSITY = 1130.0
 """Polyamide 6, kg/m^3 (1.12 to 1.14 g/cm^3 by the makers' data sheets)."""
 
 
+_Side = Annotated[Length, Field(gt=0.0)]
+
+
 class _Object(Params):
     position: tuple[Length, Length, Length] = Field(description="of the object's frame in the world at time 0")
     orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the object's frame in the world at time 0: quaternion x, y, z, w")
 
 
-class RingParams(_Object):
+class _Wire(_Object):
+    """A round wire along an arc of a circle."""
+
+    radius: Length
+    wire_radius: Length
+
+    @model_validator(mode="after")
+    def _is_thinner_than_its_circle(self) -> Self:
+        if self.wire_radius >= self.radius:
+            raise ValueError(f"wire_radius ({self.wire_radius:g} m) must be less than radius ({self.radius:g} m)")
+        return self
+
+
+class RingParams(_Wire):
     """A torus; its frame is in the middle, z along the axis."""
 
     kind: Literal["ring"]
@@ -37,7 +53,7 @@ class RingParams(_Object):
         return 2.0 * pi
 
 
-class NeedleParams(_Object):
+class NeedleParams(_Wire):
     """A round wire bent to an arc; its frame is in the arc's centre, z normal to its plane, x to the middle of the wire.
 
     The defaults are the needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm, wire 0.8 mm.
@@ -54,7 +70,7 @@ class BlockParams(_Object):
     """A box; its frame is in the middle. The default size is that of the small objects in unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt."""
 
     kind: Literal["block"]
-    size: tuple[Length, Length, Length] = Field(default=(9e-3, 14e-3, 20.5e-3), description="along x, y and z")
+    size: tuple[_Side, _Side, _Side] = Field(default=(9e-3, 14e-3, 20.5e-3), description="along x, y and z")
     density: Density = Field(default=POLYAMIDE_DENSITY, gt=0.0)
 
 
@@ -66,4 +82,4 @@ class TableParams(Params):
     """A fixed slab with a level top. The default size is that of all scenes of unina-icaros/dvrk-vrep."""
 
     position: tuple[Length, Length, Length] = Field(description="of the middle of its top in the world")
-    size: tuple[Length, Length, Length] = Field(default=(0.4972, 0.6952, 0.02), description="along x, y and z")
+    size: tuple[_Side, _Side, _Side] = Field(default=(0.4972, 0.6952, 0.02), description="along x, y and z")

@@ -34,10 +34,11 @@ _ROUNDNESS = 0.1
 
 
 def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
-    """Add the table to the world."""
+    """Add the table to the world, as a body: MuJoCo pairs geoms of the world itself with every link, wherever that is."""
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
-    spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[x, y, z - half[2]], size=half, conaffinity=_TABLE, rgba=_RGBA["table"])
+    body = spec.worldbody.add_body(name="table", pos=[x, y, z - half[2]])
+    body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, conaffinity=_TABLE, rgba=_RGBA["table"])
 
 
 def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:

@@ -16,7 +16,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-__all__ = ["REMEDY", "OpenGL", "check", "context", "find"]
+__all__ = ["REMEDY", "OpenGL", "check", "context", "find", "import_mujoco"]
 
 REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 and the driver of the GPU"
 
@@ -62,6 +62,23 @@ def _try(name: str) -> tuple[bool, str]:
     if done.returncode == 0:
         return True, done.stdout.strip()
     return False, (done.stderr.strip().splitlines() or [f"the process ended with {done.returncode}"])[-1]
+
+
+def import_mujoco() -> None:
+    """Import MuJoCo, also where MUJOCO_GL names an OpenGL that this machine does not have: physics needs none.
+
+    MuJoCo's package loads that OpenGL as it is imported, and fails with whatever the OpenGL library's loader raises.
+    """
+    try:
+        import_module("mujoco")
+    except (AttributeError, ImportError, OSError, RuntimeError):
+        wish = os.environ.pop("MUJOCO_GL", None)
+        if wish is None:
+            raise
+        try:
+            import_module("mujoco")
+        finally:
+            os.environ["MUJOCO_GL"] = wish
 
 
 def context(name: str, width: int, height: int) -> Any:

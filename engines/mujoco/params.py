@@ -9,34 +9,22 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, field_validator, model_validator, with_config
+from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, model_validator, with_config
 from typing_extensions import TypedDict  # pydantic's wish before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import MountedPositions, UnitQuaternion, home
-from robots.serial_chain import Joint, SerialChain
-from schemas.errors import MotionError
+from robots.dvrk.parameters import EcmPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
+from robots.serial_chain import SerialChain
 from schemas.keys import valid_name
 from schemas.quantity import Angle, Duration, Length
 
-__all__ = ["ArmParams", "EcmParams", "MujocoParams", "PsmParams", "SceneArm", "SceneParams", "SetupPositions"]
+__all__ = ["ArmParams", "EcmParams", "MujocoParams", "PsmParams", "SceneArm", "SceneParams"]
 
 SceneArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
 """The arms of the patient's cart."""
-
-SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
-"""Of the setup joints that carry one arm: the lift (m), then five angles."""
-
-
-def _check_range(q: tuple[float, ...], joints: tuple[Joint, ...]) -> None:
-    if len(q) != len(joints):
-        raise ValueError(f"{len(q)} joint positions, expected {len(joints)}: {', '.join(joint.name for joint in joints)}")
-    for joint, value in zip(joints, q, strict=True):
-        if not joint.lower <= value <= joint.upper:
-            raise ValueError(f"{joint.name} {value:g} is out of its range {joint.lower:g} .. {joint.upper:g}")
 
 
 class ArmParams(Params):
@@ -49,7 +37,7 @@ class ArmParams(Params):
 class PsmParams(ArmParams):
     """A patient-side manipulator: what it holds and where it starts."""
 
-    instrument: str = Field(default="palpation-probe", description="name or number, such as 400006")
+    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
     start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
@@ -65,43 +53,30 @@ class PsmParams(ArmParams):
         """The arm's kinematics, from `<arm>_base` to the tip."""
         return psm.chain(self.tool)
 
-    @field_validator("instrument")
-    @classmethod
-    def _is_known(cls, name: str) -> str:
-        try:
-            snake = instrument(name).has_snake_wrist
-        except MotionError as error:
-            raise ValueError(str(error)) from error
-        if snake:
-            raise ValueError(f"'{name}' has a snake wrist, which the model cannot bend; take an 8 mm instrument such as 400006")
-        return name
-
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        _check_range(self.start, self.chain.joints)
-        jaw = self.tool.jaw
-        if jaw is not None and not jaw.lower <= self.jaw <= jaw.upper:
-            raise ValueError(f"jaw {self.jaw:g} is out of its range {jaw.lower:g} .. {jaw.upper:g}")
-        if self.tool.hand is not None:
-            _check_range(self.hand, self.tool.hand.joints)
+        check_start(self.chain, self.start, self.tool, self.jaw, self.hand)
         return self
 
 
 class EcmParams(ArmParams):
     """The endoscope camera manipulator: which endoscope it holds and where it starts."""
 
-    endoscope: Literal["straight", "up", "down"] = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    start: tuple[Angle, Angle, Length, Angle] = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+    endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    )
+    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        _check_range(self.start, self.chain.joints)
+        check_start(self.chain, self.start)
         return self
 
     @cached_property
     def chain(self) -> SerialChain:
         """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope)
+        return ecm.chain(self.endoscope, self.tip_frame)
 
 
 @with_config(ConfigDict(extra="forbid"))
@@ -114,10 +89,10 @@ class _Arms(TypedDict, total=False):
 
 @with_config(ConfigDict(extra="forbid"))
 class _SetupJoints(TypedDict, total=False):
-    PSM1: SetupPositions
-    PSM2: SetupPositions
-    PSM3: SetupPositions
-    ECM: SetupPositions
+    PSM1: Annotated[SetupPositions, settable("PSM1")]
+    PSM2: Annotated[SetupPositions, settable("PSM2")]
+    PSM3: Annotated[SetupPositions, settable("PSM3")]
+    ECM: Annotated[SetupPositions, settable("ECM")]
 
 
 def _validated_as(form: Any) -> GetPydanticSchema:
@@ -150,6 +125,15 @@ class SceneParams(Params):
         default="friction", description="what holds an object between two jaws: friction alone, or a weld as long as both touch it"
     )
     looks: bool = Field(default=True, description="give the robot its meshes; without, only what collides is there")
+
+    @model_validator(mode="after")
+    def _stands_in_one_place(self) -> Self:
+        if self.mounting == "free" and self.setup_joints:
+            raise ValueError("setup_joints are those of the cart; say 'mounting: cart' or leave them out")
+        placed = [name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}]
+        if self.mounting == "cart" and placed:
+            raise ValueError(f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart setup_joints say where an arm stands")
+        return self
 
 
 class MujocoParams(SceneParams):

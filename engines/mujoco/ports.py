@@ -12,7 +12,7 @@ __all__ = ["bond_sides", "has_hand", "has_jaw", "has_probe", "has_spheres", "sce
 
 _JOINT_STATE, _POSE, _WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"
 _ALL = ("position", "velocity", "effort")
-_MODES = "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort"
+_MODES = "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort; 3 and 4 the last two without gravity compensation"
 
 
 def has_jaw(params: PsmParams | EcmParams) -> bool:

@@ -23,6 +23,8 @@ __all__ = ["Servos"]
 
 _OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
 """Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
+_BARE = 2.0
+"""Added to the latter two: without the gravity compensation that the real controller can switch off, see docs/decisions/0010."""
 
 
 @dataclass
@@ -37,11 +39,13 @@ class _Group:
     """Whose weight its controller bears."""
     ports: str
     """Its ports' names up to `servo_jp` and `servo_jf`."""
+    weighed: list[int]
+    """Those of `bodies` whose weight the real controller bears: the endoscope. Springs and weights balance all else."""
     mode: float = _POSITION
 
 
 class Servos:
-    """Takes commands and modes, and keeps the setpoints. While all drives hold positions, a step allocates nothing."""
+    """Takes commands and modes, and keeps the setpoints."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams], period: float) -> None:
         """Drive `arms`, which are stepped every `period` seconds, from where they start."""
@@ -66,12 +70,19 @@ class Servos:
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
         self.setpoint, self._previous, self._effort = np.split(self._inputs, 3)
-        self._command, self._change, self._way = start.copy(), np.zeros(n), speed * period
+        self._reach, self._ways = np.empty((2, n)), np.outer((-1.0, 1.0), speed * period)
         self._layout, self._measure = self._matrices(shares, n, period)
         self._springs, self._rest = self._elasticity(shares, n)
         self._gains = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
         self._gravity_compensation = model.body_gravcomp.copy()
-        self._modes = {arm: np.full(2, _POSITION).tobytes() for arm in arms}
+        self._mode_ports = {arm: f"{arm}/control_mode" for arm in arms}
+        self._ports = *self._mode_ports.values(), *(f"{group.ports}servo_jp" for group in self._groups)
+        self._state = np.concatenate([start, np.full(2 * len(arms), _POSITION)])
+        self._modes = self._state[n:]  # per arm those of its joints and its jaw
+        self._taken = np.concatenate([self._modes, start])
+        self._wanted, self._command = np.split(self._taken, [2 * len(arms)])
+        self.off: frozenset[str] = frozenset()
+        """The arms whose joints have no torque."""
         self._holding = True
         np.multiply(self._springs, start - self._rest, out=self._effort)
         self._layout.dot(self._inputs, data.ctrl)
@@ -83,7 +94,8 @@ class Servos:
         grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, "finger"))  # those of a jaw, and the phalanges of a hand
         own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
         bodies = [i for i in own if model.body(i).name.startswith(grasping) == grasps]
-        self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports))
+        weighed = [i for i in bodies if model.body(i).name == "ECM/roll"]
+        self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports, weighed))
 
     def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
         """Return what makes `ctrl` of (setpoint, setpoint one step ago, effort), and what makes the drives' positions of `qpos`."""
@@ -119,27 +131,18 @@ class Servos:
         """Return the view of `setpoint` that is the joints of `arm`."""
         return self.setpoint[next(group.part for group in self._groups if group.arm == arm)]
 
-    def is_off(self, arm: str) -> bool:
-        """Say whether the joints of `arm` have no torque."""
-        return any(group.mode == _OFF for group in self._groups if group.arm == arm and not group.ports.endswith("/jaw/"))
-
     def begin(self, inputs: Inputs) -> None:
         """Take commands and modes for the step that begins. Raises SessionError for a mode that there is none of."""
-        for arm, known in self._modes.items():
-            if (modes := inputs[f"{arm}/control_mode"]).tobytes() != known:
-                self._set_modes(arm, modes)
-        command, setpoint, change, way = self._command, self.setpoint, self._change, self._way
-        for group in self._groups:
-            command[group.part] = inputs[group.ports + "servo_jp"]
-        self._previous[:] = setpoint
+        np.concatenate([inputs[port] for port in self._ports], out=self._taken)
+        if self._wanted.tobytes() != self._modes.tobytes():
+            self._set_modes(self._wanted)
+        command, setpoint, reach = self._command, self.setpoint, self._reach
         np.maximum(command, self._lower, out=command)
         np.minimum(command, self._upper, out=command)
-        np.subtract(command, setpoint, out=change)
-        if (np.abs(change) <= way).all():
-            setpoint[:] = command
-        else:
-            np.maximum(change, -way, out=change)
-            setpoint += np.minimum(change, way, out=change)
+        np.add(setpoint, self._ways, out=reach)
+        self._previous[:] = setpoint
+        np.maximum(command, reach[0], out=command)
+        np.minimum(command, reach[1], out=setpoint)
         np.multiply(self._springs, np.subtract(setpoint, self._rest, out=self._effort), out=self._effort)  # what holds against the springs there
         if not self._holding:
             self._let_go(inputs)
@@ -154,25 +157,31 @@ class Servos:
                 self._effort[part] = inputs[group.ports + "servo_jf"] if group.mode == _EFFORT else 0.0
                 self.setpoint[part] = self._previous[part] = measured[part]
 
-    def _set_modes(self, arm: str, modes: Vector) -> None:
-        if not np.isin(modes, (_OFF, _POSITION, _EFFORT)).all():
-            raise SessionError(f"input '{arm}/control_mode' is {modes}; each of [arm, jaw] is 0 (off), 1 (position servo) or 2 (effort)")
-        for group, mode in zip([group for group in self._groups if group.arm == arm], modes.tolist(), strict=False):
-            gain, bias = self._gains
-            self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
-            self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
-            self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (mode != _OFF)
-            group.mode = mode
-        self._modes[arm] = modes.tobytes()
+    def _set_modes(self, modes: Vector) -> None:
+        """Switch the drives; `modes`, shape (2 arms,), are those of the joints and the jaw of every arm."""
+        gain, bias = self._gains
+        for (arm, port), wanted in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
+            if not np.isin(wanted, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
+                modes_there_are = "0 (off), 1 (position servo) or 2 (effort), 3 and 4 the last two without gravity compensation"
+                raise SessionError(f"input '{port}' is {wanted}; each of [arm, jaw] is {modes_there_are}")
+            for group, asked in zip([group for group in self._groups if group.arm == arm], wanted.tolist(), strict=False):
+                mode = asked - _BARE if asked > _EFFORT else asked
+                self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
+                self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
+                self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (mode != _OFF)
+                self._model.body_gravcomp[group.weighed] *= asked == mode
+                group.mode = mode
+        self._modes[:] = modes
+        self.off = frozenset(arm for arm, mode in zip(self._mode_ports, modes[::2].tolist(), strict=True) if mode == _OFF)
         self._holding = all(group.mode == _POSITION for group in self._groups)
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not hold: setpoints and modes."""
-        return np.concatenate([self.setpoint, np.frombuffer(b"".join(self._modes.values()))])
+        """What MuJoCo's own state does not hold: setpoints and modes; the same array at every call."""
+        self._state[: self.setpoint.size] = self.setpoint
+        return self._state
 
     @state.setter
     def state(self, state: Vector) -> None:
         self.setpoint[:] = state[: self.setpoint.size]
-        for arm, modes in zip(self._modes, state[self.setpoint.size :].reshape(-1, 2), strict=True):
-            self._set_modes(arm, modes)
+        self._set_modes(state[self.setpoint.size :])

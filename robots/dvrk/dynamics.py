@@ -44,7 +44,7 @@ class Dynamics:
 
         A body that is neither a joint's nor the linkage's (a finger of the jaw) moves with the last link.
         """
-        self._joints = len(chain.joints)
+        self._chain, self._joints = chain, len(chain.joints)
         self._rotors = np.diag(rotors)
         index = {joint.name: i for i, joint in enumerate(chain.joints)}
         self._motions = [_Motion(i - 1, i, 1.0, *_joint_twist(chain, i)) for i in range(self._joints)]
@@ -59,7 +59,11 @@ class Dynamics:
         self._pseudo = np.array([body.pseudo_inertia for body in bodies.values()])  # (bodies, 4, 4)
 
     def displacements(self, q: Vector) -> Vector:
-        """Return the derivatives by the joints of the bodies' displacements, shape (bodies, n, 4, 4), bodies in the order they were given."""
+        """Return the derivatives by the joints of the bodies' displacements, shape (bodies, n, 4, 4), bodies in the order they were given.
+
+        Raises MotionError if `q` is not n finite numbers.
+        """
+        self._chain.check_form(q)
         n = self._joints
         poses, slopes = np.empty((len(self._motions), 4, 4)), np.zeros((len(self._motions), n, 4, 4))
         for i, motion in enumerate(self._motions):

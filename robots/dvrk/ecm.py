@@ -15,7 +15,7 @@ from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["ENDOSCOPE_PITCH", "HOME", "JOINTS", "JOINT_NAMES", "MOUNTING_PITCH", "Endoscope", "chain", "tip"]
+__all__ = ["ENDOSCOPE_PITCH", "HOME", "JOINTS", "JOINT_NAMES", "Endoscope", "TipFrame", "chain", "tip"]
 
 Endoscope = Literal["straight", "up", "down"]
 """Where an endoscope looks: along its shaft, or 30 degrees up or down."""
@@ -40,21 +40,27 @@ JOINT_NAMES = tuple(joint.name for joint in JOINTS)
 HOME = (0.0, 0.0, 0.12, 0.0)
 """Where the real controller homes a simulated arm (SAW mtsIntuitiveResearchKitECM.cpp): straight, insertion 0.12 m."""
 
-MOUNTING_PITCH = radians(-45.0)
-"""Of the arm on its setup joint (SAW share/arm/ECM_KIN_SIMULATED.json, Classic)."""
-
 ENDOSCOPE_PITCH = {"straight": 0.0, "up": radians(-30.0), "down": radians(30.0)}
 """Rotation of the tip about its x axis by the kind of endoscope, rad (SAW mtsIntuitiveResearchKitECM.cpp)."""
 
 
-def tip(endoscope: Endoscope) -> Vector:
+TipFrame = Literal["kinematic", "view"]
+"""How the camera frame stands about the shaft: as the roll link, or as the surgeon sees it: x to the left, y up, z ahead. See docs/decisions/0013."""
+
+_VIEW_IN_ROLL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""A quarter turn about the shaft (SAW, commit 0210eb1a, same file, set_endoscope_type), to which the endoscope's own pitch is added."""
+
+
+def tip(endoscope: Endoscope, frame: TipFrame = "kinematic") -> Vector:
     """Return the pose of the camera frame in the frame of the roll link, shape (4, 4)."""
     angle = ENDOSCOPE_PITCH[endoscope]
     pose = np.eye(4)
     pose[1:3, 1:3] = [[cos(angle), -sin(angle)], [sin(angle), cos(angle)]]
+    if frame == "view":
+        pose[:3, :3] = _VIEW_IN_ROLL @ pose[:3, :3]
     return pose
 
 
-def chain(endoscope: Endoscope = "straight") -> SerialChain:
+def chain(endoscope: Endoscope = "straight", frame: TipFrame = "kinematic") -> SerialChain:
     """Return the kinematics of the arm, from the RCM frame `ECM_base` to the camera frame."""
-    return SerialChain(JOINTS, tip(endoscope))
+    return SerialChain(JOINTS, tip(endoscope, frame))

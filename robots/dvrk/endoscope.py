@@ -8,12 +8,12 @@ docs/decisions/0013. SI units, radians.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, radians, sin, tan
+from math import radians, tan
 from typing import Literal
 
 import numpy as np
 
-from robots.dvrk.ecm import ENDOSCOPE_PITCH, Endoscope
+from robots.dvrk.ecm import Endoscope, tip
 from schemas.vectors import Vector
 
 __all__ = ["BASELINE", "EYES", "FAR", "FIELD_OF_VIEW", "HEIGHT", "NEAR", "WIDTH", "Eye", "StereoCamera", "optical_in_roll"]
@@ -30,11 +30,7 @@ BASELINE = 5.06e-3
 NEAR, FAR = 0.01, 2.0
 """Distances between which the cameras see, m (same source)."""
 
-_VIEW_IN_ROLL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-"""The surgeon's view (x to the left, y up, z ahead) in the frame of the roll link (jhu-dvrk/sawIntuitiveResearchKit, commit 02f31483,
-components/code/mtsIntuitiveResearchKitECM.cpp, set_endoscope_type: a quarter turn about the shaft, to which the endoscope's own
-pitch about x is added)."""
-_OPTICAL_IN_VIEW = np.diag([-1.0, -1.0, 1.0])
+_OPTICAL_IN_VIEW = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -67,8 +63,4 @@ def optical_in_roll(endoscope: Endoscope) -> Vector:
 
     The left camera's frame is half the baseline along -x of it, the right one's half along x.
     """
-    angle = ENDOSCOPE_PITCH[endoscope]
-    pitch = np.array([[1.0, 0.0, 0.0], [0.0, cos(angle), -sin(angle)], [0.0, sin(angle), cos(angle)]])
-    pose = np.eye(4)
-    pose[:3, :3] = _VIEW_IN_ROLL @ pitch @ _OPTICAL_IN_VIEW
-    return pose
+    return tip(endoscope, "view") @ _OPTICAL_IN_VIEW

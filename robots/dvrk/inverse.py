@@ -39,6 +39,10 @@ refused; above the 11 degrees that 20 mm sideways at a depth of 100 mm need, a s
 
 _SLACK = 1e-9
 """rad and m by which rounding may carry a joint past its limit."""
+_RIGID = 1e-6
+"""Largest entry of R^T R - 1 that is taken for rounding, of a pose that was written with 7 digits."""
+_FAR = 1e3
+"""m: no arm reaches so far, and the squares of what is much further are no numbers."""
 _POINT = 1e-9
 """m: two axes that pass each other so closely meet."""
 _RCM_ROWS = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in psm.ARM_JOINTS)
@@ -58,14 +62,11 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
         near: joint positions that decide between solutions, shape (n,) or (..., n).
 
     Raises:
-        MotionError: not finite, or not reachable; the message names the joints, what they would have to be and their ranges.
-            Of many poses it speaks of the first that fails.
+        MotionError: wrong shape, not finite, no rigid transform, or not reachable; the message names the joints, what they would
+            have to be and their ranges. Of many poses it speaks of the first that fails.
     """
     n = len(chain.joints)
-    poses = np.asarray(pose, np.float64).reshape(-1, 4, 4)
-    start = np.broadcast_to(near, (*np.shape(pose)[:-2], n)).reshape(-1, n)
-    if not (np.isfinite(poses).all() and np.isfinite(start).all()):
-        raise MotionError("a pose or a joint position that is not finite cannot be reached")
+    poses, start = _goals(chain, pose, near)
     ends = poses @ inverse_pose(chain.tip)
     if n == len(ecm.JOINTS):
         _require(chain, ecm.JOINTS[3:])
@@ -84,6 +85,32 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     if n == len(ecm.JOINTS):
         _check_orientation(chain.forward(q), poses)
     return q.reshape(*np.shape(pose)[:-2], n)
+
+
+def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vector]:
+    """Return poses, shape (N, 4, 4), and where they are looked for, shape (N, n), once they make sense."""
+    n, many = len(chain.joints), np.shape(pose)[:-2]
+    if np.shape(pose)[-2:] != (4, 4):
+        raise MotionError(f"pose of shape {np.shape(pose)}, expected (..., 4, 4), a homogeneous transform")
+    if np.shape(near)[-1:] != (n,) or np.shape(near)[:-1] not in ((), many):
+        names = ", ".join(joint.name for joint in chain.joints)
+        allowed = " or ".join(dict.fromkeys([f"({n},)", str((*many, n))]))
+        raise MotionError(f"positions `near` of shape {np.shape(near)}, expected {allowed}: {names}")
+    poses = np.asarray(pose, np.float64).reshape(-1, 4, 4)
+    start = np.broadcast_to(np.asarray(near, np.float64), (*many, n)).reshape(-1, n)
+    if not (np.isfinite(poses).all() and np.isfinite(start).all()):
+        raise MotionError("a pose or a joint position that is not finite cannot be reached")
+    if (np.abs(poses[:, :3, 3]) > _FAR).any():
+        raise MotionError(f"a position more than {_FAR:g} m away from the base cannot be reached")
+    rotation = poses[:, :3, :3]
+    unrigid = np.abs(rotation.swapaxes(-1, -2) @ rotation - np.eye(3)).max(axis=(-2, -1))
+    unrigid = np.maximum(unrigid, np.abs(poses[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=-1))
+    wrong = (unrigid > _RIGID) | (np.linalg.det(rotation) < 0.0)
+    if wrong.any():
+        i = int(wrong.argmax())
+        where = f" {i}" if len(poses) > 1 else ""
+        raise MotionError(f"pose{where} is no rigid transform: {poses[i].tolist()}; allowed are a rotation matrix, a position and (0, 0, 0, 1) below")
+    return poses, start
 
 
 def _require(chain: SerialChain, wrist: tuple[Joint, ...]) -> None:

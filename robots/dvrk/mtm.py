@@ -15,7 +15,7 @@ from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["ACTUATOR_TO_JOINT", "BASE", "GRIPPER_UPPER", "MtmName", "chain"]
+__all__ = ["ACTUATOR_TO_JOINT", "BASE", "MtmName", "chain"]
 
 MtmName = Literal["MTML", "MTMR"]
 
@@ -33,9 +33,6 @@ _RANGES = {
 ACTUATOR_TO_JOINT = np.eye(7)
 """Joint positions of actuator positions, shape (7, 7): the elbow hangs on a parallelogram, the platform on both."""
 ACTUATOR_TO_JOINT[2, 1], ACTUATOR_TO_JOINT[3, 1:3] = -1.0, (0.6697, -0.6697)
-
-GRIPPER_UPPER = radians(60.0)
-"""Opening of the gripper (rad); closed is 0."""
 
 
 def _base(side: float) -> Vector:

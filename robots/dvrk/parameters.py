@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
 
-from robots.dvrk import psm
-from robots.dvrk.instruments import instrument
+from robots.dvrk import psm, setup_joints
+from robots.dvrk.instruments import Instrument, instrument
+from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
 from schemas.quantity import Angle, Length
 
-__all__ = ["ArmName", "MountedPositions", "PsmPositions", "UnitQuaternion", "home"]
+__all__ = [
+    "ArmName",
+    "EcmPositions",
+    "InstrumentName",
+    "MountedPositions",
+    "PsmPositions",
+    "SetupPositions",
+    "UnitQuaternion",
+    "check_start",
+    "home",
+    "settable",
+]
 
 ArmName = Literal["PSM1", "PSM2", "PSM3"]
-
-
-def _in_range(value: tuple[float, ...]) -> tuple[float, ...]:
-    for joint, q in zip(psm.ARM_JOINTS + instrument("palpation-probe").joints, value, strict=True):
-        if not joint.lower <= q <= joint.upper:
-            raise ValueError(f"{joint.name} {q:g} is out of its range {joint.lower:g} .. {joint.upper:g}")
-    return value
 
 
 def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
@@ -31,8 +37,36 @@ def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
     return value
 
 
-PsmPositions = Annotated[tuple[Angle, Angle, Length, Angle, Angle, Angle], AfterValidator(_in_range)]
-"""Positions of a PSM's six joints (rad, m), inside their ranges."""
+def _mountable(name: str) -> str:
+    try:
+        found = instrument(name)
+    except MotionError as error:
+        raise ValueError(str(error)) from error
+    if found.has_snake_wrist:
+        raise ValueError(f"'{name}' has a snake wrist, which neither model nor motion controller can bend; take an 8 mm instrument such as 400006")
+    return found.name
+
+
+def _text(name: Any) -> Any:
+    return str(name) if isinstance(name, int) and not isinstance(name, bool) else name
+
+
+InstrumentName = Annotated[
+    str,
+    BeforeValidator(_text),  # a number in YAML needs no quotes
+    AfterValidator(_mountable),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer"}], "examples": ["LARGE_NEEDLE_DRIVER_400006", 400006]}),
+]
+"""Name or number of an instrument that can be mounted on a PSM; the name, once it is validated."""
+
+PsmPositions = tuple[Angle, Angle, Length, Angle, Angle, Angle]
+"""Positions of a PSM's six joints (rad, m)."""
+
+EcmPositions = tuple[Angle, Angle, Length, Angle]
+"""Positions of the ECM's four joints (rad, m)."""
+
+SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
+"""Of the setup joints that carry one arm: the lift (m), then five angles."""
 
 MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Length, Angle, Angle, Angle]
 """Positions of a PSM's joints (rad, m), as many as it has with its instrument: four with a hand, else six."""
@@ -47,3 +81,35 @@ def home(arm: dict[str, Any]) -> MountedPositions:
         return cast("MountedPositions", psm.home(instrument(arm.get("instrument", ""))))
     except MotionError:
         return psm.HOME  # not looked at: the instrument has been refused
+
+
+def check_start(chain: SerialChain, start: Sequence[float], tool: Instrument | None = None, jaw: float = 0.0, hand: Sequence[float] = ()) -> None:
+    """Raise ValueError, as pydantic's validators do, if `start`, or how far `jaw` or `hand` (rad) of the tool are open, is not inside its range."""
+    try:
+        chain.check(np.array(start, np.float64))
+    except MotionError as error:
+        raise ValueError(str(error)) from error
+    range_ = tool.jaw if tool is not None else None
+    if range_ is None and jaw:
+        raise ValueError(f"jaw at {jaw:g} rad, but what the arm holds has no jaw; leave it out")
+    if range_ is not None and not range_.lower <= jaw <= range_.upper:
+        raise ValueError(f"jaw at {jaw:g} rad, allowed are {range_.lower:g} .. {range_.upper:g}")
+    joints = tool.hand.joints if tool is not None and tool.hand is not None else ()
+    if not joints and any(hand):
+        raise ValueError("closings of a hand, but what the arm holds is none; leave them out")
+    for joint, closing in zip(joints, hand, strict=bool(joints)):
+        if not joint.lower <= closing <= joint.upper:
+            raise ValueError(f"{joint.name} at {closing:g} rad, allowed are {joint.lower:g} .. {joint.upper:g}")
+
+
+def settable(arm: setup_joints.CartArm) -> AfterValidator:
+    """Return what refuses `SetupPositions` that the setup joint which carries `arm` does not reach."""
+
+    def check(positions: tuple[float, ...]) -> tuple[float, ...]:
+        try:
+            setup_joints.chain(arm).check(np.array(positions, np.float64))
+        except MotionError as error:
+            raise ValueError(str(error)) from error
+        return positions
+
+    return AfterValidator(check)

@@ -12,7 +12,7 @@ from robots.dvrk.instruments import Instrument
 from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 
-__all__ = ["ARM_JOINTS", "CANNULA_DEPTH", "HOME", "JOINT_NAMES", "SAFE_DISTANCE", "chain", "home"]
+__all__ = ["ARM_JOINTS", "HOME", "JOINT_NAMES", "chain", "home"]
 
 _RCM_TO_CARRIAGE = 0.4318
 """Distance (m) of the instrument carriage from the RCM at insertion 0 (SAW share/kinematic/PSM.json, offset of joint 3)."""
@@ -32,13 +32,6 @@ JOINT_NAMES = ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
 
 HOME = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Where the real controller homes a simulated arm (SAW mtsIntuitiveResearchKitPSM.cpp): straight, insertion 0.12 m."""
-
-CANNULA_DEPTH = 0.025
-"""Insertion (m) at which an instrument is engaged in the cannula (SAW mtsIntuitiveResearchKit.h)."""
-
-SAFE_DISTANCE = 0.045 + 0.002
-"""From the RCM to the wrist pitch axis (m), beyond which the real controller lets the wrist and Cartesian motion go (same file: distance
-and buffer)."""
 
 
 def home(instrument: Instrument) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ CART = {**PSM1, "PSM2": {"instrument": "400006"}, "PSM3": {"instrument": "400006
 
 class Rig:
     def __init__(self, arms=PSM1, initial_state="homed", **params):
-        self.motion = MotionController("motion", MotionParams.model_validate({"arms": arms, "initial_state": initial_state, **params}))
+        self.motion = MotionController("motion", MotionParams.model_validate({"mounting": "cart", "arms": arms, "initial_state": initial_state, **params}))
         self.outputs = dict(self.motion.configure(Setup(H, Path())))
         self.sensed = {}
         for port in self.motion.ports:

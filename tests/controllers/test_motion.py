@@ -12,7 +12,7 @@ from robots import rotation
 from robots.dvrk import arms
 from schemas.crtk import StringStamped
 from schemas.errors import StateError
-from schemas.ros import JointState
+from schemas.ros import BoolMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
 from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, jf, jp, ratio
 
 CHAIN = arms.chain("PSM1")
@@ -38,7 +38,7 @@ MOTIONS = {
 
 @pytest.mark.parametrize("state", ["disabled", "homed"])
 def test_the_contract_of_participants_is_kept(state):
-    params = MotionParams.model_validate({"arms": CART, "initial_state": state})
+    params = MotionParams.model_validate({"mounting": "cart", "arms": CART, "initial_state": state})
     at_home = {f"sense/{arm}/measured_js": [*HOME, *[0.0] * 12] for arm in ("PSM1", "PSM2", "PSM3")}
     orders = {"PSM1/move_jp": (jp(*GOAL),), "PSM2/state_command": (StringStamped(string="home"),)}
     check_engine(lambda: MotionController("motion", params), period_ns=H, inputs={**at_home, **orders})
@@ -123,6 +123,20 @@ def test_motion_in_the_wrong_state_is_refused_with_a_warning(state, command):
     assert rig.mode == mode
     if state != "homing":
         assert (rig.step(20).setpoint == before).all()
+
+
+@pytest.mark.parametrize("state", ["disable", "pause", "enable"])
+def test_gravity_compensation_is_switched_whatever_the_state_and_kept_over_a_checkpoint(state):
+    rig = Rig().step().command(state)
+    mode = rig.mode[0]
+    rig.step(2, use_gravity_compensation=BoolMessage(data=False))
+    assert not rig.said("warning")
+    assert rig.mode[0] == (mode + 2 if mode else 0)
+    saved = rig.motion.save()
+    rig.step(1, use_gravity_compensation=BoolMessage(data=True))
+    assert rig.mode[0] == mode
+    rig.motion.restore(saved)
+    assert rig.mode[0] == (mode + 2 if mode else 0)
 
 
 @pytest.mark.parametrize("command", MOTIONS)
@@ -230,7 +244,74 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("command", "bad", "reason"), BAD)
+NAN, TOP_DOWN = float("nan"), (0.70710678, 0.70710678, 0.0, 0.0)
+
+
+def raw_pose(position, orientation, frame="PSM1_base"):
+    x, y, z = position
+    point, quaternion = Point.model_construct(x=x, y=y, z=z), Quaternion.model_construct(**dict(zip("xyzw", orientation, strict=True)))
+    return PoseStamped.model_construct(header=Header(frame_id=frame), pose=Pose.model_construct(position=point, orientation=quaternion))
+
+
+def raw_wrench(x, frame):
+    vectors = {"force": Vector3.model_construct(x=x, y=0.0, z=0.0), "torque": Vector3()}
+    return WrenchStamped.model_construct(header=Header(frame_id=frame), wrench=Wrench.model_construct(**vectors))
+
+
+EVERY = [
+    *(
+        (command, bad, reason)
+        for command in ("servo_jp", "servo_jr", "move_jp", "move_jr")
+        for bad, reason in [
+            (construct("position", [0.0, NAN, 0.0, 0.0, 0.0, 0.0]), "every number must be finite"),
+            (construct("position", [0.0, 0.0, -np.inf, 0.0, 0.0, 0.0]), "every number must be finite"),
+            (jp(), "0 values of position, expected 6: yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw"),
+            (jp(*[0.0] * 5), "5 values of position, expected 6"),
+            (jp(0, 0, 0, 0, 2.0, 0), "joint wrist_pitch at 2 rad, allowed are -1.39626 .. 1.39626"),
+            (jp(*HOME, names=["yaw"] * 6), "joints yaw, yaw, yaw, yaw, yaw, yaw, expected yaw, pitch"),
+        ]
+    ),
+    *(
+        (command, bad, reason)
+        for command in ("servo_cp", "move_cp")
+        for bad, reason in [
+            (raw_pose((0.0, NAN, -0.1), TOP_DOWN), "position [0.0, nan, -0.1]: every number must be finite"),
+            (raw_pose((0.0, 0.0, -0.1), (NAN, 0.0, 0.0, 1.0)), "every number must be finite"),
+            (raw_pose((0.0, 0.0, -0.1), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
+            (raw_pose((0.0, 0.0, -0.1), TOP_DOWN, "world"), "frame 'world', allowed are PSM1_base"),
+            (raw_pose((0.0, 0.0, -0.5), TOP_DOWN), "pose cannot be reached: joint insertion at"),
+            (raw_pose((0.3, 0.0, 0.3), TOP_DOWN), "allowed are"),
+        ]
+    ),
+    *(
+        (command, bad, reason)
+        for command, size in (("servo_jf", 6), ("jaw__servo_jf", 1))
+        for bad, reason in [
+            (construct("effort", [NAN] * size), "every number must be finite"),
+            (jf(*[0.0] * (size + 1)), f"{size + 1} values of effort, expected {size}"),
+            (jf(*[99.0] * size), "at 99 N m, allowed are"),
+        ]
+    ),
+    *((f"{kind}__servo_cf", raw_wrench(NAN, frame), "every number must be finite") for kind, frame in (("body", "PSM1_tip"), ("spatial", "PSM1_base"))),
+    ("spatial__servo_cf", raw_wrench(0.0, "PSM1_tip"), "frame 'PSM1_tip', allowed are PSM1_base"),
+    *(
+        (command, bad, reason)
+        for command in ("jaw__servo_jp", "jaw__move_jp")
+        for bad, reason in [
+            (construct("position", [NAN]), "every number must be finite"),
+            (jp(0.0, 0.0), "2 values of position, expected 1: jaw"),
+            (jp(2.0), "joint jaw at 2 rad, allowed are -0.698132 .. 1.39626"),
+        ]
+    ),
+    *(("trajectory_j__set_ratio", Float64Message.model_construct(data=bad), "allowed are over 0 to 1") for bad in (NAN, -1.0, 1.1, np.inf)),
+]
+
+
+def test_every_command_has_bad_input_that_is_tried():
+    assert {command for command, *_ in BAD + EVERY} >= set(MOTIONS) - {"hold", "free"}
+
+
+@pytest.mark.parametrize(("command", "bad", "reason"), [*BAD, *EVERY])
 def test_bad_input_is_refused_with_the_reason_and_changes_nothing(command, bad, reason):
     rig, twin = Rig().step(5), Rig().step(5)
     rig.step(1, **{command: bad})
@@ -285,6 +366,12 @@ def test_the_tip_is_seen_from_the_camera_through_the_setup_joints(arm):
     frames = {port.name: port.frame for port in rig.motion.ports}
     assert frames[f"{arm}/measured_cp"] == ("Cart" if arm == "ECM" else "ECM")
     assert frames[f"{arm}/local/measured_cp"] == f"{arm}_base"
+
+
+def test_with_the_frame_of_the_view_the_tip_is_seen_a_quarter_turned_about_the_line_of_sight():
+    kinematic, view = (Rig({**CART, "ECM": {"tip_frame": frame}}).step(10).outputs["PSM1/measured_cp"] for frame in ("kinematic", "view"))
+    x, y, z = kinematic[:3]
+    assert np.allclose(view[:3], [-y, x, z], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("frame", ["", "ECM", "PSM1_base"])
@@ -360,8 +447,13 @@ def test_restore_returns_to_the_same_bits_in_the_middle_of_a_move():
     ("arms", "reason"),
     [
         ({}, "name at least one"),
-        ({"PSM1": {"instrument": "400999"}}, "400999"),
+        ({"PSM1": {"instrument": "400999"}}, "no instrument '400999'. Did you mean"),
+        ({"PSM1": {"instrument": "400117"}}, "'400117' has a snake wrist"),
         ({"PSM1": {"start": [3, 0, 0.1, 0, 0, 0]}}, r"joint yaw at 3 rad, allowed are -1\.588 \.\. 1\.588"),
+        ({"PSM1": {"instrument": "420006", "start": [0, 0, 0.1, 0, 1.4, 0]}}, "joint wrist_pitch at 1.4 rad, allowed are"),
+        ({"PSM1": {"instrument": "400006", "jaw": 2.0}}, r"jaw at 2 rad, allowed are -0\.698132 \.\. 1\.39626"),
+        ({"PSM1": {"instrument": "palpation-probe", "jaw": 0.1}}, "has no jaw; leave it out"),
+        ({"ECM": {"start": [0, 0, 0.3, 0]}}, r"joint insertion at 0\.3 m, allowed are 0 \.\. 0\.255"),
     ],
 )
 def test_parameters_that_make_no_sense_are_refused(arms, reason):

@@ -8,9 +8,10 @@ import yourdfpy
 from typer.testing import CliRunner
 
 from engines.mujoco.command_line import app
-from engines.mujoco.export import write
-from engines.mujoco.model import build, spec
+from engines.mujoco.export import START, write
+from engines.mujoco.model import build
 from engines.mujoco.params import SceneParams
+from robots.dvrk import setup_joints
 from robots.dvrk.linkage import LINKAGES
 
 SCENE = SceneParams.model_validate(
@@ -25,8 +26,8 @@ SCENE = SceneParams.model_validate(
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     where = tmp_path_factory.mktemp("export")
-    write(spec(SCENE), where / "dvrk.xml", "mjcf")
-    write(spec(SCENE), where / "dvrk.urdf", "urdf")
+    write(SCENE, where / "dvrk.xml", "mjcf")
+    write(SCENE, where / "dvrk.urdf", "urdf")
     return where
 
 
@@ -49,6 +50,17 @@ def test_mjcf_reads_back_as_it_was(folder):
     mujoco.mj_forward(back, other)
     assert np.allclose(data.site_xpos, other.site_xpos, atol=1e-12)
     assert np.allclose(data.xmat, other.xmat, atol=1e-12)
+
+
+def test_a_keyframe_holds_the_arms_where_they_start(folder):
+    model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(START).id)
+    start = data.qpos.copy()
+    assert data.joint("PSM1/insertion").qpos[0] == SCENE.arms["PSM1"].start[2] > 0.1
+    assert data.joint("PSM1/counterweight").qpos[0] == -SCENE.arms["PSM1"].start[2]
+    mujoco.mj_step(model, data, nstep=1000)
+    assert np.abs(data.qpos - start).max() < 5e-3  # no more than the springs of roll and pitch pull their servos away
 
 
 def test_meshes_read_back_where_they_were(folder):
@@ -104,6 +116,21 @@ def test_urdf_has_the_masses_of_the_model(robot):
     assert masses["PSM1_pitch_link"] == pytest.approx(model.body("PSM1/pitch").mass[0])
 
 
+def test_mujoco_reads_the_urdf(folder):
+    """It refuses moving links without mass, looks for meshes beside the file, and makes equalities of the mimics."""
+    model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.urdf"))
+    params = SCENE.arms["PSM1"]
+    q = np.random.default_rng(3).uniform(params.chain.lower, params.chain.upper)
+    data = mujoco.MjData(model)
+    for joint, value in zip(params.chain.joints, q, strict=True):
+        data.joint(f"PSM1_{joint.name}").qpos = value
+    mujoco.mj_kinematics(model, data)
+    expected = setup_joints.base_pose("PSM1", np.array(SCENE.setup_joints["PSM1"])) @ params.chain.frames(q)[5]
+    assert np.allclose(data.body("PSM1_wrist_yaw_link").xpos, expected[:3, 3], atol=1e-9)
+    assert model.neq == 2 * 7 + 4
+    assert model.nmesh
+
+
 def test_urdf_meshes_are_beside_it(folder, robot):
     names = {visual.geometry.mesh.filename for link in robot.robot.links for visual in link.visuals if visual.geometry.mesh}
     assert names
@@ -126,7 +153,7 @@ def test_positions_are_numbers_in_a_row(written):
 def test_first_position_may_be_negative():
     result = run("fk", "--json", "ECM", "--q", "-0.4", "-0.3", ".1", "-0.5")
     assert result.exit_code == 0
-    assert list(json.loads(result.stdout)["q"].values()) == [-0.4, -0.3, 0.1, -0.5]
+    assert json.loads(result.stdout)["q"] == [-0.4, -0.3, 0.1, -0.5]
 
 
 def test_dynamics_are_those_of_the_model():
@@ -161,9 +188,12 @@ def test_dynamics_for_a_person():
         (("dynamics", "MTML", "--q", "0"), "no arm 'MTML' in the model"),
         (("dynamics", "PSM1", "--instrument", "12", "--q", "0,0,0,0,0,0"), "no instrument '12'"),
         (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0"), "1 joint velocities, expected 6"),
+        (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0,0,0,0,0,inf"), "not all joint velocities are finite"),
         (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "one place"),
         (("export", "x", "--instrument", "PSM1"), "ARM=N"),
         (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
+        (("export", "x", "--arms", ""), "at least one of PSM1, PSM2, PSM3, ECM"),
+        (("export", "/dev/null/x"), "Invalid value for PATH: cannot write there"),
         (("export", "x", "--instrument", "PSM1=400143"), "snake"),
     ],
 )

@@ -204,7 +204,7 @@ def test_an_arm_collides_with_things_and_with_other_instruments_but_not_with_its
 
 
 def test_start_outside_the_joint_range_is_refused():
-    with pytest.raises(ValueError, match=r"insertion 0\.3 is out of its range 0 \.\. 0\.24"):
+    with pytest.raises(ValueError, match=r"joint insertion at 0\.3 m, allowed are 0 \.\. 0\.24"):
         scene(PSM1={"start": [0, 0, 0.3, 0, 0, 0]})
 
 

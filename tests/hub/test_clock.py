@@ -41,6 +41,15 @@ def test_a_run_without_an_end_is_never_done():
     assert clock.horizon() == 10
 
 
+@pytest.mark.parametrize(
+    ("step", "realtime", "host", "count"),
+    [("1 ms", False, "hub", 10), ("4 ms", False, "hub", 2), ("20 ms", False, "hub", 1), ("1 ms", True, "hub", 1), ("1 ms", False, "far", 1)],
+)
+def test_a_grant_covers_10_ms_where_nobody_says_and_nothing_enters(step, realtime, host, count):
+    quiet = plan_of(Part("one", out()), Part("other", out()), specs={"other": {"host": host}}, step=step)
+    assert Clock(quiet, window=None, realtime=realtime, steps=None).horizon() == count
+
+
 @pytest.fixture
 def wall(monkeypatch):
     """A wall clock that a test moves."""

@@ -81,7 +81,7 @@ def test_the_pose_goes_through_json_unchanged():
     pose = fk("SUJ/ECM", None, [0.2, 0.3, -0.5, 0.4])
     assert json.loads(json.dumps(pose)) == pose
     assert pose["frame"] == "cart"
-    assert list(pose["q"]) == ["lift", "shoulder", "elbow", "wrist", "tilt", "mount"]
+    assert pose["joints"] == ["lift", "shoulder", "elbow", "wrist", "tilt", "mount"]
 
 
 def test_a_snake_wrist_is_straight_at_zero_and_bends_by_the_sum_of_its_joints():

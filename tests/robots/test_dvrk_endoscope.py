@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from robots.dvrk import ecm, setup_joints
 from robots.dvrk.endoscope import BASELINE, StereoCamera, optical_in_roll
+from robots.dvrk.inverse import inverse
 from schemas.vectors import Vector
 
 CAMERA = StereoCamera()
@@ -54,3 +55,13 @@ def test_an_endoscope_looks_up_or_down_in_its_own_picture(endoscope: ecm.Endosco
 
 def test_the_view_of_a_straight_endoscope_is_a_quarter_turn_from_the_roll_link() -> None:
     assert optical_in_roll("straight")[:2, :2] == pytest.approx(np.array([[0.0, -1.0], [1.0, 0.0]]), abs=pi * 1e-16)
+
+
+@pytest.mark.parametrize("endoscope", ["straight", "up", "down"])
+def test_in_the_frame_of_the_view_x_is_left_and_y_up_in_the_picture_and_poses_come_back(endoscope: ecm.Endoscope) -> None:
+    chain, q = ecm.chain(endoscope, "view"), np.array([0.2, -0.1, 0.12, 0.3])
+    pose = chain.forward(q)
+    picture = ecm.chain("straight").forward(q) @ optical_in_roll(endoscope)
+    assert pose[:3, :3] == pytest.approx(picture[:3, :3] * [-1.0, -1.0, 1.0])
+    assert pose[:3, 3] == pytest.approx(picture[:3, 3])
+    assert inverse(chain, pose, q) == pytest.approx(q)

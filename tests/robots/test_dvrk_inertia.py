@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from robots.dvrk import drives, dynamics, identified, inertia
 from robots.dvrk.inertia import Inertia
 from robots.dvrk.instruments import instrument, instruments
+from schemas.errors import MotionError
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "reference_dynamics.json").read_text())
 CASES = pytest.mark.parametrize("case", REFERENCE["cases"], ids=lambda case: str(case["q"]))
@@ -109,3 +110,10 @@ def test_every_instrument_has_drives_for_all_it_moves(tool):
     assert set(found) == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *grasping}
     assert all(drive.stiffness > 0 and drive.damping > 0 and drive.effort > 0 and drive.velocity > 0 for drive in found.values())
     assert all(set(disc.shares) <= set(found) for disc in drives.discs(tool))
+
+
+@pytest.mark.parametrize(("q", "reason"), [(np.zeros(5), "expected 6: yaw"), (np.full(6, np.nan), "not all positions are finite")])
+def test_there_are_no_dynamics_of_what_is_no_configuration(q, reason):
+    for ask in (PSM.inertia_matrix, PSM.gravity):
+        with pytest.raises(MotionError, match=reason):
+            ask(q)

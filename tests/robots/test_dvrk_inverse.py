@@ -120,6 +120,30 @@ def test_what_is_not_finite_is_refused(chain, near):
         inverse(chain, pose, near)
 
 
+MIRROR = np.diag([1.0, 1.0, -1.0, 1.0])
+SEVERAL = np.broadcast_to(np.eye(4), (2, 4, 4))
+
+
+@pytest.mark.parametrize(
+    ("pose", "near", "reason"),
+    [
+        (np.eye(3), HOME, r"pose of shape \(3, 3\), expected \(..., 4, 4\)"),
+        (np.zeros(6), HOME, r"pose of shape \(6,\), expected"),
+        (np.eye(4), HOME[:4], r"`near` of shape \(4,\), expected \(6,\): yaw, pitch"),
+        (np.eye(4), 0.0, r"`near` of shape \(\), expected \(6,\): yaw, pitch"),
+        (SEVERAL, np.zeros((3, 6)), r"`near` of shape \(3, 6\), expected \(6,\) or \(2, 6\): yaw, pitch"),
+        (np.eye(4), HOME + np.inf, "not finite"),
+        (np.eye(4) + 1e300 * np.eye(4, k=3), HOME, "more than 1000 m away"),
+        (MIRROR, HOME, "is no rigid transform: .*rotation matrix"),
+        (np.eye(4) * 2.0, HOME, "is no rigid transform"),
+        (np.stack([PSM.forward(HOME), np.zeros((4, 4))]), HOME, "pose 1 is no rigid transform"),
+    ],
+)
+def test_what_is_no_pose_or_no_configuration_is_refused_with_what_is_one(pose, near, reason):
+    with np.errstate(invalid="ignore"), pytest.raises(MotionError, match=reason):
+        inverse(PSM, pose, near)
+
+
 @pytest.mark.parametrize(("arm", "tool"), [("MTML", None), ("SUJ/PSM1", None), ("PSM1", "400117")])
 def test_chains_of_another_kind_are_refused(arm, tool):
     chain = arms.chain(arm, tool)

@@ -112,3 +112,17 @@ def test_positions_at_the_limits_can_be():
     chain = CHAINS["PSM1"]
     chain.check(chain.lower)
     chain.check(chain.upper)
+
+
+@pytest.mark.parametrize("call", [CHAINS["PSM1"].forward, CHAINS["PSM1"].frames])
+@pytest.mark.parametrize("shape", [(), (5,), (3, 7)])
+def test_another_number_of_joints_has_no_pose(call, shape):
+    with pytest.raises(MotionError, match="expected 6: yaw, pitch, insertion, roll"):
+        call(np.zeros(shape))
+
+
+def test_a_pose_of_what_is_not_finite_is_refused_naming_the_first():
+    q = np.zeros((3, 6))
+    q[1, 2] = np.nan
+    with np.errstate(invalid="ignore"), pytest.raises(MotionError, match=r"\[0.0, 0.0, nan, 0.0, 0.0, 0.0\] of yaw, pitch"):
+        CHAINS["PSM1"].forward(q)

@@ -31,7 +31,7 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
     for mesh in root.findall("asset/mesh"):
         del mesh.attrib["vertex"], mesh.attrib["face"]
         mesh.set("file", file_of(mesh.attrib["name"]))
-    by_tag = {"body": spec.body, "joint": spec.joint, "site": spec.site, "geom": spec.geom, "general": spec.actuator}
+    by_tag = {"body": spec.body, "joint": spec.joint, "site": spec.site, "geom": spec.geom, "general": spec.actuator, "key": spec.key}
     for element in root.iter():
         if element.tag in by_tag and (name := element.get("name")):
             _restore(element, by_tag[element.tag](name), {})

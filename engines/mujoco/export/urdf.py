@@ -1,8 +1,10 @@
 """The model as URDF.
 
 A link is called `<arm>_<link>_link`, its joint `<arm>_<link>`. The bars of the linkage mimic the pitch or the insertion. The two fingers mimic a
-joint `<arm>_jaw`, which moves a link without mass or shape: its position is the angle between them. What can be moved about freely and
+joint `<arm>_jaw`, which moves a link without shape: its position is the angle between them. What can be moved about freely and
 the world's own shapes are left out, a URDF being one robot.
+
+Links that stand for a frame alone have all but no mass: PyBullet takes one without inertia for 1 kg, and MuJoCo refuses it where it moves.
 """
 
 from __future__ import annotations
@@ -22,12 +24,16 @@ __all__ = ["urdf"]
 
 _KINDS = {mujoco.mjtJoint.mjJNT_HINGE: "revolute", mujoco.mjtJoint.mjJNT_SLIDE: "prismatic"}
 _WORLD = "world"
+_FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-9
+"""kg, kg m^2, of a link that stands for a frame: less than a fifth of the lightest link, the wrist yaw with 6.6e-6 kg."""
+_AT_ORIGIN, _UPRIGHT = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def urdf(spec: mujoco.MjSpec) -> Element:
     """Return the root element `robot` of the model's URDF, whose meshes are files in `FOLDER`."""
     model = spec.compile()
     robot = Element("robot", name=spec.modelname)
+    SubElement(SubElement(robot, "mujoco"), "compiler", strippath="false", discardvisual="false")  # what MuJoCo needs to read it as it is
     SubElement(robot, "link", name=_WORLD)
     for body in spec.bodies[1:]:
         if any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints):
@@ -47,11 +53,7 @@ def _add_link(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: 
     link = SubElement(robot, "link", name=_link(body.name))
     compiled = model.body(body.name)
     if mass := float(compiled.mass[0]):
-        inertial = SubElement(link, "inertial")
-        _add_origin(inertial, compiled.ipos, compiled.iquat)
-        SubElement(inertial, "mass", value=repr(mass))
-        xx, yy, zz = compiled.inertia.tolist()
-        SubElement(inertial, "inertia", ixx=repr(xx), iyy=repr(yy), izz=repr(zz), ixy="0", ixz="0", iyz="0")
+        _add_inertial(link, mass, compiled.inertia, compiled.ipos, compiled.iquat)
     for geom in body.geoms:
         shape = SubElement(link, "collision" if geom.contype or geom.conaffinity else "visual")
         _add_shape(shape, geom)
@@ -60,6 +62,18 @@ def _add_link(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: 
             rgba = geom.rgba if surface is None else surface.rgba
             material = SubElement(shape, "material", name="_".join(f"{round(255 * channel)}" for channel in rgba))
             SubElement(material, "color", rgba=numbers(rgba))
+
+
+def _add_inertial(link: Element, mass: float, moments: Vector, pos: Vector = _AT_ORIGIN, quat: Vector = _UPRIGHT) -> None:
+    inertial = SubElement(link, "inertial")
+    _add_origin(inertial, pos, quat)
+    SubElement(inertial, "mass", value=repr(mass))
+    xx, yy, zz = (repr(float(moment)) for moment in moments)
+    SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
+
+
+def _add_frame_link(robot: Element, name: str) -> None:
+    _add_inertial(SubElement(robot, "link", name=name), _FRAME_MASS, np.full(3, _FRAME_INERTIA))
 
 
 def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
@@ -120,7 +134,7 @@ def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str) -
 def _add_jaw(robot: Element, spec: mujoco.MjSpec, arm: str) -> None:
     left = spec.body(f"{arm}/{FINGERS[0]}")
     name = f"{arm}/jaw"
-    SubElement(robot, "link", name=_link(name))
+    _add_frame_link(robot, _link(name))
     joint = SubElement(robot, "joint", name=_joint(name), type="revolute")
     SubElement(joint, "parent", link=_link(left.parent.name))
     SubElement(joint, "child", link=_link(name))
@@ -131,7 +145,7 @@ def _add_jaw(robot: Element, spec: mujoco.MjSpec, arm: str) -> None:
 def _add_frame(robot: Element, model: mujoco.MjModel, body: mujoco.MjsBody, site: mujoco.MjsSite) -> None:
     """Add a link without mass or shape where a site is, such as the tip of an arm."""
     name = site.name.replace("/", "_")
-    SubElement(robot, "link", name=name)
+    _add_frame_link(robot, name)
     joint = SubElement(robot, "joint", name=f"{name}_fixed", type="fixed")
     compiled = model.site(site.name)
     _add_origin(joint, compiled.pos, compiled.quat)

@@ -36,10 +36,7 @@ def _base() -> tuple[Part, ...]:
     deck = plate("z", symmetric(half, 0.03), -0.105, 0.0)
     housing = plate("z", symmetric([(0.25, -0.53), (0.29, -0.40), (0.24, -0.10)], 0.04), -0.01, 0.30, 0.03)
     skirt = plate("z", symmetric([(0.16, -0.14), (0.13, 0.02)]), -0.01, 0.10, 0.012)
-    casters = [
-        union(rod((x - 0.022, y, _FLOOR + 0.05), (x + 0.022, y, _FLOOR + 0.05), 0.05), rod((x, y, -0.11), (x, y, -0.09), 0.03))
-        for x, y in ((-0.36, 0.28), (0.36, 0.28), (-0.30, -0.48), (0.30, -0.48))
-    ]
+    casters = [rod((x - 0.022, y, _FLOOR + 0.05), (x + 0.022, y, _FLOOR + 0.05), 0.05) for x, y in ((-0.36, 0.28), (0.36, 0.28), (-0.30, -0.48), (0.30, -0.48))]
     panel = block((-0.10, -0.535, 0.08), (0.10, -0.525, 0.24))
     return part("deck", deck, GREY), part("housing", union(housing, skirt), IVORY), part("casters", union(*casters), BLACK), part("panel", panel, SLATE)
 

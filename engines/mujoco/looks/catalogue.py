@@ -40,17 +40,21 @@ def parts(what: str) -> Looks:
 
 @cache
 def collision(what: str) -> Collisions:
-    """Return what collides of `what` by body: `psm`, `ecm` or `instrument/<name or number>`, in the same frames as `parts`.
+    """Return what collides of `what` by body: of what `parts` knows, in the same frames.
 
     Raises:
-        MotionError: no such instrument, or nothing of this name that collides.
+        MotionError: no such instrument, or nothing of this name.
     """
     if what.startswith(_INSTRUMENT):
         return contact.instrument(instrument(what.removeprefix(_INSTRUMENT)))
-    if what not in ("psm", "ecm"):
+    for arm in get_args(CartArm):
+        if what == f"suj/{arm}":
+            return contact.setup_joint(arm)
+    simple = {"psm": contact.psm, "ecm": contact.ecm, "cart": contact.cart}
+    if what not in simple:
         raise _nothing(what)
-    return contact.psm() if what == "psm" else contact.ecm()
+    return simple[what]()
 
 
 def _nothing(what: str) -> MotionError:
-    return MotionError(f"no look of '{what}': there are psm, ecm, cart, suj/<arm> and instrument/<name or number>; the last and the arms collide")
+    return MotionError(f"no look of '{what}': there are psm, ecm, cart, suj/<arm> and instrument/<name or number>")

@@ -1,27 +1,42 @@
-"""What of arms and instruments collides: convex hulls of the links' covers, capsules for shafts, boxes for fingers."""
+"""What collides: convex hulls of the covers of arms, setup joints and cart, capsules for shafts, boxes for fingers."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from engines.mujoco.looks import cart as cart_look
 from engines.mujoco.looks import ecm as ecm_look
 from engines.mujoco.looks import fingers, instruments, musha
 from engines.mujoco.looks import psm as psm_look
+from engines.mujoco.looks import setup_joints as setup_look
 from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
-from engines.mujoco.looks.solids import hull, part
+from engines.mujoco.looks.solids import hull
 from robots.dvrk import psm as psm_arm
 from robots.dvrk.instruments import SHAFT_RADIUS, WRIST_RADIUS, Instrument
+from robots.dvrk.setup_joints import CartArm
 
-__all__ = ["ecm", "instrument", "psm"]
+__all__ = ["cart", "ecm", "instrument", "psm", "setup_joint"]
 
 _ECM_SHAFT_RADIUS = 0.006
 _THIN = ("cannula", "endoscope_shaft")
 """Parts that a hull of the whole link would swell."""
+_BULK = ("column", "housing", "deck")
+"""Parts of the cart that enclose the others, each with a hull of its own."""
+
+
+def cart() -> Collisions:
+    """Return what collides of the cart."""
+    return {body: tuple(_hull(p.name, (p,)) for p in shown if p.name in _BULK) for body, shown in cart_look.parts().items()}
+
+
+def setup_joint(arm: CartArm) -> Collisions:
+    """Return what collides of the setup joint that carries `arm`."""
+    return {body: (_hull(body, shown),) for body, shown in setup_look.parts(arm).items() if shown}
 
 
 def psm() -> Collisions:
     """Return what collides of a PSM without its instrument."""
-    return {body: (_hull(body, shown),) for body, shown in psm_look.parts().items() if body != "counterweight"}
+    return {body: (_hull(body, shown),) for body, shown in psm_look.parts().items()}
 
 
 def ecm() -> Collisions:
@@ -33,7 +48,7 @@ def ecm() -> Collisions:
 
 
 def instrument(tool: Instrument) -> Collisions:
-    """Return what collides of an instrument in its PSM: housing, shaft, wrist and fingers."""
+    """Return what collides of an instrument in its PSM: housing, shaft, wrist, and fingers or electrode."""
     looks: Looks = instruments.parts(tool)
     frames = psm_arm.chain(tool).frames(np.zeros(3 + len(tool.joints)))
     if tool.hand is not None:
@@ -45,6 +60,7 @@ def instrument(tool: Instrument) -> Collisions:
         "insertion": (_hull("housing", looks["insertion"]),),
         "roll": (_upright("shaft", SHAFT_RADIUS, pitch, float(looks["roll"][0].vertices[:, 2].max())),),
         tool.joints[1].name: (_upright("wrist", WRIST_RADIUS, yaw, pitch),),
+        tool.joints[-1].name: (_hull(tool.joints[-1].name, looks[tool.joints[-1].name]),),
     }
     if tool.jaw is not None:
         form, pose = fingers.shape(tool, tool.jaw), instruments.finger_frame(tool)
@@ -55,7 +71,7 @@ def instrument(tool: Instrument) -> Collisions:
 
 def _hull(name: str, shown: tuple[Part, ...]) -> Part:
     points = np.concatenate([p.vertices for p in shown if p.name not in _THIN])
-    return part(f"{name}_hull", hull(points), shown[0].material)
+    return hull(f"{name}_hull", points, shown[0].material)
 
 
 def _upright(name: str, radius: float, low: float, high: float) -> Primitive:

@@ -2,7 +2,7 @@
 
 Like the PSM, but the front link drives and holds the motors, and the camera's head hangs on the column. Outer dimensions: bounding
 boxes of the CAD meshes in jhu-dvrk/dvrk_model (Classic ECM) and of its endoscope; pivots: `robots.dvrk.linkage`; shapes between
-them are ours, after photographs.
+them are ours, after the general appearance of the arm.
 """
 
 from __future__ import annotations

@@ -72,8 +72,8 @@ def _housing() -> tuple[Part, ...]:
 def _shaft(pitch: Vector) -> tuple[Part, ...]:
     """Shaft down to the clevis about the wrist pitch axis, which is z of `pitch`, shape (4, 4)."""
     height = pitch[2, 3]
-    tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=14)
-    core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=14)
+    tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=12)
+    core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=12)
     slot = placed(block((-0.01, -0.01, -0.01), (0.01, 0.01, 0.0028)) ^ block((-0.0021, -1.0, -1.0), (0.0021, 1.0, 1.0)), _drawing(pitch), pitch[:3, 3])
     flats = [block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0)) for side in (-1.0, 1.0)]
     ears = core - slot - placed(union(*flats), _drawing(pitch), pitch[:3, 3])
@@ -103,7 +103,7 @@ def _affine(rotation: Vector, frame: Vector) -> Vector:
 
 def _pin(name: str, frame: Vector) -> Part:
     """Pin of the wrist yaw."""
-    pin = rod((0.0, 0.0, -0.0034), (0.0, 0.0, 0.0034), 0.0011, segments=10)
+    pin = rod((0.0, 0.0, -0.0034), (0.0, 0.0, 0.0034), 0.0011)
     return part(name, placed(pin, frame[:3, :3], frame[:3, 3]), STEEL)
 
 

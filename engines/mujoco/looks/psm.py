@@ -3,7 +3,7 @@
 Seen from the side: a cradle on the mount carries the yaw link, a trough that swings in it; two pairs of bars lead from the
 motor block in the trough to the column, along which the carriage with the instrument slides. Outer dimensions: bounding boxes of
 the CAD meshes in WPI-AIM/dvrk_env and med-air/SurRoL (the same CAD) and of the shapes in unina-icaros/dvrk-vrep; pivots:
-`robots.dvrk.linkage`; shapes between them are ours, after photographs.
+`robots.dvrk.linkage`; shapes between them are ours, after the general appearance of the arm.
 """
 
 from __future__ import annotations
@@ -52,8 +52,7 @@ def _base() -> tuple[Part, ...]:
     stand = plate("x", outline([(-0.766, -0.1524), (-0.684, -0.1524), (-0.684, 0.0), (-0.766, 0.0)], 0.01), -0.058, 0.058, 0.008)
     drum = turned([(0.0, 0.0), (0.055, 0.0), (0.067, 0.012), (0.067, 0.096), (0.0, 0.096)], (0.0, -0.776, 0.0), (0.0, 1.0, 0.0))
     cap = rod((0.0, -0.370, 0.0), (0.0, -0.3665, 0.0), 0.028)
-    mount = rod((0.0, -0.4864, -0.1524), (0.0, -0.4864, -0.136), 0.046)
-    return part("base", union(foot, front, mount), GREY), part("base_drum", union(stand, drum), IVORY), part("base_cap", cap, DARK)
+    return part("base", union(foot, front), GREY), part("base_drum", union(stand, drum), IVORY), part("base_cap", cap, DARK)
 
 
 def _yaw() -> tuple[Part, ...]:
@@ -63,9 +62,9 @@ def _yaw() -> tuple[Part, ...]:
     trough = plate("y", outline(section), -0.677, -0.381) - plate("y", outline(inside), -0.656, -0.397)
     sweep = plate("x", outline([(-0.70, 0.05), (-0.70, -0.045), (-0.60, -0.045), (-0.55, 0.05)], 0.015), -0.1, 0.1)
     chest = plate("x", outline([(-0.37, 0.05), (-0.405, 0.05), (-0.36, -0.02)]), -0.1, 0.1)
-    bearings = [rod((0.0, -0.684, 0.0), (0.0, -0.655, 0.0), 0.050), rod((0.0, -0.383, 0.0), (0.0, -0.379, 0.0), 0.034)]
+    bearing = rod((0.0, -0.684, 0.0), (0.0, -0.655, 0.0), 0.050)
     bosses = [cheeks(circle(pivot, radius), 0.0800, 0.0813) for pivot, radius in ((_BACK, 0.0115), (_FRONT, 0.0095))]
-    return part("yaw", trough - sweep - chest, IVORY), part("yaw_bearings", union(*bearings, *bosses), DARK)
+    return part("yaw", trough - sweep - chest, IVORY), part("yaw_bearings", union(bearing, *bosses), DARK)
 
 
 def _pitch_back() -> tuple[Part, ...]:
@@ -127,7 +126,7 @@ def _column() -> tuple[Part, ...]:
     rails = [block((x - 0.004, -0.0365, 0.13), (x + 0.004, -0.0300, 0.530)) for x in (-0.014, 0.014)]
     holder = plate("x", outline([(-0.050, 0.014), (-0.036, 0.014), (0.002, 0.050), (0.002, 0.066), (-0.034, 0.070), (-0.050, 0.060)]), -0.011, 0.011)
     clamp = rod((0.0, 0.0, 0.048), (0.0, 0.0, 0.068), 0.0115)
-    bosses = [cheeks(circle(pin, 0.0130), 0.0388, 0.0393) for pin in (_LOWER, _UPPER)]
+    bosses = [cheeks(circle(pin, 0.0130), 0.0388, 0.0396) for pin in (_LOWER, _UPPER)]
     stripe = block((-0.0391, -0.060, 0.478), (0.0391, -0.046, 0.486))
     return (
         part("column", cover, IVORY),

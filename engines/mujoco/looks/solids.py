@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi, sqrt
 from typing import Literal
 
 import numpy as np
@@ -20,10 +19,14 @@ Point3 = tuple[float, float, float]
 
 _SHARP = 40.0
 """Degrees between two faces above which their edge is drawn sharp: below the 45 degrees of a bevel, above the steps of a round."""
-_CORNER = 8
-"""Segments of a full turn of a rounded corner: two in a right angle."""
-_DEVIATION = 2.0e-3
-"""How far a round of the arms may lie from its circle, m: under a pixel in an image of the whole cart."""
+_CORNER = 4
+"""Segments of a full turn of a rounded corner: a right angle is cut by one."""
+_ROUND, _BOLT, _BOLT_RADIUS = 10, 6, 0.020
+"""Segments of a circle, each turning by less than `_SHARP`, so that it is shaded as a round; below this radius (m) of a bolt's head."""
+_DETAIL, _LENGTH_SHARE, _THICKNESS_SHARE = 7.0e-4, 0.02, 0.25
+"""What a mesh leaves out: details smaller than 0.7 mm, a fifth of a pixel in an image of the whole cart, and than these shares of the part."""
+_FLAT = 1.0e-7
+"""m by which rounding may carry a corner of a hull out of the face it lies in."""
 _TURNS = {
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "y": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
@@ -108,9 +111,10 @@ def union(*solids: Manifold) -> Manifold:
     return Manifold.batch_boolean(solids, OpType.Add)
 
 
-def hull(points: Vector) -> Manifold:
+def hull(name: str, points: Vector, material: Material) -> Part:
     """Return the convex hull of points, shape (n, 3)."""
-    return Manifold.hull_points(points)
+    mesh = Manifold.hull_points(points).simplify(_FLAT).to_mesh64()
+    return Part(name, np.array(mesh.vert_properties[:, :3]), np.array(mesh.tri_verts, dtype=np.int32), material)
 
 
 def placed(solid: Manifold, rotation: Vector, translation: Sequence[float] | Vector = (0.0, 0.0, 0.0)) -> Manifold:
@@ -119,14 +123,17 @@ def placed(solid: Manifold, rotation: Vector, translation: Sequence[float] | Vec
 
 
 def part(name: str, solid: Manifold, material: Material) -> Part:
-    """Return the mesh of `solid`, with a vertex for each side of a sharp edge."""
-    mesh = solid.calculate_normals(0, _SHARP).to_mesh64()
+    """Return the mesh of `solid` without details that nobody sees, with a vertex for each side of a sharp edge."""
+    low, high = np.split(np.array(solid.bounding_box()), 2)
+    extent = (high - low).tolist()
+    plain = solid.simplify(min(_DETAIL, _LENGTH_SHARE * max(extent), _THICKNESS_SHARE * min(extent)))
+    mesh = plain.calculate_normals(0, _SHARP).to_mesh64()
     return Part(name, np.array(mesh.vert_properties[:, :3]), np.array(mesh.tri_verts, dtype=np.int32), material)
 
 
 def _segments(radius: float) -> int:
-    """Return into how many straight pieces a circle is cut: an even number, 10 to 14."""
-    return int(np.clip(2 * round(pi / (2.0 * sqrt(2.0 * _DEVIATION / radius))), 10, 14))
+    """Return into how many straight pieces a circle is cut."""
+    return _BOLT if radius < _BOLT_RADIUS else _ROUND
 
 
 def _turn_to(direction: Vector) -> Vector:

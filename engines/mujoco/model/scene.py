@@ -53,6 +53,7 @@ def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
     if grasping:
         option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
+        option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # dearer than what they save here
 
 
 def _free_pose(params: ArmParams) -> Vector:

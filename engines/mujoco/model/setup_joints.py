@@ -20,8 +20,7 @@ CART = "cart"
 def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[SceneArm, Vector]:
     """Add the cart and the setup joint of every arm in `scene`; return the poses of the arms' base frames in the world, shape (4, 4)."""
     cart = spec.worldbody.add_body(name=CART)
-    if scene.looks:
-        shapes.add_looks(spec, "cart", {CART: (cart, np.eye(4))})
+    shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=scene.looks)
     mounts: dict[SceneArm, Vector] = {}
     for arm in scene.arms:
         chain = setup_joints.chain(arm)
@@ -31,6 +30,5 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[SceneArm, Vector]:
         for joint, pose, zero in zip(setup_joints.JOINT_NAMES, poses, drawn[:-1], strict=True):
             body = body.add_body(name=f"SUJ/{arm}/{joint}", **transform.placed(inverse_pose(above) @ pose))
             bodies[joint], above = (body, zero), pose
-        if scene.looks:
-            shapes.add_looks(spec, f"suj/{arm}", bodies)
+        shapes.add(spec, f"suj/{arm}", f"SUJ/{arm}", bodies, seen=scene.looks)
     return mounts
