@@ -12,7 +12,7 @@ from robots.dvrk.instruments import instrument
 from schemas.errors import MotionError
 from schemas.quantity import Angle, Length
 
-__all__ = ["ArmName", "MountedPositions", "PsmPositions", "UnitQuaternion", "home"]
+__all__ = ["ArmName", "HandPositions", "MountedPositions", "PsmPositions", "UnitQuaternion", "home"]
 
 ArmName = Literal["PSM1", "PSM2", "PSM3"]
 
@@ -39,6 +39,9 @@ MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Leng
 
 UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
 """A rotation as quaternion (x, y, z, w)."""
+
+HandPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+"""Closings, then spreads, of three fingers."""
 
 
 def home(arm: dict[str, Any]) -> MountedPositions:
