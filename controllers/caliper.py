@@ -58,11 +58,11 @@ class Caliper(Stepped):
     def ports(self) -> tuple[Port, ...]:
         """What hand and tissue say in; the command to the fingers and the widths out."""
         state, number = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
-        motors, bones, everything = tuple(joint.name for joint in HAND.joints), tuple(link.name for link in HAND.links), ("position", "velocity", "effort")
+        motors, bones = tuple(joint.name for joint in HAND.joints), tuple(link.name for link in HAND.links)
         return (
             Port(name="start", causality="input", type=number, start=(0.0,), description="1: measure"),
-            Port(name="hand", causality="input", type=state, names=motors, fields=everything, description="its measured_js"),
-            Port(name="phalanges", causality="input", type=state, names=bones, fields=everything, description="their measured_js"),
+            Port(name="hand", causality="input", type=state, names=motors, fields=("position", "velocity", "effort"), description="its measured_js"),
+            Port(name="phalanges", causality="input", type=state, names=bones, fields=("position", "velocity", "effort"), description="their measured_js"),
             Port(name="position", causality="input", size=3 * _SPHERES, unit="m", frame="world", description="of the hand's contact spheres"),
             Port(name="force", causality="input", size=3 * _SPHERES, unit="N", frame="world", description="on the hand's contact spheres"),
             Port(name="nodes", causality="input", type=SoftBodyState.ros_type, frame="world", description="of the organ"),

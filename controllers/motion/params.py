@@ -51,7 +51,7 @@ class PsmParams(ArmParams):
     instrument: Annotated[str, AfterValidator(_known)] = Field(default="palpation-probe", description="name or number, such as 400006")
     start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of the fingers of a hand at time 0; default: folded")
+    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
