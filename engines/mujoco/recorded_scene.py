@@ -61,7 +61,7 @@ class RecordedScene:
             camera: `left` or `right` of the endoscope, or `overview`.
             size: width and height, pixels.
             position: where the overview looks from, m in the world; by default from above and aside.
-            target: where it looks at, m in the world; by default at the soft bodies and objects.
+            target: where it looks at, m in the world; by default at where the soft bodies and objects began.
 
         Raises RecordingError if the recording does not say what is asked, TrocarError if nothing can be drawn on this machine.
         """
@@ -117,7 +117,7 @@ class RecordedScene:
     def _overview(self, bodies: Mapping[str, SoftBody], position: Point | None, target: Point | None) -> ViewParams | None:
         if position is not None and target is not None:
             return ViewParams(position=position, target=target)
-        points = [body.nodes.astype(np.float64) for body in bodies.values()]
+        points = [body.rest.astype(np.float64) for body in bodies.values()]
         points += [np.array([thing["position"]]) for thing in self._scene["objects"].values()]
         if not points:
             raise RecordingError(f"'{self._recording.file}': neither soft bodies nor objects to look at; say where the overview looks, from where and at what")
