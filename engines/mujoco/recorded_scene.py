@@ -29,7 +29,7 @@ Point = tuple[float, float, float]
 
 _ASIDE = np.array([0.5, -0.72, 0.48])
 """Direction from which the overview looks: between the axes and from above, so that three sides of a box are seen."""
-_DISTANCE, _LEAST = 1.8, 0.08
+_DISTANCE, _LEAST = 1.4, 0.1
 """Of the overview, in diagonals of what is looked at; the least diagonal, m."""
 _LENS = ("field_of_view", "baseline", "near", "far")
 _OVERSAMPLING = 2
