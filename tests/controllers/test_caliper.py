@@ -4,9 +4,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.caliper import Caliper, CaliperParams, width_of_mesh
+from controllers.motion.controller import MotionController
+from controllers.motion.params import MotionParams
+from controllers.routine import Routine, RoutineParams
+from engines.bullet.engine import BulletEngine, BulletParams
+from engines.mujoco.engine import MujocoEngine
+from engines.mujoco.params import MujocoParams
 from hub.inputs import Inputs
 from hub.participant import Setup
-from hub.testing import check_engine
+from hub.testing import check_engine, run_in_process
 from robots.dvrk.musha import HAND
 from schemas.errors import SessionError, StateError
 from schemas.ros import Header
@@ -101,3 +107,37 @@ def test_the_width_of_a_box_is_its_edge_wherever_it_is_measured(z, x):
 
 def test_a_line_that_misses_has_no_width():
     assert width_of_mesh(CORNERS[BOX], np.array([0.5, -1.0, 0.0]), np.array([0.5, 1.0, 0.0])) == 0.0
+
+
+def test_a_block_is_measured_through_both_engines():
+    """The scenario `caliper` in small: 40 mm of soft tissue, in one process."""
+    scenario = {
+        "name": "caliper",
+        "step": "0.5 ms",
+        "duration": "1.3 s",
+        "order": ["tissue", "caliper", "motion", "robot"],
+        "connections": [
+            *("caliper.* -> motion.*", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*", "tissue.hand/force -> caliper.force"),
+            *("robot.PSM1/hand/measured_js -> caliper.hand", "robot.PSM1/hand/phalanges/measured_js -> caliper.phalanges"),
+            *("robot.PSM1/contact/position -> caliper.position", "tissue.block/nodes -> caliper.nodes", "clock.done -> caliper.start"),
+        ],
+        "bonds": [{"motion": "robot.PSM1/contact", "force": "tissue.hand", "algorithm": "impulse"}],
+        "measure": {"width": {"kind": "final", "of": "caliper.width"}, "true_width": {"kind": "final", "of": "caliper.true_width"}},
+    }
+    arm = {"instrument": "MUSHA_HAND", "position": [0, 0, "153 mm"], "start": [0, 0, 0.13, 0], "hand": HAND.command("caliper", 0.25).tolist()}
+    block = {"size": ["30 mm", "40 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": 60}
+    participants = {
+        "clock": Routine("clock", RoutineParams.model_validate({"steps": [{"do": "wait", "time": 0}]})),
+        "caliper": Caliper("caliper", CaliperParams(arm="PSM1", rate=0.25)),
+        "motion": MotionController("motion", MotionParams.model_validate({"mounting": "free", "initial_state": "homed", "arms": {"PSM1": arm}})),
+        "robot": MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": arm}, "looks": False})),
+        "tissue": BulletEngine(
+            "tissue",
+            BulletParams.model_validate(
+                {"timestep": "0.5 ms", "organs": {"block": block}, "probes": {"hand": {"spheres": 9, "radius": "2.4 mm", "stiffness": "500 N/m"}}}
+            ),
+        ),
+    }
+    measured = run_in_process(scenario, participants).measures
+    assert measured["true_width"] == pytest.approx(0.04, rel=0.01)
+    assert measured["width"] == pytest.approx(measured["true_width"], rel=0.05)
