@@ -84,25 +84,22 @@ class Grasp:
         self._rest = [organ.nodes[:, 2].copy() for organ in organs]
         self._holds: list[_Hold] = []
         self._widest = 0.0
-        """Spread of the fingers when they were widest since they touch tissue, or when they took hold of it, m."""
+        """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when they took hold, m."""
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
         self.outputs: dict[str, Value] = {}
         self._say(())
 
     def update(self, t: int, *, looked: bool) -> None:
-        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes are those of now."""
-        spread = self._spread()
+        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches them, are those of now."""
         events: tuple[TissueGrasp, ...] = ()
         if self._holds:
             self._pull[:] = self._probe.forces[self._probe.held].sum(axis=0)
-            if spread > self._widest + _CLOSING_M:
-                events = self._let_go("released", t)
-            elif float(np.linalg.norm(self._pull)) > self._params.hold:
+            if float(self._pull @ self._pull) > self._params.hold**2:
                 events = self._let_go("torn", t)
+            elif looked:
+                events = self._watch_hold(t)
         elif looked:
-            events = self._watch(spread, t)
-        if looked and self._holds:
-            self._lift[0] = np.concatenate([hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]).mean()
+            events = self._watch(t)
         self._say(events)
 
     @property
@@ -115,12 +112,20 @@ class Grasp:
         middles = self._probe.targets[self._spheres].mean(axis=1)  # (fingers, 3)
         return float(np.linalg.norm(middles - middles.mean(axis=0), axis=1).mean())
 
-    def _watch(self, spread: float, t: int) -> tuple[TissueGrasp, ...]:
+    def _watch_hold(self, t: int) -> tuple[TissueGrasp, ...]:
+        """Let go if the fingers have opened; else see how far the tissue is lifted."""
+        if self._spread() > self._widest + _CLOSING_M:
+            return self._let_go("released", t)
+        self._lift[0] = np.concatenate([hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]).mean()
+        return ()
+
+    def _watch(self, t: int) -> tuple[TissueGrasp, ...]:
         """Take hold if at least two fingers touch tissue, have closed since they do, and cannot close any further."""
         touching = self._probe.touching[self._spheres].max(axis=1)
         if touching.sum() < 2:
             self._widest = 0.0
             return ()
+        spread = self._spread()
         self._widest = max(self._widest, spread)
         if spread > self._widest - _CLOSING_M:
             return ()
