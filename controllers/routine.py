@@ -77,7 +77,7 @@ class MoveHand(_Order):
 
     def message(self) -> tuple[str, Message]:
         """Return port and message."""
-        return f"{self.arm}/hand/move_jp", JointState(position=HAND.closings(self.mode, self.closing))
+        return f"{self.arm}/hand/move_jp", JointState(position=HAND.command(self.mode, self.closing))
 
 
 class ChangeState(_Order):

@@ -113,7 +113,7 @@ class MotionSide:
             self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
     def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
-        """Return the force (N, N m; shape (size,)) on this side in a sub-step around `tau`, given where it is now."""
+        """Return the force (N, N m; shape (size,)) on this side in the sub-step that begins `tau` seconds into the step, given where it is then."""
         if self._correction is None:
             return self._reaction
         c, force = self._correction, self._reaction.copy()

@@ -73,6 +73,8 @@ class BondSide(BaseModel):
     """Force side: damping b of the virtual coupling, N s/m."""
     proxy_mass: float | None = None
     """Force side: mass of the proxy, kg."""
+    proxy_step: float = 0.0
+    """Force side: sub-step in which the proxy moves, s; 0: it moves continuously."""
     contact_stiffness: float | None = None
     """Force side: estimate of what the proxy presses on, N/m."""
     effective_mass: float | None = None

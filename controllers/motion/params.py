@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import instrument
-from robots.dvrk.parameters import EcmPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
+from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import Joint, SerialChain
 from schemas.quantity import Angle, Duration, Length
@@ -42,7 +42,7 @@ class PsmParams(ArmParams):
     instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
     start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: tuple[Angle, Angle, Angle] = Field(default=(0.0, 0.0, 0.0), description="closings of the fingers of a hand at time 0; default: folded")
+    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:

@@ -92,7 +92,7 @@ class _Touch:
 
 
 class Contacts:
-    """Sets the gains of all spheres on all organs."""
+    """Sees which spheres touch organs, and sets their gains."""
 
     def __init__(self, tissues: Sequence[Tissue]) -> None:
         """Take the organs."""
@@ -104,6 +104,7 @@ class Contacts:
         for probe in probes:
             for sphere in range(len(probe.radii)):
                 found = [] if probe.held[sphere] else [(touch.distance, i, touch) for i, t in enumerate(self._tissues) if (touch := _touch(t, probe, sphere))]
+                probe.touching[sphere] = bool(found)
                 if found:
                     _, i, touch = min(found, key=lambda item: item[:2])
                     touches[i].append(touch)

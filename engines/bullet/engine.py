@@ -187,6 +187,7 @@ class BulletEngine(Stepped):
             stiffness=coupling.stiffness,
             damping=coupling.damping,
             proxy_mass=coupling.mass,
+            proxy_step=self.params.timestep * 1e-9,
             contact_stiffness=self._contact_stiffness(probe),
         )
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from engines.bullet.contact import closest_points
 from engines.bullet.organ import Organ
 from hub.participant import Value
 from schemas.ports import Port
@@ -36,9 +35,6 @@ _SHUT_M = 0.5e-3
 
 _SQUEEZE_N = 0.1
 """Force with which tissue between fingers keeps each of them from closing, from which on they have it."""
-
-_TOUCH_M = 0.6e-3
-"""Gap to a face of an organ up to which a sphere counts as touching it: the band in which `contact` lets faces share its force."""
 
 
 class GraspParams(BaseModel):
@@ -88,25 +84,22 @@ class Grasp:
         self._rest = [organ.nodes[:, 2].copy() for organ in organs]
         self._holds: list[_Hold] = []
         self._widest = 0.0
-        """Spread of the fingers when they were widest since they touch tissue, or when they took hold of it, m."""
+        """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when they took hold, m."""
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
         self.outputs: dict[str, Value] = {}
         self._say(())
 
     def update(self, t: int, *, looked: bool) -> None:
-        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes are those of now."""
-        spread = self._spread()
+        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches them, are those of now."""
         events: tuple[TissueGrasp, ...] = ()
         if self._holds:
             self._pull[:] = self._probe.forces[self._probe.held].sum(axis=0)
-            if spread > self._widest + _CLOSING_M:
-                events = self._let_go("released", t)
-            elif float(np.linalg.norm(self._pull)) > self._params.hold:
+            if float(self._pull @ self._pull) > self._params.hold**2:
                 events = self._let_go("torn", t)
+            elif looked:
+                events = self._watch_hold(t)
         elif looked:
-            events = self._watch(spread, t)
-        if looked and self._holds:
-            self._lift[0] = np.concatenate([hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]).mean()
+            events = self._watch(t)
         self._say(events)
 
     @property
@@ -119,12 +112,20 @@ class Grasp:
         middles = self._probe.targets[self._spheres].mean(axis=1)  # (fingers, 3)
         return float(np.linalg.norm(middles - middles.mean(axis=0), axis=1).mean())
 
-    def _watch(self, spread: float, t: int) -> tuple[TissueGrasp, ...]:
+    def _watch_hold(self, t: int) -> tuple[TissueGrasp, ...]:
+        """Let go if the fingers have opened; else see how far the tissue is lifted."""
+        if self._spread() > self._widest + _CLOSING_M:
+            return self._let_go("released", t)
+        self._lift[0] = np.concatenate([hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]).mean()
+        return ()
+
+    def _watch(self, t: int) -> tuple[TissueGrasp, ...]:
         """Take hold if at least two fingers touch tissue, have closed since they do, and cannot close any further."""
-        touching = self._touching()
+        touching = self._probe.touching[self._spheres].max(axis=1)
         if touching.sum() < 2:
             self._widest = 0.0
             return ()
+        spread = self._spread()
         self._widest = max(self._widest, spread)
         if spread > self._widest - _CLOSING_M:
             return ()
@@ -135,13 +136,6 @@ class Grasp:
         if self._gap(touching) <= _SHUT_M:
             return self._take(touching, outward, spread, t)
         return ()
-
-    def _touching(self) -> NDArray[np.bool_]:
-        """Return which fingers touch an organ, shape (fingers,)."""
-        probe = self._probe
-        reaches = zip(probe.positions, (probe.radii + _TOUCH_M).tolist(), strict=True)
-        near = np.array([any(_is_near(position, reach, organ) for organ in self._organs) for position, reach in reaches])
-        return near[self._spheres].max(axis=1)
 
     def _outward(self) -> Vector:
         """Return the direction from the middle of all fingers to each, shape (fingers, 3)."""
@@ -166,8 +160,8 @@ class Grasp:
             distances = np.linalg.norm(organ.nodes[:, None] - pads, axis=2) - radii  # (n, k)
             nodes = np.flatnonzero((distances.min(axis=1) <= self._reach(organ)) & ~organ.anchored & ~organ.held)
             if nodes.size:
-                nearest = spheres[distances[nodes].argmin(axis=1)]
-                anchors = [organ.anchor(node, probe.bodies[sphere]) for node, sphere in zip(nodes.tolist(), nearest.tolist(), strict=True)]
+                nearest: list[int] = spheres[distances[nodes].argmin(axis=1)].tolist()
+                anchors = [organ.anchor(node, probe.bodies[sphere]) for node, sphere in zip(nodes.tolist(), nearest, strict=True)]
                 self._holds.append(_Hold(organ, nodes, anchors, rest[nodes]))
         if self._holds:
             self._widest = spread
@@ -192,8 +186,9 @@ class Grasp:
         """Let these spheres pass through what they hold, so that all force goes through the anchors, or touch it again."""
         self._probe.held[spheres] = held
         self._probe.gains[spheres] = 1.0
+        numbers: list[int] = spheres.tolist()
         for hold in self._holds:
-            for sphere in spheres.tolist():
+            for sphere in numbers:
                 hold.organ.let_touch(self._probe.bodies[sphere], on=not held)
 
     def _events(self, event: str, t: int) -> tuple[TissueGrasp, ...]:
@@ -204,10 +199,3 @@ class Grasp:
         name = self._probe.name
         self._held[0] = float(bool(self._holds))
         self.outputs = {f"{name}/held": self._held, f"{name}/pull": self._pull, f"{name}/lift": self._lift, f"{name}/events": events}
-
-
-def _is_near(point: Vector, distance: float, organ: Organ) -> bool:
-    """Say whether `point` (m), shape (3,), is no further than `distance` (m) from a face of `organ` that may be touched."""
-    corners = organ.nodes[organ.touchable]  # (f, 3, 3)
-    near = ((corners.min(axis=1) < point + distance) & (corners.max(axis=1) > point - distance)).all(axis=1)
-    return bool(near.any()) and bool((closest_points(point, corners[near])[1] <= distance).any())

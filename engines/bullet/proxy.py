@@ -130,6 +130,8 @@ class Probe:
         """How much the measured gains differ from those that the geometry of the contact suggests, shape (n,)."""
         self.held = np.zeros(n, dtype=np.bool_)
         """Which spheres have tissue anchored to them; anchors lose nothing of a force, so their gain is 1. Shape (n,)."""
+        self.touching = np.zeros(n, dtype=np.bool_)
+        """Which spheres were at an organ when last looked at, shape (n,)."""
         self.contacts = np.zeros((n, 3))
         """Force (N) with which each proxy pressed on what it touched in the last sub-step, as Bullet has it, shape (n, 3)."""
         self._side = ForceSide(bond, plan)

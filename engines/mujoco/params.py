@@ -16,7 +16,7 @@ from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import EcmPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
+from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
 from robots.serial_chain import SerialChain
 from schemas.keys import valid_name
 from schemas.quantity import Angle, Duration, Length
@@ -41,7 +41,7 @@ class PsmParams(ArmParams):
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
     start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: tuple[Angle, Angle, Angle] = Field(default=(0.0, 0.0, 0.0), description="closings of the fingers of a hand at time 0; default: folded")
+    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
 
     @cached_property
     def tool(self) -> Instrument:

@@ -82,12 +82,13 @@ def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
 
 def _hand_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
     if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-        names, still = hand.fingers, (0.0,) * len(hand.fingers)
-        yield Port(name=f"{arm}/hand/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=params.hand, description="goal of their closings")
+        names, still = tuple(motor.name for motor in hand.joints), (0.0,) * len(hand.joints)
+        goal = "goal of closings and spreads"
+        yield Port(name=f"{arm}/hand/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=params.hand, description=goal)
         yield Port(
             name=f"{arm}/hand/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode"
         )
-        closing = "closings of the fingers, and the torques of their motors"
+        closing = "closings of the fingers and positions of their first joints, and the torques of the motors"
         yield Port(name=f"{arm}/hand/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL, description=closing)
         bones = tuple(link.name for link in hand.links)
         yield Port(name=f"{arm}/hand/phalanges/measured_js", causality="output", type=_JOINT_STATE, names=bones, fields=_ALL, description="of each joint")

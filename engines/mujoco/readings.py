@@ -61,7 +61,7 @@ class Readings:
                 jaw = self.outputs[f"{arm}/jaw/measured_js"] = np.empty(3)
                 self._jaws.append((self._sensors[fingers : fingers + 6], jaw))
             elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-                fingers, k, m = int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]), 3 * len(hand.fingers), 3 * len(hand.links)
+                fingers, k, m = int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]), 3 * len(hand.joints), 3 * len(hand.links)
                 self.outputs[f"{arm}/hand/measured_js"] = self._sensors[fingers : fingers + k]
                 self.outputs[f"{arm}/hand/phalanges/measured_js"] = self._sensors[fingers + k : fingers + k + m]
         self._where = np.concatenate(poses)

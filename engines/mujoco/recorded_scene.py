@@ -29,7 +29,7 @@ Point = tuple[float, float, float]
 
 _ASIDE = np.array([0.5, -0.72, 0.48])
 """Direction from which the overview looks: between the axes and from above, so that three sides of a box are seen."""
-_DISTANCE, _LEAST = 1.8, 0.08
+_DISTANCE, _LEAST = 1.4, 0.1
 """Of the overview, in diagonals of what is looked at; the least diagonal, m."""
 _LENS = ("field_of_view", "baseline", "near", "far")
 _OVERSAMPLING = 2
@@ -61,7 +61,7 @@ class RecordedScene:
             camera: `left` or `right` of the endoscope, or `overview`.
             size: width and height, pixels.
             position: where the overview looks from, m in the world; by default from above and aside.
-            target: where it looks at, m in the world; by default at the soft bodies and objects.
+            target: where it looks at, m in the world; by default at where the soft bodies and objects began.
 
         Raises RecordingError if the recording does not say what is asked, TrocarError if nothing can be drawn on this machine.
         """
@@ -117,7 +117,7 @@ class RecordedScene:
     def _overview(self, bodies: Mapping[str, SoftBody], position: Point | None, target: Point | None) -> ViewParams | None:
         if position is not None and target is not None:
             return ViewParams(position=position, target=target)
-        points = [body.nodes.astype(np.float64) for body in bodies.values()]
+        points = [body.rest.astype(np.float64) for body in bodies.values()]
         points += [np.array([thing["position"]]) for thing in self._scene["objects"].values()]
         if not points:
             raise RecordingError(f"'{self._recording.file}': neither soft bodies nor objects to look at; say where the overview looks, from where and at what")

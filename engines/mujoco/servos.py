@@ -63,9 +63,9 @@ class Servos:
                 shares += [(actuator, len(rows), 0.5) for actuator in self._groups[-1].actuators]
                 rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
             elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-                self._add_group(arm, f"{arm}/hand/", list(hand.fingers), len(rows), len(hand.fingers))
+                self._add_group(arm, f"{arm}/hand/", [motor.name for motor in hand.joints], len(rows), len(hand.joints))
                 shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
-                rows += [(u, finger.lower, finger.upper, finger.velocity) for u, finger in zip(params.hand, hand.joints, strict=True)]
+                rows += [(q, motor.lower, motor.upper, motor.velocity) for q, motor in zip(params.hand, hand.joints, strict=True)]
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])

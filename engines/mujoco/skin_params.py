@@ -18,8 +18,8 @@ _COLOURS: dict[str, Rgb] = {
     "adrenal": (0.83, 0.60, 0.28),
     "colon": (0.86, 0.55, 0.48),
     "fat": (0.90, 0.76, 0.42),
-    "kidney": (0.56, 0.22, 0.18),
-    "liver": (0.45, 0.17, 0.13),
+    "kidney": (0.60, 0.24, 0.20),
+    "liver": (0.52, 0.20, 0.15),
 }
 """Chosen by eye for a white lamp at the camera, after what anatomy says of the living organs: liver and kidney red-brown, the liver
 darker; the colon a greyish pink; the adrenal gland the yellow of its cortex; `tissue`, which is all else, the pink of muscle."""

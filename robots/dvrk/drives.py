@@ -10,7 +10,7 @@ rotor inertia belong to the discs. Each joint gets the diagonal of its share; th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -20,7 +20,6 @@ from robots.dvrk import ecm
 from robots.dvrk import psm as psm_arm
 from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import Instrument
-from robots.serial_chain import Joint
 
 __all__ = ["ECM", "FINGERS", "SMOOTHING", "Disc", "Drive", "discs", "friction", "psm"]
 
@@ -98,17 +97,21 @@ def psm(tool: Instrument) -> Mapping[str, Drive]:
         elastic = (_ROLL_ELASTICITY, _ROLL_OFFSET) if name == "roll" else (0.0, 0.0)
         drives[name] = Drive(_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, *elastic, _DISC_INERTIA * share, *limits[name])
     if tool.hand is not None:
-        drives |= {finger.name: _finger(finger, tool.hand) for finger in tool.hand.joints}
+        drives |= {joint.name: drive for joint, drive in zip(tool.hand.joints, _motors(tool.hand), strict=True)}
     return MappingProxyType(drives)
 
 
-def _finger(finger: Joint, hand: Hand) -> Drive:
-    """Return the drive of a finger of `hand`, over its closing: a disc that winds the tendon up and lets it go.
+def _motors(hand: Hand) -> Iterator[Drive]:
+    """Yield the drives of `hand` in the order of its joints.
 
-    Its friction stays with the motor: the springs that open the finger do not turn it.
+    A closing is turned by a disc that winds a tendon up and lets it go; its friction stays with the motor, as the springs that open a finger do
+    not turn it. A spread moves the end of a spring, with the friction of the first joints.
     """
-    first = hand.phalanges[0]
-    return Drive(_DISC_STIFFNESS, _DISC_DAMPING, 0.0, 0.0, first.stiffness, -first.stiffness * first.rest, _DISC_INERTIA, finger.effort, finger.velocity)
+    spring, friction = hand.phalanges[0].stiffness, float(hand.damping[0])
+    for joint in hand.joints:
+        gains = (_DISC_STIFFNESS, _DISC_DAMPING) if joint.name in hand.fingers else (spring, friction)
+        armature = _DISC_INERTIA if joint.name in hand.fingers else 0.0
+        yield Drive(*gains, 0.0, 0.0, 0.0, 0.0, armature, joint.effort, joint.velocity)
 
 
 def discs(tool: Instrument) -> tuple[Disc, ...]:

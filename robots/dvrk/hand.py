@@ -1,11 +1,13 @@
 """A hand of under-actuated fingers at the end of a shaft: geometry, tendons and kinematics.
 
-Each finger has one motor. Its tendon runs over a pulley in every joint and closes the phalanges against springs that open them, so
-how far each joint goes is decided by springs and by what it meets: a phalanx that is blocked lets the others go on. With the tension T of the
-tendon, joint i with pulley r_i and spring k_i (at rest at q_i0) stands, unloaded, at q_i = q_i0 + r_i T / k_i, inside its stops.
+Two motors drive the three joints of a finger. One sets the *spread* s (rad), where the spring in the first joint is at rest. The other winds a tendon up that
+runs over a pulley in every joint and closes the phalanges against springs: how far each goes is decided by springs and by what it meets, and a
+phalanx that is blocked lets the others go on. At the tension T of the tendon, joint i with pulley r_i and spring k_i (at rest at
+q_i0, s for the first one) stands, unloaded, at q_i = q_i0 + r_i T / k_i, inside its stops.
 
-The *closing* u (rad) of a finger is the length of tendon wound up, over the radius of the first pulley: u = sum r_i q_i / r_1. While the springs of
-the outer joints hold these at their stops, it is the angle of the first joint. At 0 the fingers are straight along the shaft.
+The *closing* u (rad) of a finger is the length of tendon wound up, over the radius of the first pulley: u = sum r_i q_i / r_1; the
+tendon slackens where less is wound up than the springs leave over. At spread 0 and closing 0 the fingers are straight along the shaft.
+A *command* of the hand has the closings of all fingers, then their spreads.
 
 The hand's frame is that of the link that rolls: z along the shaft to the fingertips, origin where the shaft ends. SI units, radians.
 """
@@ -42,9 +44,9 @@ class Phalanx:
     pulley: float
     """Radius over which the tendon runs, m."""
     stiffness: float
-    """Of the opening spring, N m/rad."""
+    """Of the spring, N m/rad."""
     rest: float
-    """Where the spring would be at rest, rad; below `lower` it presses the joint to its stop."""
+    """Where the spring would be at rest, rad; below `lower` it presses the joint to its stop. Of the first phalanx: with the spread at 0."""
     contact: float
     """Of the contact sphere's centre along the phalanx, share of its length."""
 
@@ -62,7 +64,7 @@ class HandLink:
 
 @dataclass(frozen=True)
 class Mode:
-    """An actuation pattern: the closings (rad) of the fingers, between which one number from 0 (open) to 1 (closed) goes straight."""
+    """An actuation pattern: the commands (rad) of the hand, between which one number from 0 (open) to 1 (closed) goes straight."""
 
     open: tuple[float, ...]
     closed: tuple[float, ...]
@@ -85,17 +87,22 @@ class Hand:
     density: float
     """Of the phalanges, round bars, kg/m^3."""
     effort: float
-    """Largest torque of a motor at the first pulley, N m: it pulls, and pushes nothing."""
+    """Largest torque of a motor, of a tendon's at the first pulley, N m: that one pulls, and pushes nothing."""
     velocity: float
-    """Largest velocity of a closing, rad/s."""
+    """Largest velocity of a closing or spread, rad/s."""
     acceleration: float
     jerk: float
     modes: Mapping[str, Mode]
 
     @property
     def fingers(self) -> tuple[str, ...]:
-        """Names of the fingers, `finger1` and so on; also of their tendons and motors."""
+        """Names of the fingers, `finger1` and so on; also of their tendons and closings."""
         return tuple(f"finger{i}" for i in range(1, len(self.azimuths) + 1))
+
+    @property
+    def spreads(self) -> tuple[str, ...]:
+        """Names of the spreads."""
+        return tuple(f"spread{i}" for i in range(1, len(self.azimuths) + 1))
 
     @cached_property
     def links(self) -> tuple[HandLink, ...]:
@@ -114,10 +121,12 @@ class Hand:
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
-        """The closings as joints: their ranges and what they can do."""
-        lower, upper = self._closings[[0, -1]].tolist()
-        limits = (lower, upper, self.velocity, self.effort, self.acceleration, self.jerk)
-        return tuple(Joint(finger, "revolute", 0.0, 0.0, 0.0, 0.0, *limits) for finger in self.fingers)
+        """Closings and spreads as joints: their ranges and what they can do."""
+        first, ratios = self.phalanges[0], self._pulleys / self._pulleys[0]
+        limits = (self.velocity, self.effort, self.acceleration, self.jerk)
+        most = float(ratios @ [phalanx.upper for phalanx in self.phalanges])
+        ranges = [(name, first.lower, most) for name in self.fingers] + [(name, first.lower, first.upper) for name in self.spreads]
+        return tuple(Joint(name, "revolute", 0.0, 0.0, 0.0, 0.0, lower, upper, *limits) for name, lower, upper in ranges)
 
     @cached_property
     def spheres(self) -> tuple[ContactSphere, ...]:
@@ -146,8 +155,8 @@ class Hand:
         inertia = (np.triu(np.ones((len(lengths), len(lengths)))) * self.masses * (lengths**2 / 12.0 + away**2)).sum(axis=1)
         return 2.0 * np.sqrt(np.array([phalanx.stiffness for phalanx in self.phalanges]) * inertia)
 
-    def closings(self, mode: str, closing: float) -> Vector:
-        """Return the closings (rad) of the fingers, shape (fingers,), of a mode closed by `closing`, 0 to 1. Raises MotionError."""
+    def command(self, mode: str, closing: float) -> Vector:
+        """Return the command (rad), shape (2 fingers,), of a mode closed by `closing`, 0 to 1. Raises MotionError."""
         pattern = self.modes.get(mode)
         if pattern is None:
             raise MotionError(f"no mode '{mode}'.{did_you_mean(mode, self.modes)}")
@@ -156,13 +165,21 @@ class Hand:
         start, end = np.array(pattern.open), np.array(pattern.closed)
         return start + closing * (end - start)
 
-    def unloaded(self, closings: Vector) -> Vector:
-        """Return the joint positions (rad), shape (..., fingers, phalanges), of fingers that touch nothing, at `closings`, shape (..., fingers)."""
-        return self._positions(self._tension(closings)[..., None])
+    def unloaded(self, command: Vector) -> Vector:
+        """Return the joint positions (rad), shape (fingers, phalanges), of fingers that touch nothing, at a command, shape (2 fingers,)."""
+        closings, spreads = command.reshape(2, -1).tolist()
+        return np.array([self._positions(self.tension(u, s), s) for u, s in zip(closings, spreads, strict=True)])
 
-    def effort_of_springs(self, closings: Vector) -> Vector:
-        """Return the torque (N m) at the first pulley, shape as `closings`, that holds unloaded fingers."""
-        return self._tension(closings) * self.phalanges[0].pulley
+    def tension(self, closing: float, spread: float) -> float:
+        """Return the tension (N) of the tendon of a finger that touches nothing; 0 where it is slack."""
+        stops = [p.stiffness * (stop - rest) / p.pulley for p, rest in zip(self.phalanges, self._rest(spread), strict=True) for stop in (p.lower, p.upper)]
+        tensions = sorted({0.0, *(stop for stop in stops if stop > 0.0)})  # between these all moves in proportion
+        closings = [float(self._positions(tension, spread) @ self._pulleys) / float(self._pulleys[0]) for tension in tensions]
+        return float(np.interp(closing, closings, tensions))
+
+    def closing_for(self, positions: Vector) -> float:
+        """Return the closing (rad) of a finger whose joints are at `positions` (rad), shape (phalanges,)."""
+        return float(positions @ self._pulleys / self._pulleys[0])
 
     def contacts(self, positions: Vector) -> Vector:
         """Return the centres of the contact spheres in the hand's frame (m), shape (..., fingers, phalanges, 3).
@@ -179,20 +196,15 @@ class Hand:
         azimuths = np.array(self.azimuths)[:, None]
         return np.stack([radial * np.cos(azimuths), radial * np.sin(azimuths), self.palm + along], axis=-1)
 
-    def _positions(self, tension: Vector) -> Vector:
-        """Return the unloaded joint positions, shape (..., phalanges), at a tension (N), shape (..., 1)."""
-        rest, slope, lower, upper = np.array([(p.rest, p.pulley / p.stiffness, p.lower, p.upper) for p in self.phalanges]).T
-        return np.clip(rest + slope * tension, lower, upper)
-
     @cached_property
-    def _tensions(self) -> Vector:
-        """Tensions (N) at which a joint leaves or meets a stop, ascending: between them all moves in proportion."""
-        return np.sort([p.stiffness * (stop - p.rest) / p.pulley for p in self.phalanges for stop in (p.lower, p.upper)])
+    def _pulleys(self) -> Vector:
+        return np.array([phalanx.pulley for phalanx in self.phalanges])
 
-    @cached_property
-    def _closings(self) -> Vector:
-        pulleys = np.array([phalanx.pulley for phalanx in self.phalanges])
-        return self._positions(self._tensions[:, None]) @ pulleys / pulleys[0]
+    def _rest(self, spread: float) -> list[float]:
+        first, *others = self.phalanges
+        return [first.rest + spread, *(phalanx.rest for phalanx in others)]
 
-    def _tension(self, closings: Vector) -> Vector:
-        return np.interp(closings, self._closings, self._tensions)
+    def _positions(self, tension: float, spread: float) -> Vector:
+        """Return the unloaded joint positions of a finger, shape (phalanges,), at a tension (N) and a spread (rad)."""
+        slope, lower, upper = np.array([(p.pulley / p.stiffness, p.lower, p.upper) for p in self.phalanges]).T
+        return np.clip(self._rest(spread) + slope * tension, lower, upper)

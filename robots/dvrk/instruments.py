@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from math import radians
@@ -21,6 +21,8 @@ from robots.dvrk.contact_spheres import ContactSphere, on_jaw
 from robots.dvrk.hand import Hand
 from robots.dvrk.limits import jerk
 from robots.dvrk.musha import HAND
+from robots.dvrk.rolling_needle_driver import NAME as ROLLING
+from robots.dvrk.rolling_needle_driver import Roller, roller
 from robots.serial_chain import Joint
 from schemas.errors import MotionError, did_you_mean
 from schemas.vectors import Vector
@@ -96,6 +98,8 @@ class Instrument:
     """Mass of the link between wrist pitch and wrist yaw, kg (same file)."""
     hand: Hand | None = None
     """In place of wrist and jaw."""
+    roller: Roller | None = None
+    """In the jaw: turns a needle between the fingers."""
 
     @property
     def has_snake_wrist(self) -> bool:
@@ -126,6 +130,8 @@ def instruments() -> Mapping[str, Instrument]:
     driver = made["LARGE_NEEDLE_DRIVER_400006"]
     made[_PROBE] = Instrument(_PROBE, "", driver.joints, driver.tip, None, driver.actuator_to_joint, driver.source)
     made[_MUSHA] = _with_hand(_MUSHA, HAND, driver)
+    source = f"{driver.source}; robots.dvrk.rolling_needle_driver"
+    made[ROLLING] = replace(driver, name=ROLLING, number="", source=source, roller=None if driver.jaw is None else roller(driver.jaw.effort))
     return MappingProxyType(made)
 
 

@@ -30,7 +30,7 @@ from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["ORIENTATION_TOLERANCE", "inverse"]
+__all__ = ["ORIENTATION_TOLERANCE", "branches", "inverse"]
 
 ORIENTATION_TOLERANCE = radians(20.0)
 """Between the ECM's goal and the nearest orientation at its position, rad. The real controller (jhu-dvrk/sawIntuitiveResearchKit,
@@ -111,6 +111,21 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
         where = f" {i}" if len(poses) > 1 else ""
         raise MotionError(f"pose{where} is no rigid transform: {poses[i].tolist()}; allowed are a rotation matrix, a position and (0, 0, 0, 1) below")
     return poses, start
+
+
+def branches(chain: SerialChain, pose: Vector) -> Vector:
+    """Return the joint positions of all four branches, shape (4, ..., 6), in range or not, revolute ones within half a turn of 0.
+
+    Where a singular pose leaves a joint free, it is at 0.
+
+    Args:
+        chain: a PSM with a wrist of three joints.
+        pose: of the tip in the chain's base frame, shape (..., 4, 4), finite.
+    """
+    _require(chain, chain.joints[3:])
+    ends = (pose @ inverse_pose(chain.tip)).reshape(-1, 4, 4)
+    near = np.zeros((1, len(chain.joints)))
+    return _unwind(chain, _psm_branches(chain, ends, near), near).reshape(4, *pose.shape[:-2], len(chain.joints))
 
 
 def _require(chain: SerialChain, wrist: tuple[Joint, ...]) -> None:

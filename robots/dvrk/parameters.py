@@ -17,6 +17,7 @@ from schemas.quantity import Angle, Length
 __all__ = [
     "ArmName",
     "EcmPositions",
+    "HandPositions",
     "InstrumentName",
     "MountedPositions",
     "PsmPositions",
@@ -73,6 +74,9 @@ MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Leng
 
 UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
 """A rotation as quaternion (x, y, z, w)."""
+
+HandPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+"""Closings, then spreads, of three fingers."""
 
 
 def home(arm: dict[str, Any]) -> MountedPositions:

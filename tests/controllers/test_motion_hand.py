@@ -11,7 +11,7 @@ from robots.dvrk.musha import HAND
 from tests.controllers.motion_rig import H, Rig, cp, jf, jp
 
 ARM = {"PSM1": {"instrument": "MUSHA_HAND"}}
-OPEN = HAND.closings("caliper", 0.0)
+OPEN = HAND.command("caliper", 0.0)
 
 
 def closings(rig):
@@ -33,22 +33,22 @@ def test_a_hand_moves_while_the_arm_does():
 def test_a_hand_follows_a_stream():
     rig = Rig(ARM)
     for i in range(200):
-        rig.step(hand__servo_jp=jp(*(-1e-3 * i * np.ones(3))))
+        rig.step(hand__servo_jp=jp(*(-1e-3 * i * np.ones(6))))
     assert np.allclose(closings(rig), -0.199, atol=0.005)
 
 
 def test_fingers_may_be_told_to_pull():
-    rig = Rig(ARM).step(hand__servo_jf=jf(0.1, 0.1, 0.0))
+    rig = Rig(ARM).step(hand__servo_jf=jf(0.1, 0.1, 0.0, 0.0, 0.0, 0.0))
     assert rig.mode == [1, 2]
-    assert rig.outputs["drive/PSM1/hand/servo_jf"].tolist() == [0.1, 0.1, 0.0]
+    assert rig.outputs["drive/PSM1/hand/servo_jf"].tolist() == [0.1, 0.1, 0.0, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
     ("order", "reason"),
     [
-        ({"hand__move_jp": jp(0.0, 0.0)}, "expected 3: finger1, finger2, finger3"),
-        ({"hand__servo_jp": jp(3.0, 0.0, 0.0)}, "finger1 at 3 rad, allowed are"),
-        ({"hand__servo_jf": jf(1.0, 0.0, 0.0)}, "finger1 at 1 N m, allowed are"),
+        ({"hand__move_jp": jp(0.0, 0.0)}, "expected 6: finger1, finger2, finger3, spread1, spread2, spread3"),
+        ({"hand__servo_jp": jp(4.0, *[0.0] * 5)}, "finger1 at 4 rad, allowed are"),
+        ({"hand__servo_jf": jf(1.0, *[0.0] * 5)}, "finger1 at 1 N m, allowed are"),
         ({"move_jp": jp(0, 0, 0.12, 0, 0, 0)}, "expected 4: yaw, pitch, insertion, roll"),
     ],
 )
@@ -77,6 +77,6 @@ def test_a_routine_names_the_mode():
     (step,) = RoutineParams.model_validate({"steps": [{"do": "hand", "arm": "PSM1", "mode": "caliper", "closing": 0.4}]}).steps
     port, message = step.message()
     assert port == "PSM1/hand/move_jp"
-    assert np.allclose(message.position, HAND.closings("caliper", 0.4))
+    assert np.allclose(message.position, HAND.command("caliper", 0.4))
     with pytest.raises(ValidationError, match="closing"):
         RoutineParams.model_validate({"steps": [{"do": "hand", "arm": "PSM1", "mode": "grasp", "closing": 2}]})

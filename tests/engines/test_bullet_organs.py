@@ -59,6 +59,13 @@ def test_an_organ_may_lie_freely_on_a_bed_or_be_tied_to_it():
         assert nodes[:, 2].min() < -0.065
 
 
+def test_organs_touch_one_another():
+    small = {**SMALL_BLOCK, "size": ["40 mm", "30 mm", "20 mm"], "position": [0, 0, "22 mm"], "anchors": []}
+    with engine_of({"under": SMALL_BLOCK, "on_top": small}) as engine:
+        nodes = nodes_after(engine, 160, "on_top")
+    assert -3e-3 < nodes[:, 2].min() < 0  # the one under it gives way
+
+
 def test_an_organ_that_falls_out_of_the_scene_ends_the_session_and_is_named():
     with pytest.raises(SessionError, match=r"organ 'loose'.*it fell: nothing anchors it"), engine_of({"loose": {**SMALL_BLOCK, "anchors": []}}):
         pass

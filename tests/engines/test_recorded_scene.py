@@ -50,7 +50,7 @@ connections:
 bonds:
   - {motion: robot.PSM1/probe, force: tissue.probe}
 """
-LIVER_RED_TO_GREEN = 0.45 / 0.17
+LIVER_RED_TO_GREEN = 0.52 / 0.20
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ from robots.dvrk.inverse import inverse
 from robots.dvrk.musha import HAND, TROCAR_RADIUS
 from schemas.errors import MotionError
 
-LOWER, UPPER = HAND.joints[0].lower, HAND.joints[0].upper
 PULLEYS = np.array([phalanx.pulley for phalanx in HAND.phalanges])
-closings = st.tuples(*[st.floats(LOWER, UPPER)] * 3).map(np.array)
+LOWER, UPPER = (np.array([getattr(joint, end) for joint in HAND.joints]) for end in ("lower", "upper"))
+commands = st.tuples(*(st.floats(joint.lower, joint.upper) for joint in HAND.joints)).map(np.array)
 
 
 def test_the_folded_hand_passes_the_trocar_with_its_spheres():
-    centres = HAND.contacts(HAND.unloaded(HAND.closings("folded", 0.0)))
+    centres = HAND.contacts(HAND.unloaded(HAND.command("folded", 0.0)))
     assert (np.hypot(centres[..., 0], centres[..., 1]) + HAND.radius < TROCAR_RADIUS).all()
 
 
@@ -24,32 +24,33 @@ def test_fingers_of_the_folded_hand_lie_side_by_side():
     assert min(apart) > 2.0 * HAND.radius
 
 
-@given(closings)
-def test_an_unloaded_finger_has_the_closing_it_is_told(u):
-    q = HAND.unloaded(u)
-    assert np.allclose(q @ PULLEYS / PULLEYS[0], u, atol=1e-9)
-    assert all(p.lower <= q[i, j] <= p.upper for i in range(3) for j, p in enumerate(HAND.phalanges))
+@given(commands)
+def test_an_unloaded_finger_winds_up_what_it_is_told_or_its_tendon_is_slack(command):
+    q = HAND.unloaded(command)
+    for finger, (closing, spread) in enumerate(command.reshape(2, 3).T.tolist()):
+        tension = HAND.tension(closing, spread)
+        assert tension >= 0.0
+        assert all(p.lower <= q[finger, j] <= p.upper for j, p in enumerate(HAND.phalanges))
+        wound = HAND.closing_for(q[finger])
+        assert wound == pytest.approx(closing, abs=1e-9) or (tension == 0.0 and wound > closing)
 
 
-@given(closings)
-def test_an_unloaded_finger_is_in_balance(u):
+@given(commands)
+def test_an_unloaded_finger_is_in_balance(command):
     """Where a joint is at no stop, the torque of its tendon is that of its spring."""
-    q, tension = HAND.unloaded(u), HAND.effort_of_springs(u) / PULLEYS[0]
-    for j, p in enumerate(HAND.phalanges):
-        free = (q[:, j] > p.lower + 1e-9) & (q[:, j] < p.upper - 1e-9)
-        assert np.allclose((p.pulley * tension - p.stiffness * (q[:, j] - p.rest))[free], 0.0, atol=1e-12)
+    q = HAND.unloaded(command)
+    for finger, (closing, spread) in enumerate(command.reshape(2, 3).T.tolist()):
+        tension = HAND.tension(closing, spread)
+        for j, p in enumerate(HAND.phalanges):
+            rest = p.rest + (spread if j == 0 else 0.0)
+            if p.lower + 1e-9 < q[finger, j] < p.upper - 1e-9:
+                assert p.pulley * tension == pytest.approx(p.stiffness * (q[finger, j] - rest), abs=1e-12)
 
 
-def test_an_unloaded_finger_turns_as_one_piece_over_the_range_of_its_first_joint():
+def test_the_motors_can_bend_a_spread_finger_all_the_way():
     first = HAND.phalanges[0]
-    u = np.linspace(first.lower, first.upper, 20)
-    q = HAND.unloaded(u)
-    assert np.allclose(q[:, 0], u)
-    assert not q[:, 1:].any()
-
-
-def test_the_motors_can_close_the_fingers_against_all_springs():
-    assert (HAND.effort_of_springs(np.array([UPPER])) < HAND.effort).all()
+    bent = HAND.closing_for(np.array([first.lower, *(phalanx.upper for phalanx in HAND.phalanges[1:])]))
+    assert HAND.tension(bent, first.lower) * first.pulley < HAND.effort
 
 
 def test_contacts_are_where_the_links_are():
@@ -66,16 +67,25 @@ def test_contacts_are_where_the_links_are():
         assert np.allclose((poses[link.name] @ [*sphere.position, 1.0])[:3], found.reshape(-1, 3)[i], atol=1e-15)
 
 
-def test_the_caliper_opposes_two_fingers_and_clears_the_third():
-    tips = HAND.contacts(HAND.unloaded(HAND.closings("caliper", 0.5)))[:, -1]
+@pytest.mark.parametrize("closing", [0.0, 0.3, 0.7, 0.95])
+def test_the_caliper_closes_two_parallel_fingers_and_clears_the_third(closing):
+    q = HAND.unloaded(HAND.command("caliper", closing))
+    assert np.allclose(q[:2].sum(axis=1), 0.0, atol=np.radians(0.05))
+    tips = HAND.contacts(q)[:, -1]
     assert np.allclose(tips[0] * [-1, 1, 1], tips[1], atol=1e-15)
     assert tips[2, 2] < tips[0, 2] - 0.02
 
 
+def test_the_retractor_fans_straight_fingers_out():
+    q = HAND.unloaded(HAND.command("retractor", 0.0))
+    assert np.allclose(q[:, 0], np.radians(-85.0))
+    assert np.allclose(q[:, 1:], 0.0)
+
+
 def test_modes_go_straight_from_open_to_closed():
     for mode, pattern in HAND.modes.items():
-        assert HAND.closings(mode, 0.0).tolist() == list(pattern.open)
-        assert HAND.closings(mode, 1.0) == pytest.approx(np.array(pattern.closed))
+        assert HAND.command(mode, 0.0).tolist() == list(pattern.open)
+        assert HAND.command(mode, 1.0) == pytest.approx(np.array(pattern.closed))
         for joint, u in zip(HAND.joints, [*pattern.open, *pattern.closed] * 2, strict=False):
             assert joint.lower <= u <= joint.upper
 
@@ -83,7 +93,7 @@ def test_modes_go_straight_from_open_to_closed():
 @pytest.mark.parametrize(("mode", "closing", "reason"), [("calliper", 0.5, "caliper"), ("grasp", 1.2, "0 .* to 1")])
 def test_what_is_no_mode_is_refused(mode, closing, reason):
     with pytest.raises(MotionError, match=reason):
-        HAND.closings(mode, closing)
+        HAND.command(mode, closing)
 
 
 def test_the_tip_is_reached_even_where_the_orientation_is_only_near():

@@ -92,7 +92,8 @@ def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
     if len(open_edges):
         problems.append(f"the surface is not watertight: {len(open_edges)} edges have not two triangles, for instance between nodes {open_edges[0].tolist()}")
     apart = _SAME_PLACE * np.ptp(nodes, axis=0).max()
-    order = np.lexsort(np.round(nodes / apart).T)
+    places = np.rint(nodes / apart)
+    order = np.lexsort((places[:, 2], places[:, 1], places[:, 0]))
     near = np.linalg.norm(np.diff(nodes[order], axis=0), axis=1) < apart
     if near.any():
         pairs = np.sort(order[1:][near])

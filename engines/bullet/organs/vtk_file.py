@@ -80,7 +80,8 @@ class _Reader:
         others, counts = np.unique(types[types != _TETRA], return_counts=True)
         if len(others) or len(types) != len(cells) or any(len(cell) != 4 for cell in cells):
             found = ", ".join(f"{count} of type {kind}" for kind, count in zip(others.tolist(), counts.tolist(), strict=True))
-            raise ValueError(f"all cells must be tetrahedra (VTK type {_TETRA}, four nodes each); there are others: {found or 'with other numbers of nodes'}")
+            others_found = f"there are {found}" if found else "there are some with other numbers of nodes"
+            raise ValueError(f"all cells must be tetrahedra (VTK type {_TETRA}, four nodes each), but {others_found}: export the volume alone")
         return nodes, np.array(cells, np.int64).reshape(-1, 4)
 
     def _cells(self, words: list[str]) -> list[Indices]:

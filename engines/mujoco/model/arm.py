@@ -66,10 +66,10 @@ def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) ->
     driven = drives.psm(params.tool) if is_psm else drives.ECM
     hand = params.tool.hand if is_psm else None
     for name, drive in driven.items():
-        if hand is None or name not in hand.fingers:
+        if hand is None or name not in (*hand.fingers, *hand.spreads):
             _add_drive(spec, f"{arm}/{name}", drive)
     if hand is not None:
-        hands.add_drives(spec, arm, hand, driven[hand.fingers[0]])
+        hands.add_drives(spec, arm, hand, driven)
         hands.add_contacts(spec, arm, hand)
     for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
         tendon = spec.add_tendon(name=f"{arm}/disc_{i}", damping=[disc.viscous_friction, 0.0, 0.0], frictionloss=disc.coulomb_friction)
