@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from engines.bullet.anchor import WORLD, RigidParams, add_rigid
 from engines.bullet.client import connect, disconnect
 from engines.bullet.contact import CONTACT_PERIOD_NS, Contacts, Tissue
-from engines.bullet.grasp import Grasp, grasp_ports
+from engines.bullet.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
 from engines.bullet.proxy import Coupling, Probe, ProbeParams
@@ -67,6 +67,8 @@ class BulletEngine(Stepped):
         self._organs: list[Organ] = []
         self._probes: list[Probe] = []
         self._grasps: list[Grasp] = []
+        self._unused: dict[str, Value] = {}
+        """What probes say that might grasp, but are not bonded."""
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -110,6 +112,10 @@ class BulletEngine(Stepped):
         self._read_nodes(0)
         self._contacts = Contacts([Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity) for organ in self._organs])
         outputs = self._nodes(0)
+        self._unused = {
+            port: value for name, probe in self.params.probes.items() if probe.grasp and name not in setup.bonds for port, value in nothing_held(name).items()
+        }
+        outputs.update(self._unused)
         for probe in self._probes:
             outputs.update(probe.idle)
             if grasp := self.params.probes[probe.name].grasp:
@@ -134,7 +140,7 @@ class BulletEngine(Stepped):
             self._read_nodes(end)
         if touch:
             self._contacts.update(self._probes)
-        outputs = self._nodes(end) if due else {}
+        outputs = (self._nodes(end) if due else {}) | self._unused
         for probe in probes:
             outputs.update(probe.result(end, seconds))
         for grasp in self._grasps:
