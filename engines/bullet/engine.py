@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil, pi, sin
 from typing import ClassVar, Self
 
 import numpy as np
@@ -10,7 +11,7 @@ from pydantic import Field, model_validator
 from engines.bullet.anchor import WORLD, RigidParams, add_rigid
 from engines.bullet.client import connect, disconnect
 from engines.bullet.contact import CONTACT_PERIOD_NS, Contacts, Tissue
-from engines.bullet.grasp import Grasp, grasp_ports
+from engines.bullet.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
 from engines.bullet.proxy import Coupling, Probe, ProbeParams
@@ -25,8 +26,11 @@ from schemas.trocar_msgs import SoftBodyState
 
 __all__ = ["BulletEngine", "BulletParams"]
 
-_SETTLING_NS = 450_000_000
-"""Simulated before time 0, so that the organs have come to rest under their own weight; gravity is whole after two thirds."""
+_RAMP_S = 0.2
+"""Gravity grows over this time before time 0, or over two periods of the slowest organ if they are longer; half as long again the organs rest."""
+
+_GRAVITY_DIGITS = 6
+"""Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
 
 _NO_CLIENT = -1
 
@@ -67,6 +71,8 @@ class BulletEngine(Stepped):
         self._organs: list[Organ] = []
         self._probes: list[Probe] = []
         self._grasps: list[Grasp] = []
+        self._unused: dict[str, Value] = {}
+        """What probes say that might grasp, but are not bonded."""
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -110,6 +116,10 @@ class BulletEngine(Stepped):
         self._read_nodes(0)
         self._contacts = Contacts([Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity) for organ in self._organs])
         outputs = self._nodes(0)
+        self._unused = {
+            port: value for name, probe in self.params.probes.items() if probe.grasp and name not in setup.bonds for port, value in nothing_held(name).items()
+        }
+        outputs.update(self._unused)
         for probe in self._probes:
             outputs.update(probe.idle)
             if grasp := self.params.probes[probe.name].grasp:
@@ -134,7 +144,7 @@ class BulletEngine(Stepped):
             self._read_nodes(end)
         if touch:
             self._contacts.update(self._probes)
-        outputs = self._nodes(end) if due else {}
+        outputs = (self._nodes(end) if due else {}) | self._unused
         for probe in probes:
             outputs.update(probe.result(end, seconds))
         for grasp in self._grasps:
@@ -204,13 +214,18 @@ class BulletEngine(Stepped):
             organ.sample(t)
 
     def _settle(self) -> None:
-        """Let gravity grow slowly, as organs that it seized at once would swing for long."""
+        """Let gravity grow as slowly as the organs can follow: seized at once, they would swing for long.
+
+        It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window on.
+        """
         import pybullet as bullet
 
-        steps = _SETTLING_NS // self.params.timestep
+        ramp = max(_RAMP_S, *(2.0 * organ.period for organ in self._organs))
+        steps = ceil(1.5 * ramp / self._dt)
         for i in range(steps):
-            share = min(1.0, 1.5 * (i + 1) / steps)
-            bullet.setGravity(0.0, 0.0, -self.params.gravity * share * share * (3.0 - 2.0 * share), physicsClientId=self._client)
+            s = min(1.0, 1.5 * (i + 1) / steps)
+            share = round(s - sin(2.0 * pi * s) / (2.0 * pi), _GRAVITY_DIGITS)
+            bullet.setGravity(0.0, 0.0, -self.params.gravity * share, physicsClientId=self._client)
             self._simulate(physicsClientId=self._client)
 
     def _check_steps(self, period_ns: int) -> None:

@@ -25,7 +25,7 @@ from schemas.vectors import Vector
 if TYPE_CHECKING:
     from engines.bullet.proxy import Probe
 
-__all__ = ["Grasp", "GraspParams", "grasp_ports"]
+__all__ = ["Grasp", "GraspParams", "grasp_ports", "nothing_held"]
 
 _CLOSING_M = 0.5e-3
 """By how much the fingers must have closed on tissue to take hold, and opened from there to let go: half of what two jaws come nearer."""
@@ -63,6 +63,11 @@ def grasp_ports(probe: str) -> tuple[Port, ...]:
     )
 
 
+def nothing_held(probe: str) -> dict[str, Value]:
+    """Return what the ports say of a probe that touches nothing."""
+    return {f"{probe}/held": np.zeros(1), f"{probe}/pull": np.zeros(3), f"{probe}/lift": np.zeros(1), f"{probe}/events": ()}
+
+
 @dataclass(frozen=True)
 class _Hold:
     """What is held of one organ."""
@@ -86,8 +91,7 @@ class Grasp:
         self._widest = 0.0
         """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when they took hold, m."""
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
-        self.outputs: dict[str, Value] = {}
-        self._say(())
+        self.outputs = nothing_held(probe.name)
 
     def update(self, t: int, *, looked: bool) -> None:
         """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches them, are those of now."""

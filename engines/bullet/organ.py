@@ -12,7 +12,7 @@ import numpy as np
 from engines.bullet.anchor import WORLD
 from engines.bullet.client import quiet
 from engines.bullet.contact import COLLISION_MARGIN_M
-from engines.bullet.material import highest_frequency
+from engines.bullet.material import highest_frequency, lowest_frequency
 from engines.bullet.organ_params import OrganParams
 from schemas.errors import SessionError
 from schemas.vectors import Vector
@@ -42,8 +42,11 @@ class Organ:
         edges = mesh.nodes[mesh.triangles] - mesh.nodes[np.roll(mesh.triangles, 1, axis=1)]
         self.mean_edge = float(np.linalg.norm(edges, axis=2).mean())
         """Mean length of an edge of the surface, m."""
-        self.frequency = highest_frequency(mesh, np.where(self.anchored, 0.0, 1.0), params.elastic)
+        free = np.where(self.anchored, 0.0, 1.0)
+        self.frequency = highest_frequency(mesh, free, params.elastic)
         """Highest natural frequency, rad/s."""
+        self.period = 2.0 * np.pi / lowest_frequency(mesh, free, params.elastic) if self.anchored.any() else 0.0
+        """Period of the slowest swing, s; 0 where nothing holds the organ."""
         self._client = client
         self._mesh_data = bullet.getMeshData
         self._flags = bullet.MESH_DATA_SIMULATION_MESH

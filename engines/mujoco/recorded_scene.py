@@ -70,7 +70,7 @@ class RecordedScene:
             raise TrocarError(f"no OpenGL works here ({gl.detail}), so there are no pictures. To mend it: {opengl.REMEDY}")
         positions, bodies = self._positions(time_ns), self._bodies(time_ns)
         width, height = size
-        shown: dict[str, Any] = {"width": _OVERSAMPLING * width, "height": _OVERSAMPLING * height}
+        shown: dict[str, Any] = {"width": _OVERSAMPLING * width, "height": _OVERSAMPLING * height, "looks": True}
         shown["skins"] = {name: self._looks.get(name, {}) for name in bodies}
         if camera == "overview":
             shown |= {"view": self._overview(bodies, position, target), "baseline": 0.0}

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from engines.bullet.engine import BulletEngine, BulletParams
 from hub.inputs import Inputs
 from hub.participant import Setup
+from hub.testing import check_engine
 from tests.engines.bullet_rig import IMPULSE, MS
 from tests.engines.finite_elements import Body, equilibrium
 
@@ -166,6 +167,13 @@ def test_a_grasp_comes_out_the_same_again():
             assert jaw.said == ["grasped", "torn"]
             hashes.append(jaw.hashes)
     assert hashes[0] == hashes[1]
+
+
+@pytest.mark.parametrize("bonds", [{}, {"jaw": IMPULSE}], ids=["alone", "bonded"])
+def test_the_engine_keeps_its_contract(bonds):
+    small = {**SLAB, "nodes": 18, "young_modulus": "3 kPa"}
+    params = BulletParams.model_validate({"organs": {"organ": small}, "probes": {"jaw": {"spheres": 2, "grasp": {}}}})
+    check_engine(lambda: BulletEngine("tissue", params), period_ns=MS, bonds=bonds)
 
 
 @pytest.mark.parametrize("wrong", [{"spheres": 5}, {"spheres": 6, "fingers": 4}, {"spheres": None}, {"spheres": 6, "hold": "0 N"}])

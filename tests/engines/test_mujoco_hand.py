@@ -1,12 +1,16 @@
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+import yourdfpy
 from pydantic import ValidationError
 
 from engines.mujoco import looks
 from engines.mujoco.engine import MujocoEngine
-from engines.mujoco.params import MujocoParams
+from engines.mujoco.export import write
+from engines.mujoco.model import build, spec
+from engines.mujoco.params import MujocoParams, SceneParams
 from hub.inputs import Inputs
 from hub.participant import Setup
 from hub.testing import check_engine
@@ -125,3 +129,21 @@ def test_the_start_has_as_many_joints_as_the_arm_with_its_hand():
         Run(start=[0, 0, 0.12, 0, 0, 0])
     with pytest.raises(ValidationError, match="finger1"):
         Run(hand=[4, 0, 0, 0, 0, 0])
+
+
+def test_an_exported_hand_reads_back(tmp_path):
+    scene = SceneParams.model_validate(SCENE)
+    write(spec(scene), tmp_path / "hand.xml", "mjcf")
+    model, back = build(scene), mujoco.MjModel.from_xml_path(str(tmp_path / "hand.xml"))
+    assert (model.nq, model.nu, model.ntendon, model.npair, model.nsensor) == (back.nq, back.nu, back.ntendon, back.npair, back.nsensor)
+    assert np.allclose(model.wrap_prm, back.wrap_prm, rtol=1e-5)  # MJCF has six digits
+    write(spec(scene), tmp_path / "hand.urdf", "urdf")
+    robot = yourdfpy.URDF.load(str(tmp_path / "hand.urdf"), load_meshes=False)
+    q = {**dict.fromkeys(robot.actuated_joint_names, 0.0), "PSM1_insertion": 0.12}
+    command = HAND.command("caliper", 0.3)
+    q |= dict(zip((f"PSM1_{link.name}" for link in HAND.links), HAND.unloaded(command).ravel(), strict=True))
+    robot.update_cfg(q)
+    shaft = arms.chain("PSM1", "MUSHA_HAND").frames(np.array([0.0, 0.0, 0.12, 0.0]))[3]
+    expected = (shaft @ [*HAND.contacts(HAND.unloaded(command))[0, 2], 1.0])[:3]
+    distal = robot.get_transform("PSM1_finger1_distal_link", "PSM1_base")
+    assert np.allclose((distal @ [HAND.phalanges[-1].length, 0.0, 0.0, 1.0])[:3], expected, atol=1e-9)
