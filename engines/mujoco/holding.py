@@ -6,6 +6,8 @@ comes and goes with that; with `grasp: friction` nothing but contact acts, and t
 
 from __future__ import annotations
 
+from math import acos
+
 import mujoco
 import numpy as np
 
@@ -45,7 +47,7 @@ def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
         for arm in _jawed(scene):
             for finger in FINGERS:
                 sensor = spec.add_sensor(name=f"{thing}/{arm}/{finger}", type=mujoco.mjtSensor.mjSENS_CONTACT)
-                sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, f"{arm}/{finger}"
+                sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_XBODY, f"{arm}/{finger}"  # with the pad on it
                 sensor.reftype, sensor.refname = mujoco.mjtObj.mjOBJ_BODY, thing
                 sensor.intprm[:3] = _FOUND_AND_POSITION, _CENTROID, 1
             if scene.grasp == "weld":
@@ -104,13 +106,13 @@ class Holding:
         self._welds = [[model.equality(f"{thing}/{arm}/weld").id for arm in arms] for thing in things] if scene.grasp == "weld" else None
         self._touched = np.zeros(shape)  # how often in succession both fingers were seen to touch
         self._holder = np.full(len(things), -1.0)  # index of an arm
-        self._grip = np.zeros((*shape, 6))  # where the fingers took hold: in the object, and in the left finger
-        self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 3))
+        self._grip = np.zeros((*shape, 10))  # where the fingers took hold: in the object, and in the left finger; the object's orientation in that finger
+        self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 4))
         self._height = data.xpos[self._bodies, 2].copy()
         self.outputs: dict[str, Vector] = {}
         for i, thing in enumerate(things):
-            held_by, slip, lift = self._values[i, 0:1], self._values[i, 1:2], self._values[i, 2:3]
-            self.outputs |= {f"{thing}/pose": self._poses[i], f"{thing}/held_by": held_by, f"{thing}/slip": slip, f"{thing}/lift": lift}
+            values = {f"{thing}/{name}": self._values[i, k : k + 1] for k, name in enumerate(("held_by", "slip", "turn", "lift"))}
+            self.outputs |= {f"{thing}/pose": self._poses[i], **values}
 
     def update(self) -> None:
         """Look at the contacts, set welds, and bring the outputs up to date."""
@@ -134,8 +136,8 @@ class Holding:
             self._poses[i, :3] = data.xpos[body]
             self._poses[i, 3:] = data.xquat[body, [1, 2, 3, 0]]
             holder = int(self._holder[i])
-            self._values[i] = (0.0, 0.0, 0.0) if holder < 0 else (self._numbers[holder], self._slip(i, holder), 0.0)
-            self._values[i, 2] = data.xpos[body, 2] - self._height[i]
+            self._values[i, :3] = (0.0, 0.0, 0.0) if holder < 0 else (self._numbers[holder], self._slip(i, holder), self._turn(i, holder))
+            self._values[i, 3] = data.xpos[body, 2] - self._height[i]
 
     def _choose_holder(self, i: int) -> None:
         """Keep the arm that holds object `i` as long as it does; then take the first that does."""
@@ -148,7 +150,8 @@ class Holding:
         data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = self._contacts[i, j, :, 1:].mean(axis=0)
         self._grip[i, j, :3] = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
-        self._grip[i, j, 3:] = data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger])
+        self._grip[i, j, 3:6] = data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger])
+        self._grip[i, j, 6:] = self._orientation(i, j)
         if self._welds is not None:
             wrist, weld = self._wrists[j], self._welds[i][j]
             position, turn, back = np.zeros(3), np.zeros(4), np.zeros(4)
@@ -161,7 +164,19 @@ class Holding:
     def _slip(self, i: int, j: int) -> float:
         data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self._grip[i, j, :3]
-        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:]))
+        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:6]))
+
+    def _turn(self, i: int, j: int) -> float:
+        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` since it was taken."""
+        w = abs(float(self._grip[i, j, 6:] @ self._orientation(i, j)))
+        return 2.0 * acos(min(w, 1.0))
+
+    def _orientation(self, i: int, j: int) -> Vector:
+        """Return the orientation of object `i` in the left finger of arm `j`, quaternion (w, x, y, z)."""
+        back, turn = np.zeros(4), np.zeros(4)
+        mujoco.mju_negQuat(back, self._data.xquat[self._fingers[j]])
+        mujoco.mju_mulQuat(turn, back, self._data.xquat[self._bodies[i]])
+        return turn
 
     @property
     def state(self) -> Vector:
