@@ -34,12 +34,12 @@ class CaliperParams(Params):
     """Which hand measures, how fast it closes, and when it has touched."""
 
     arm: ArmName
-    touch: Force = Field(default=0.05, gt=0, description="force on a finger at which it stops")
+    touch: Force = Field(default=0.05, gt=0, description="force on a fingertip at which its finger stops")
     rate: float = Field(default=0.05, gt=0, description="at which the fingers close, in 1/s: share of the way from open to closed")
 
 
 class Caliper(Stepped):
-    """Closes the two fingers from where they are once `start` is 1. Each stops when it feels the organ; when both have, the width is told."""
+    """Closes the two fingers from where they are once `start` is 1. Each stops when its tip feels the organ; when both have, the width is told."""
 
     params_model: ClassVar[type[Params]] = CaliperParams
     params: CaliperParams
@@ -84,7 +84,7 @@ class Caliper(Stepped):
         if not self._started[0]:
             closings = (inputs["hand"][:_FINGERS] - _OPEN[:_FINGERS])[list(_JAWS)] / (_CLOSED - _OPEN)[list(_JAWS)]
             self._started[0], self._closing[list(_JAWS)] = 1.0, np.clip(closings, 0.0, 1.0)
-        self._feel(inputs["force"].reshape(_FINGERS, -1, 3))
+        self._feel(inputs["force"].reshape(_FINGERS, _PHALANGES, 3))
         if self._touched[list(_JAWS)].all():
             self._measure(inputs)
         else:
@@ -98,8 +98,9 @@ class Caliper(Stepped):
             self._mesh = body.nodes_m.astype(np.float64).reshape(-1, 3)[body.triangles.reshape(-1, 3)]
 
     def _feel(self, forces: Vector) -> None:
+        """Note which fingertips are touched; the published hand has its force sensors there."""
         for finger in _JAWS:
-            if np.linalg.norm(forces[finger].sum(axis=0)) >= self.params.touch:
+            if np.linalg.norm(forces[finger, -1]) >= self.params.touch:
                 self._touched[finger] = 1.0
 
     def _close(self, seconds: float) -> None:

@@ -58,14 +58,15 @@ class MoveJoints(_Order):
 
 
 class MoveJaw(_Order):
-    """Open or close the jaw."""
+    """Open or close the jaw; where it has a roller, roll what it holds."""
 
     do: Literal["jaw"]
     angle: Angle
+    roll: Angle | None = Field(default=None, description="for a jaw with a roller: by how much to have rolled the needle")
 
     def message(self) -> tuple[str, Message]:
         """Return port and message."""
-        return f"{self.arm}/jaw/move_jp", JointState(position=np.array([self.angle]))
+        return f"{self.arm}/jaw/move_jp", JointState(position=np.array([self.angle] if self.roll is None else [self.angle, self.roll]))
 
 
 class MoveHand(_Order):

@@ -24,7 +24,7 @@ class Gripper(NamedTuple):
     name: str
     """Second part of its ports' names: `jaw` or `hand`."""
     joints: tuple[Joint, ...]
-    """What is commanded: the jaw's angle, or the closings of the fingers."""
+    """What is commanded: the jaw's angle, with the roller's if it has one, or the closings of the fingers."""
     start: tuple[float, ...]
     """Positions at time 0, rad."""
 
@@ -59,7 +59,7 @@ class PsmParams(ArmParams):
         """What the instrument grasps with, if anything."""
         tool = instrument(self.instrument)
         if tool.jaw is not None:
-            return Gripper("jaw", (tool.jaw.joint,), (self.jaw,))
+            return Gripper("jaw", tool.jaw_joints, (self.jaw, 0.0)[: len(tool.jaw_joints)])
         return None if tool.hand is None else Gripper("hand", tool.hand.joints, self.hand)
 
     @property

@@ -41,6 +41,9 @@ _LARGEST_GAIN = 4.0 / 3.0
 _FILTER = 0.2
 """Share of the way to the measured gain gone at each reading: a time constant of 36 ms, in which waves in the tissue even out."""
 
+_LEAST_PART = 1e-3
+"""Of a force, on every node of the faces that may be touched."""
+
 _LEAST_FORCE_N = 5e-3
 """Below this the inertia of the touched nodes, of some 0.1 g each, counts in what they receive."""
 
@@ -83,7 +86,9 @@ class _Touch:
     guess: float
     """Gain that the faces' distances suggest."""
     nodes: Indices
-    """Of these faces."""
+    """Of these faces, shape (k,)."""
+    parts: Vector
+    """Of the force, that fall to each of the nodes by the same guess, shape (k,)."""
 
     @property
     def push(self) -> Vector:
@@ -132,21 +137,23 @@ def _touch(tissue: Tissue, probe: Probe, sphere: int) -> _Touch | None:
         return None
     share, s = reach - distance, np.einsum("fi,fi->f", weights, weights)
     guess = float(share @ ((1.0 + s) ** 2 / (4.0 * s)) / share.sum())
-    return _Touch(probe, sphere, float(distance.min()), guess, np.unique(faces))
+    touched, place = np.unique(faces, return_inverse=True)
+    parts = np.bincount(place.ravel(), (share[:, None] * weights).ravel()) / share.sum() + _LEAST_PART
+    return _Touch(probe, sphere, float(distance.min()), guess, touched, parts)
 
 
 def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
-    """Correct the guesses by what the nodes receive; where spheres share a node, by the shares of their pushes."""
+    """Correct the guesses by what the nodes receive; where spheres share a node, by the parts that should fall to it."""
     tied = tissue.organ.anchored | tissue.organ.held
     received = tissue.received(np.unique(np.concatenate([touch.nodes for touch in touches])))
     size = [float(np.linalg.norm(touch.push)) for touch in touches]
     pushed = np.zeros(len(received))
     for touch, force in zip(touches, size, strict=True):
-        pushed[touch.nodes] += force
+        pushed[touch.nodes] += force * touch.parts
     for touch, force in zip(touches, size, strict=True):
         probe, i = touch.probe, touch.sphere
         if force > _LEAST_FORCE_N and not tied[touch.nodes].any():
-            felt = force / pushed[touch.nodes] @ received[touch.nodes] @ touch.push / force
+            felt = (force * touch.parts / pushed[touch.nodes]) @ received[touch.nodes] @ touch.push / force
             needed = force / max(felt, force / _LARGEST_GAIN)
             probe.corrections[i] += _FILTER * (min(max(needed, 1.0), _LARGEST_GAIN) / touch.guess - probe.corrections[i])
         probe.gains[i] = min(max(touch.guess * probe.corrections[i], 1.0), _LARGEST_GAIN)

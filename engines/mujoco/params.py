@@ -135,6 +135,13 @@ class SceneParams(Params):
             raise ValueError(f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart setup_joints say where an arm stands")
         return self
 
+    @model_validator(mode="after")
+    def _rolls_by_friction(self) -> Self:
+        rolling = [name for name, arm in self.arms.items() if isinstance(arm, PsmParams) and arm.tool.roller is not None]
+        if rolling and self.objects and self.grasp == "weld":
+            raise ValueError(f"grasp: weld would hold what the instrument of {', '.join(rolling)} is to roll; take grasp: friction")
+        return self
+
 
 class MujocoParams(SceneParams):
     """A scene, and how it is stepped."""

@@ -72,10 +72,12 @@ def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[P
 
 def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
     if isinstance(params, PsmParams) and has_jaw(params):
-        names = ("jaw",)
-        yield Port(name=f"{arm}/jaw/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=(params.jaw,), description="goal of the jaw's servo")
+        names = tuple(joint.name for joint in params.tool.jaw_joints)
+        start, still = (params.jaw, 0.0)[: len(names)], (0.0,) * len(names)
+        goal = "goal of the jaw's servo" + ("" if params.tool.roller is None else ", and by how much the pads are to roll a needle of 0.8 mm between them")
+        yield Port(name=f"{arm}/jaw/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=start, description=goal)
         yield Port(
-            name=f"{arm}/jaw/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=(0.0,), description="acts in effort mode"
+            name=f"{arm}/jaw/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode"
         )
         yield Port(name=f"{arm}/jaw/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
 
@@ -100,4 +102,6 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(name=f"{thing}/held_by", causality="output", type="std_msgs/msg/Float64", period_ns=slow, description=holder)
     slip = "how far it has moved in the jaws that hold it since they closed"
     yield Port(name=f"{thing}/slip", causality="output", type="std_msgs/msg/Float64", unit="m", period_ns=slow, description=slip)
+    turn = "angle by which it has turned in the jaws that hold it since they closed, at most half a turn"
+    yield Port(name=f"{thing}/turn", causality="output", type="std_msgs/msg/Float64", unit="rad", period_ns=slow, description=turn)
     yield Port(name=f"{thing}/lift", causality="output", type="std_msgs/msg/Float64", unit="m", period_ns=slow, description="height over where it started")

@@ -16,6 +16,7 @@ import numpy as np
 from engines.mujoco.model import FINGERS
 from engines.mujoco.params import EcmParams, PsmParams, SceneArm
 from hub.inputs import Inputs
+from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
@@ -62,6 +63,11 @@ class Servos:
                 self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
                 shares += [(actuator, len(rows), 0.5) for actuator in self._groups[-1].actuators]
                 rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
+                if (roller := params.tool.roller) is not None:
+                    self._groups[-1].part = slice(len(rows) - 1, len(rows) + 1)
+                    self._groups[-1].actuators.append(model.actuator(f"{arm}/{ROLLER}").id)
+                    shares.append((self._groups[-1].actuators[-1], len(rows), 1.0))
+                    rows.append((0.0, roller.joint.lower, roller.joint.upper, roller.joint.velocity))
             elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
                 self._add_group(arm, f"{arm}/hand/", [motor.name for motor in hand.joints], len(rows), len(hand.joints))
                 shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
@@ -91,7 +97,7 @@ class Servos:
         model = self._model
         actuators = [model.actuator(f"{arm}/{joint}").id for joint in joints]
         grasps = ports != f"{arm}/"
-        grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, "finger"))  # those of a jaw, and the phalanges of a hand
+        grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, *PADS, "finger"))  # those of a jaw with its pads, and the phalanges of a hand
         own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
         bodies = [i for i in own if model.body(i).name.startswith(grasping) == grasps]
         weighed = [i for i in bodies if model.body(i).name == "ECM/roll"]

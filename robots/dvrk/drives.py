@@ -20,6 +20,7 @@ from robots.dvrk import ecm
 from robots.dvrk import psm as psm_arm
 from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import Instrument
+from robots.dvrk.rolling_needle_driver import ROLLER
 
 __all__ = ["ECM", "FINGERS", "SMOOTHING", "Disc", "Drive", "discs", "friction", "psm"]
 
@@ -84,7 +85,7 @@ _ECM_GAINS = {"yaw": (400.0, 30.0), "pitch": (1000.0, 80.0), "insertion": (10000
 
 
 def psm(tool: Instrument) -> Mapping[str, Drive]:
-    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw or hand included."""
+    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw or hand and the roller included."""
     chain = psm_arm.chain(tool)
     drives = {joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity) for joint in chain.joints[:3]}
     square = {name: sum(disc.shares.get(name, 0.0) ** 2 for disc in discs(tool)) for name in _moved(tool)}
@@ -96,6 +97,10 @@ def psm(tool: Instrument) -> Mapping[str, Drive]:
     for name, share in square.items():
         elastic = (_ROLL_ELASTICITY, _ROLL_OFFSET) if name == "roll" else (0.0, 0.0)
         drives[name] = Drive(_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, *elastic, _DISC_INERTIA * share, *limits[name])
+    if tool.roller is not None:
+        share = (tool.roller.wire_radius / tool.roller.pulley) ** 2
+        of_disc = (_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, 0.0, 0.0, _DISC_INERTIA * share)
+        drives[ROLLER] = Drive(*of_disc, tool.roller.joint.effort, tool.roller.joint.velocity)
     if tool.hand is not None:
         drives |= {joint.name: drive for joint, drive in zip(tool.hand.joints, _motors(tool.hand), strict=True)}
     return MappingProxyType(drives)

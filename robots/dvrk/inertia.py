@@ -25,6 +25,7 @@ from robots.dvrk.ecm import chain as ecm_chain
 from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import SHAFT_RADIUS, STEEL_DENSITY, WRIST_RADIUS, Instrument
 from robots.dvrk.psm import chain as psm_chain
+from robots.dvrk.rolling_needle_driver import PADS
 from schemas.vectors import Vector
 
 __all__ = ["ENDOSCOPE_MASS", "PROBE_RADIUS", "SHAFT_MASS", "Inertia", "ecm", "instrument", "psm"]
@@ -108,7 +109,21 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
         return {**bodies, last: Inertia(mass, end, 0.4 * mass * probe_radius**2 * np.eye(3))}
     bodies[last] = Inertia(_YAW_LINK_MASS, end, 0.4 * _YAW_LINK_MASS * WRIST_RADIUS**2 * np.eye(3))
     finger = Inertia.of_rod(_FINGER_MASS, end, end + tool.jaw.length * ahead, FINGER_HALF_WIDTH)
-    return {**bodies, "jaw_left": finger, "jaw_right": finger}
+    return {**bodies, "jaw_left": finger, "jaw_right": finger, **_pads(tool, end, ahead, frames[-2, :3, 2])}
+
+
+def _pads(tool: Instrument, end: Vector, ahead: Vector, axis: Vector) -> Mapping[str, Inertia]:
+    """Return the pads of a roller, of steel; the wrist yaw axis passes `end` along `axis`, which like `ahead` is one of the base frame's, shape (3,)."""
+    if tool.roller is None:
+        return {}
+    along, across, thickness = tool.roller.size
+    side = np.cross(axis, ahead)  # of the left finger
+    size = np.abs(along * ahead + across * axis + thickness * side)
+    middle = end + tool.roller.distance * ahead
+    return {
+        pad: Inertia.of_box(STEEL_DENSITY * along * across * thickness, middle + way * thickness / 2.0 * side, size)
+        for pad, way in zip(PADS, (1.0, -1.0), strict=True)
+    }
 
 
 def _hand(hand: Hand, shaft: Vector) -> Mapping[str, Inertia]:

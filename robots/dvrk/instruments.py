@@ -106,6 +106,11 @@ class Instrument:
         """Whether the wrist is that of a 5 mm instrument: four bending joints in place of wrist pitch and wrist yaw."""
         return len(self.joints) > 3
 
+    @property
+    def jaw_joints(self) -> tuple[Joint, ...]:
+        """What is commanded of the jaw: its angle and, where it has a roller, that of the needle; empty where there is no jaw."""
+        return () if self.jaw is None else (self.jaw.joint,) if self.roller is None else (self.jaw.joint, self.roller.joint)
+
     @cached_property
     def spheres(self) -> tuple[ContactSphere, ...]:
         """What touches tissue; empty for a palpation probe, which is a sphere itself, and for what has no jaw."""

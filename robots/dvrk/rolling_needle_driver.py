@@ -13,7 +13,7 @@ from math import radians
 from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint
 
-__all__ = ["DISTANCE", "NAME", "PADS", "TIE", "Roller", "roller"]
+__all__ = ["NAME", "PADS", "ROLLER", "Roller", "roller"]
 
 NAME = "ROLLING_NEEDLE_DRIVER"
 """Of the instrument."""
@@ -21,10 +21,10 @@ NAME = "ROLLING_NEEDLE_DRIVER"
 PADS = ("pad_left", "pad_right")
 """The links: each slides along its finger, the left one forwards while the right one goes back."""
 
-TIE = "roller"
+ROLLER = "roller"
 """The joint: the angle by which a wire of `Roller.wire_radius` rolls about its own tangent, from the pads' middle position on."""
 
-DISTANCE = 0.0077
+_DISTANCE = 0.0077
 """From the wrist yaw axis to the middle of the pads, m: as far out as pads of this length and their way leave room for on a jaw of 10.2 mm."""
 
 _WIRE_RADIUS = 0.4e-3
@@ -45,8 +45,8 @@ class Roller:
     distance: float
     """From the wrist yaw axis to the middle of the pads, m."""
     size: tuple[float, float, float]
-    """Of a pad, m: along the finger, along the wire, and its thickness. Narrow, since a curved wire that is rolled out of the plane of the pads wedges them
-    apart by the height of its arc over their width."""
+    """Of a pad, m: along the finger, along the wire, and its thickness. Narrow as a rail, since a curved wire that is rolled out of the plane of wide pads
+    wedges them apart, by the height of its arc over their width, and slips."""
     pulley: float
     """By which the motor shifts the pads, m: one disc more than a PSM turns."""
 
@@ -56,6 +56,6 @@ def roller(jaw_effort: float) -> Roller:
 
     Its effort is what makes the pads slip, at a friction coefficient of 1, on a needle that the jaw grips with all its torque.
     """
-    effort = 2.0 * _WIRE_RADIUS * jaw_effort / DISTANCE
-    joint = Joint(TIE, "revolute", 0.0, 0.0, 0.0, 0.0, -_RANGE, _RANGE, _VELOCITY, effort, _ACCELERATION, jerk(_ACCELERATION))
-    return Roller(joint, _WIRE_RADIUS, DISTANCE, (0.0036, 0.0020, 0.0005), 0.001)
+    effort = 2.0 * _WIRE_RADIUS * jaw_effort / _DISTANCE
+    joint = Joint(ROLLER, "revolute", 0.0, 0.0, 0.0, 0.0, -_RANGE, _RANGE, _VELOCITY, effort, _ACCELERATION, jerk(_ACCELERATION))
+    return Roller(joint, _WIRE_RADIUS, _DISTANCE, (0.0036, 0.0006, 0.0005), 0.001)

@@ -114,7 +114,7 @@ def test_a_block_is_measured_through_both_engines():
     scenario = {
         "name": "caliper",
         "step": "0.5 ms",
-        "duration": "1.3 s",
+        "duration": "0.7 s",
         "order": ["tissue", "caliper", "motion", "robot"],
         "connections": [
             *("caliper.* -> motion.*", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*", "tissue.hand/force -> caliper.force"),
@@ -124,7 +124,7 @@ def test_a_block_is_measured_through_both_engines():
         "bonds": [{"motion": "robot.PSM1/contact", "force": "tissue.hand", "algorithm": "impulse"}],
         "measure": {"width": {"kind": "final", "of": "caliper.width"}, "true_width": {"kind": "final", "of": "caliper.true_width"}},
     }
-    arm = {"instrument": "MUSHA_HAND", "position": [0, 0, "153 mm"], "start": [0, 0, 0.13, 0], "hand": HAND.command("caliper", 0.25).tolist()}
+    arm = {"instrument": "MUSHA_HAND", "position": [0, 0, "153 mm"], "start": [0, 0, 0.13, 0], "hand": HAND.command("caliper", 0.38).tolist()}
     block = {"size": ["30 mm", "40 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": 60}
     participants = {
         "clock": Routine("clock", RoutineParams.model_validate({"steps": [{"do": "wait", "time": 0}]})),

@@ -10,12 +10,13 @@ from schemas.vectors import Vector
 __all__ = ["MOST_NODES", "checked_mesh"]
 
 MOST_NODES = 5000
+"""A step of 1 ms takes some 15 ms with as many at rest (bench/organs.py)."""
 
 _SMALLEST_M, _LARGEST_M = 5e-3, 1.0
 """Extent of an organ: from a lymph node to more than any abdominal organ."""
 
 _FLATTEST = 0.02
-"""Least shape quality: a tetrahedron half as flat has the stability of one twenty times as small."""
+"""Least shape quality: the flatter a tetrahedron, the shorter the stable step. Generated organs have more than 0.25 (docs/decisions/0014-organs.md)."""
 
 _SAME_PLACE = 1e-6
 """Nodes nearer than this share of the mesh's extent are at the same place."""

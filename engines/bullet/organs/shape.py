@@ -24,6 +24,7 @@ ROUNDING_DIGITS = 6
 
 _COUNT_TOLERANCE = 0.02
 _SEARCHES = 8
+"""The spacing is sought that gives the wanted number of nodes to this share, in at most so many attempts; then the nearest is taken."""
 
 _SIDE_SHARE = 0.05
 """A side takes what lies within this share of the organ's extent from its end."""

@@ -23,8 +23,9 @@ _SNAP_LONG, _SNAP_SHORT = 0.24999, 0.41189
 """A lattice vertex moves onto the surface that cuts an edge nearer to it than this share of the edge (Labelle and Shewchuk, table 2)."""
 
 _BISECTIONS = 20
-_SMOOTHINGS = 80
-_EVENNESS = 2.0
+_SMOOTHINGS = 40
+"""Steps of smoothing; the least shape quality of the organs rises by less than 1 % from 20 to 160."""
+
 _DIFFERENCE_M = 1e-6
 """Step of the differences that give a field's gradient."""
 
@@ -145,23 +146,11 @@ def _cut(points: Vector, signs: Indices, tetrahedra: Indices, edges: Indices, cu
 
 
 def smoothed(mesh: TetMesh, field: Field, spacing: float) -> TetMesh:
-    """Return a mesh with better shaped tetrahedra and a more even surface; its surface nodes stay on the surface of `field`.
-
-    The nodes move down the slope of the sum over tetrahedra of their distortion and over edges of the surface of their squared length.
-    """
-    triangles = mesh.triangles
-    nodes, surface = mesh.nodes.copy(), np.unique(triangles)
-    one, other = triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()  # every edge of the surface, once in each direction
+    """Return a mesh with better shaped tetrahedra: its nodes move down the slope of their distortion, those of the surface along that of `field`."""
+    nodes, surface = mesh.nodes.copy(), np.unique(mesh.triangles)
     step = 0.02 * spacing
-
-    def cost_and_slope(nodes: Vector) -> tuple[float, Vector]:
-        cost, slope = _distortion(nodes, mesh.tetrahedra)
-        edges = (nodes[one] - nodes[other]) / spacing
-        pull = np.stack([np.bincount(one, edges[:, i], len(nodes)) - np.bincount(other, edges[:, i], len(nodes)) for i in range(3)], axis=1)
-        return cost + _EVENNESS * float((edges**2).sum()), slope + 2.0 * _EVENNESS / spacing * pull
-
     nodes[surface] = _onto_surface(field, nodes[surface])
-    cost, slope = cost_and_slope(nodes)
+    cost, slope = _distortion(nodes, mesh.tetrahedra)
     for _ in range(_SMOOTHINGS):
         normal = _gradient(field, nodes[surface])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -169,7 +158,7 @@ def smoothed(mesh: TetMesh, field: Field, spacing: float) -> TetMesh:
         length = np.linalg.norm(slope, axis=1, keepdims=True)
         moved = nodes - step * slope / (length + 0.1 * length.max())
         moved[surface] = _onto_surface(field, moved[surface])
-        new_cost, new_slope = cost_and_slope(moved)
+        new_cost, new_slope = _distortion(moved, mesh.tetrahedra)
         if new_cost < cost:
             nodes, cost, slope, step = moved, new_cost, new_slope, 1.3 * step
         else:

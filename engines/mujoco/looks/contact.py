@@ -6,7 +6,7 @@ import numpy as np
 
 from engines.mujoco.looks import cart as cart_look
 from engines.mujoco.looks import ecm as ecm_look
-from engines.mujoco.looks import fingers, instruments, musha
+from engines.mujoco.looks import fingers, instruments, musha, roller
 from engines.mujoco.looks import psm as psm_look
 from engines.mujoco.looks import setup_joints as setup_look
 from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
@@ -66,6 +66,8 @@ def instrument(tool: Instrument) -> Collisions:
         form, pose = fingers.shape(tool, tool.jaw), instruments.finger_frame(tool)
         for name, side in zip(instruments.FINGERS, (1, -1), strict=True):
             collisions[name] = (fingers.grip(name, form, side, pose),)
+        if tool.roller is not None:
+            collisions |= {name: (box,) for name, box in roller.boxes(tool.roller, pose)}
     return collisions
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.mujoco.looks import musha
+from engines.mujoco.looks import musha, roller
 from engines.mujoco.looks.fingers import finger, shape
 from engines.mujoco.looks.part import BLACK, BLUE, SLATE, STEEL, Looks, Part
 from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
@@ -40,6 +40,8 @@ def parts(tool: Instrument) -> Looks:
         pose = finger_frame(tool)
         for name, side in zip(FINGERS, (1, -1), strict=True):
             looks[name] = finger(name, shape(tool, tool.jaw), side, pose)
+        if tool.roller is not None:
+            looks |= roller.parts(tool.roller, pose)
     elif tool.number:
         looks[tool.joints[-1].name] += (_electrode(finger_frame(tool)),)
     return looks

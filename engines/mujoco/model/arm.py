@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import hand as hands
+from engines.mujoco.model import roller as rollers
 from engines.mujoco.model import transform
 from engines.mujoco.model.names import FINGERS, sphere_site
 from engines.mujoco.model.shapes import Bodies
@@ -15,6 +16,7 @@ from robots.dvrk import drives, inertia
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.contact_spheres import ContactSphere
 from robots.dvrk.drives import Drive
+from robots.dvrk.rolling_needle_driver import ROLLER
 from schemas.vectors import Vector
 
 __all__ = ["add"]
@@ -26,6 +28,7 @@ _TIE = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 _POSE = ((mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"), (mujoco.mjtSensor.mjSENS_FRAMEQUAT, "quaternion"))
 _TWIST = ((mujoco.mjtSensor.mjSENS_FRAMELINVEL, "linear"), (mujoco.mjtSensor.mjSENS_FRAMEANGVEL, "angular"))
 _JOINT = ((mujoco.mjtSensor.mjSENS_JOINTPOS, "position"), (mujoco.mjtSensor.mjSENS_JOINTVEL, "velocity"), (mujoco.mjtSensor.mjSENS_JOINTACTFRC, "effort"))
+_MOTOR = ((mujoco.mjtSensor.mjSENS_ACTUATORPOS, "position"), (mujoco.mjtSensor.mjSENS_ACTUATORVEL, "velocity"), (mujoco.mjtSensor.mjSENS_ACTUATORFRC, "effort"))
 
 
 def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose: Vector) -> Bodies:
@@ -45,8 +48,10 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
     if isinstance(params, PsmParams):
         if (hand := params.tool.hand) is not None:
-            hands.add_sensors(spec, name, hand)
+            _add_sensors_of(spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [motor.name for motor in hand.joints])
             _add_joint_sensors(spec, name, [link.name for link in hand.links])
+        if params.tool.roller is not None:
+            _add_sensors_of(spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [ROLLER])
         _add_spheres(spec, name, params.tool.spheres, bodies)
     return bodies
 
@@ -64,13 +69,15 @@ def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) ->
     """Give each independent joint its drive, and an instrument's discs the friction that wrist and jaw share."""
     is_psm = isinstance(params, PsmParams)
     driven = drives.psm(params.tool) if is_psm else drives.ECM
-    hand = params.tool.hand if is_psm else None
+    hand, roller = (params.tool.hand, params.tool.roller) if is_psm else (None, None)
     for name, drive in driven.items():
-        if hand is None or name not in (*hand.fingers, *hand.spreads):
+        if name != ROLLER and (hand is None or name not in (*hand.fingers, *hand.spreads)):
             _add_drive(spec, f"{arm}/{name}", drive)
     if hand is not None:
         hands.add_drives(spec, arm, hand, driven)
         hands.add_contacts(spec, arm, hand)
+    if roller is not None:
+        rollers.add_drive(spec, arm, roller, driven[ROLLER])
     for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
         tendon = spec.add_tendon(name=f"{arm}/disc_{i}", damping=[disc.viscous_friction, 0.0, 0.0], frictionloss=disc.coulomb_friction)
         for name, share in disc.shares.items():
@@ -134,6 +141,11 @@ def _add_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str], has_jaw: bool
 
 
 def _add_joint_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str]) -> None:
-    for kind, what in _JOINT:
-        for joint in joints:
-            spec.add_sensor(name=f"{arm}/{what}/{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=f"{arm}/{joint}")
+    _add_sensors_of(spec, arm, _JOINT, mujoco.mjtObj.mjOBJ_JOINT, joints)
+
+
+def _add_sensors_of(spec: mujoco.MjSpec, arm: str, kinds: tuple[tuple[mujoco.mjtSensor, str], ...], what: mujoco.mjtObj, names: list[str]) -> None:
+    """Let MuJoCo lay out positions, then velocities, then efforts of joints or motors."""
+    for kind, label in kinds:
+        for name in names:
+            spec.add_sensor(name=f"{arm}/{label}/{name}", type=kind, objtype=what, objname=f"{arm}/{name}")

@@ -11,7 +11,7 @@ import mujoco
 from robots.dvrk.drives import Drive
 from robots.dvrk.hand import Hand, HandLink
 
-__all__ = ["add_contacts", "add_drives", "add_sensors"]
+__all__ = ["add_contacts", "add_drives"]
 
 _STOP = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 """Of the stops in the joints, and of fingers that touch: as stiff as the ties of a linkage, for what they hold weighs two grams."""
@@ -60,14 +60,6 @@ def _add_motor(spec: mujoco.MjSpec, name: str, drive: Drive, lower: float, upper
     inputs = mujoco.mjtCtrlInput
     actuator = spec.add_actuator(name=name, **{**motor, **fields})
     actuator.set_to_pid(kp=drive.stiffness, kv=drive.damping, ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF))
-
-
-def add_sensors(spec: mujoco.MjSpec, arm: str, hand: Hand) -> None:
-    """Let MuJoCo lay out positions, velocities and torques of all motors."""
-    sensors = mujoco.mjtSensor
-    for kind, what in ((sensors.mjSENS_ACTUATORPOS, "position"), (sensors.mjSENS_ACTUATORVEL, "velocity"), (sensors.mjSENS_ACTUATORFRC, "effort")):
-        for motor in hand.joints:
-            spec.add_sensor(name=f"{arm}/{what}/{motor.name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_ACTUATOR, objname=f"{arm}/{motor.name}")
 
 
 def add_contacts(spec: mujoco.MjSpec, arm: str, hand: Hand) -> None:

@@ -31,7 +31,7 @@ def first_sensor(arm: str) -> str:
 
     They lie in this order: positions, velocities and efforts of the n joints; tip in the base frame (position 3, quaternion w, x,
     y, z); tip in the world (the same, then linear and angular velocity); where there is a jaw, positions, velocities and
-    efforts of the two fingers, left before right, or of the fingers of a hand and then of its phalanges; positions of all contact
+    efforts of the two fingers, left before right, and then of a roller; or of the fingers of a hand and then of its phalanges; positions of all contact
     spheres in the world, then their velocities.
     """
     return f"{arm}/position/yaw"
