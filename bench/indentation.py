@@ -27,9 +27,11 @@ from tests.engines.bullet_rig import Rig
 from tests.engines.finite_elements import Body
 
 NODES = {"coarse": 250, "fine": 1000}
+TIMESTEP_S = {250: 1e-3, 1000: 0.5e-3}
+"""Sub-step times highest frequency is 1.6 and 1.3."""
 CONTINUUM_NODES = 2000
 RADII_M = (2e-3, 3e-3, 4e-3, 5e-3)
-DEPTHS_M = np.arange(1, 7) * 1e-3
+DEPTHS_M: Vector = np.arange(1, 7) * 1e-3
 FREQUENCY_HZ, MIDDLE_M, AMPLITUDE_M = 5.0, 3e-3, 2e-3
 
 
@@ -48,7 +50,7 @@ class Row:
 def params(nodes: int, radius: float) -> BulletParams:
     """Return the block of about so many nodes and its probe of `radius` (m)."""
     organ = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": nodes}
-    return BulletParams.model_validate({"organs": {"block": organ}, "probes": {"probe": {"radius": radius}}})
+    return BulletParams.model_validate({"organs": {"block": organ}, "probes": {"probe": {"radius": radius}}, "timestep": TIMESTEP_S.get(nodes, 0.5e-3)})
 
 
 def places(model: BulletParams) -> dict[str, Vector]:

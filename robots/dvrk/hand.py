@@ -27,7 +27,7 @@ from schemas.vectors import Vector
 
 __all__ = ["Hand", "HandLink", "Mode", "Phalanx"]
 
-CARRIER = "roll"
+_CARRIER = "roll"
 """The link that carries the fingers."""
 
 
@@ -110,7 +110,7 @@ class Hand:
         links: list[HandLink] = []
         for finger, azimuth in zip(self.fingers, self.azimuths, strict=True):
             c, s = np.cos(azimuth), np.sin(azimuth)
-            pose, parent = np.eye(4), CARRIER
+            pose, parent = np.eye(4), _CARRIER
             pose[:3, 0], pose[:3, 1], pose[:3, 2] = (0.0, 0.0, 1.0), (-c, -s, 0.0), (s, -c, 0.0)
             pose[:3, 3] = self.offset * c, self.offset * s, self.palm
             for phalanx in self.phalanges:

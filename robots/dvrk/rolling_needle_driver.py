@@ -1,8 +1,8 @@
 """The rolling needle driver: a large needle driver whose pads slide against each other and so roll the needle between them.
 
-Published is a needle driver with one degree of freedom more, which turns the needle between its jaws (Fontanelli, Selvaggio, Buonocore,
-Ficuciello, Villani, Siciliano, "A New Laparoscopic Tool With In-Hand Rolling Capabilities for Needle Reorientation", IEEE Robotics and Automation
-Letters 3, 2018). Its measures are not: those here are ours, see docs/decisions/0019. SI units, radians.
+Published is a needle driver with one degree of freedom more, which turns the needle between its jaws (Fontanelli et al., "A New Laparoscopic Tool
+With In-Hand Rolling Capabilities for Needle Reorientation", IEEE Robotics and Automation Letters, 2018). Its measures we could not read: those here
+are ours, see docs/decisions/0019. SI units, radians.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Roller:
     """From the wrist yaw axis to the middle of the pads, m."""
     size: tuple[float, float, float]
     """Of a pad, m: along the finger, along the wire, and its thickness. Narrow as a rail, since a curved wire that is rolled out of the plane of wide pads
-    wedges them apart, by the height of its arc over their width, and slips."""
+    wedges them apart, by the height of its arc over their width, and slips. Thinner than the wire's radius, so that the fingers behind hold a wire ahead of the pads."""
     pulley: float
     """By which the motor shifts the pads, m: one disc more than a PSM turns."""
 
@@ -58,4 +58,4 @@ def roller(jaw_effort: float) -> Roller:
     """
     effort = 2.0 * _WIRE_RADIUS * jaw_effort / _DISTANCE
     joint = Joint(ROLLER, "revolute", 0.0, 0.0, 0.0, 0.0, -_RANGE, _RANGE, _VELOCITY, effort, _ACCELERATION, jerk(_ACCELERATION))
-    return Roller(joint, _WIRE_RADIUS, _DISTANCE, (0.0036, 0.0006, 0.0005), 0.001)
+    return Roller(joint, _WIRE_RADIUS, _DISTANCE, (0.0036, 0.0006, 0.0003), 0.001)

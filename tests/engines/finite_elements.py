@@ -18,7 +18,7 @@ PENALTY = 1e5
 """Contact stiffness, N/m: at 1 N on one face the sphere is 10 um inside."""
 STICKING = 2e-6
 """Way up to which contacts stick, m."""
-FRICTION_ROUNDS = 3
+FRICTION_ROUNDS = 2
 LEVI_CIVITA = np.array([[[np.linalg.det(np.eye(3)[[i, j, k]]) for k in range(3)] for j in range(3)] for i in range(3)])
 
 
@@ -80,10 +80,11 @@ class Body:
     def press(self, centres, radii):
         """Return the force (N) on each sphere, shape (k, 3), with the spheres at `centres` (m), shape (k, 3).
 
-        They come straight from where they were last, in steps of at most a quarter of the least radius, or else they may pass through a face.
+        They come straight from where they were last (at first, from 2 mm above), in steps of at most a quarter of the least radius, or else they may pass
+        through a face.
         """
         centres = np.asarray(centres, float)
-        start = centres if self.centres is None else self.centres
+        start = centres + [0.0, 0.0, 2e-3] if self.centres is None else self.centres
         steps = max(1, int(np.ceil(np.abs(centres - start).max() / (min(radii) / 4))))
         way = (centres - start) / steps
         for i in range(steps):

@@ -24,8 +24,10 @@ ABOVE_SLAB, ON_SLAB, ON_WALL = (0.0, 0.0, RADIUS + 1e-3), (0.0, 0.0, RADIUS - 1.
 class Jaw:
     """Moves a jaw that points down, its fingers apart along x, on straight lines, and keeps what came out."""
 
+    fingers = 2
+
     def __init__(self, organ, at, opening=OPEN, **grasp):
-        probe = {"spheres": 6, "radius": RADIUS, "stiffness": "1 kN/m", "grasp": grasp}
+        probe = {"spheres": 3 * self.fingers, "radius": RADIUS, "stiffness": "1 kN/m", "grasp": {"fingers": self.fingers, **grasp}}
         self.params = BulletParams.model_validate({"organs": {"organ": organ}, "probes": {"jaw": probe}, "node_period": "1 ms"})
         self.engine = BulletEngine("tissue", self.params)
         self.outputs = dict(self.engine.configure(Setup(MS, Path(), {"jaw": IMPULSE})))
@@ -167,6 +169,26 @@ def test_a_grasp_comes_out_the_same_again():
             assert jaw.said == ["grasped", "torn"]
             hashes.append(jaw.hashes)
     assert hashes[0] == hashes[1]
+
+
+class Hand(Jaw):
+    """Two opposed fingers along x and one from -y, each of three spheres above each other."""
+
+    fingers = 3
+
+    def spheres(self, at, opening):
+        return np.array([at + np.array([x * opening, y * opening, -4e-3 * i]) for x, y in ((1, 0), (-1, 0), (0, -1)) for i in range(3)])
+
+
+def test_three_fingers_close_on_a_post_and_lift_it():
+    post = {"size": ["12 mm", "12 mm", "24 mm"], "young_modulus": "5 kPa", "nodes": 75}
+    with Hand(post, (0.0, 0.0, -2e-3), opening=10e-3) as hand:
+        hand.move(0.15, opening=7e-3)
+        assert hand.said == ["grasped"]
+        assert hand.held
+        hand.move(0.1, at=(0.0, 0.0, 2e-3)).move(0.1)
+        assert hand.outputs["jaw/lift"][0] > 2e-3
+        assert hand.force[2] < -0.05
 
 
 @pytest.mark.parametrize("bonds", [{}, {"jaw": IMPULSE}], ids=["alone", "bonded"])
