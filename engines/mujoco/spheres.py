@@ -29,14 +29,14 @@ class Spheres:
         """Let `motion` act on the spheres of the instrument of `arm`."""
         self.motion, self.bond = motion, f"{arm}/{CONTACT}"
         sites = _sites(arm, model)
-        n, carriers = len(sites), model.site_bodyid[sites]
+        n, self._carriers = len(sites), model.site_bodyid[sites]
         first = int(model.sensor(f"{model.site(sites[0]).name}/position").adr[0])
         self._position, self._velocity = data.sensordata[first : first + 3 * n], data.sensordata[first + 3 * n : first + 6 * n]
         self._centres = self._position.reshape(n, 3)
-        self._bodies = np.unique(carriers)
-        self._share = (carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
+        self._bodies = np.unique(self._carriers)
+        self._share = (self._carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
         self._applied, self._masses = data.xfrc_applied, data.xipos
-        self._loads = np.zeros((n, 6))  # force, and its moment about the origin of the world
+        self._loads = np.zeros((n, 6))  # force, and its moment about the centre of mass of the link that carries the sphere
         self._forces, self._moments = self._loads[:, :3], self._loads[:, 3:]
         self._force = np.zeros(3 * n)
         self._last = self._position.copy()
@@ -76,10 +76,8 @@ class Spheres:
     def _push(self, tau: float) -> None:
         self._force = self.motion.force(tau, self._position, self._velocity)
         self._forces[:] = self._force.reshape(-1, 3)
-        self._moments[:] = _cross(self._centres, self._forces)
-        loads = self._share @ self._loads  # (links, 6)
-        loads[:, 3:] -= _cross(self._masses[self._bodies], loads[:, :3])
-        self._applied[self._bodies] = loads
+        self._moments[:] = _cross(self._centres - self._masses.take(self._carriers, 0), self._forces)
+        self._applied[self._bodies] = self._share @ self._loads
 
     def _book(self) -> None:
         self.motion.add(self._force, self._position - self._last)
