@@ -84,7 +84,7 @@ class Body:
         through a face.
         """
         centres = np.asarray(centres, float)
-        start = centres + [0.0, 0.0, 2e-3] if self.centres is None else self.centres
+        start = centres + np.array([0.0, 0.0, 2e-3]) if self.centres is None else self.centres
         steps = max(1, int(np.ceil(np.abs(centres - start).max() / (min(radii) / 4))))
         way = (centres - start) / steps
         for i in range(steps):
