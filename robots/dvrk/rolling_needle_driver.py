@@ -46,7 +46,8 @@ class Roller:
     """From the wrist yaw axis to the middle of the pads, m."""
     size: tuple[float, float, float]
     """Of a pad, m: along the finger, along the wire, and its thickness. Narrow as a rail, since a curved wire that is rolled out of the plane of wide pads
-    wedges them apart, by the height of its arc over their width, and slips. Thinner than the wire's radius, so that the fingers behind hold a wire ahead of the pads."""
+    wedges them apart, by the height of its arc over their width, and slips. Thinner than the wire's radius, so that the fingers behind hold a wire
+    ahead of the pads."""
     pulley: float
     """By which the motor shifts the pads, m: one disc more than a PSM turns."""
 

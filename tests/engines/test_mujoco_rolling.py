@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from controllers.motion.controller import MotionController
+from controllers.motion.params import MotionParams
+from controllers.routine import Routine, RoutineParams
 from engines.mujoco import model
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.positions import position_count
 from hub.inputs import Inputs
 from hub.participant import Setup
+from hub.testing import run_in_process
 from robots import rotation
 from robots.dvrk import held_needle, psm
 from robots.dvrk.held_needle import Needle
@@ -111,3 +115,25 @@ def test_twice_the_same_and_on_from_a_saved_state():
 def test_a_weld_would_hold_what_is_to_roll():
     with pytest.raises(ValidationError, match="take grasp: friction"):
         scene(grasp="weld")
+
+
+def test_a_routine_rolls_the_needle_through_the_motion_controller():
+    params = scene()
+    arms = {"PSM1": {"instrument": TOOL.name, "start": START.tolist(), "jaw": params.arms["PSM1"].jaw}}
+    squeeze = {"do": "jaw", "arm": "PSM1", "angle": "-20 deg", "roll": 0.0}
+    participants = {
+        "routine": Routine("routine", RoutineParams.model_validate({"steps": [squeeze, {"do": "wait", "time": "150 ms"}, {**squeeze, "roll": "45 deg"}]})),
+        "motion": MotionController("motion", MotionParams.model_validate({"mounting": "free", "reference": "base", "initial_state": "homed", "arms": arms})),
+        "robot": MujocoEngine("robot", params),
+    }
+    scenario = {
+        "name": "rolling",
+        "step": "1 ms",
+        "duration": "2 s",
+        "order": ["routine", "motion", "robot"],
+        "connections": ["routine.* -> motion.*", "motion.* -> routine.*", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*"],
+        "measure": {"turn": {"kind": "final", "of": "robot.needle/turn"}, "done": {"kind": "final", "of": "routine.done"}},
+    }
+    measured = run_in_process(scenario, participants).measures
+    assert measured["done"] == 1
+    assert measured["turn"] == pytest.approx(np.radians(45), rel=0.1)

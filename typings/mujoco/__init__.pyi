@@ -103,6 +103,7 @@ class MjsJoint(MjsElement):
     type: mjtJoint
 
 class MjsActuator(MjsElement):
+    ctrlrange: _Array
     forcerange: _Array
     velrange: _Array
     def set_to_pid(self, kp: float, kv: float = ..., ctrlspec: int = ...) -> None: ...
