@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from engines.mujoco import looks
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.export import write
-from engines.mujoco.model import build, spec
+from engines.mujoco.model import build
 from engines.mujoco.params import MujocoParams, SceneParams
 from hub.inputs import Inputs
 from hub.participant import Setup
@@ -133,11 +133,11 @@ def test_the_start_has_as_many_joints_as_the_arm_with_its_hand():
 
 def test_an_exported_hand_reads_back(tmp_path):
     scene = SceneParams.model_validate(SCENE)
-    write(spec(scene), tmp_path / "hand.xml", "mjcf")
+    write(scene, tmp_path / "hand.xml", "mjcf")
     model, back = build(scene), mujoco.MjModel.from_xml_path(str(tmp_path / "hand.xml"))
     assert (model.nq, model.nu, model.ntendon, model.npair, model.nsensor) == (back.nq, back.nu, back.ntendon, back.npair, back.nsensor)
     assert np.allclose(model.wrap_prm, back.wrap_prm, rtol=1e-5)  # MJCF has six digits
-    write(spec(scene), tmp_path / "hand.urdf", "urdf")
+    write(scene, tmp_path / "hand.urdf", "urdf")
     robot = yourdfpy.URDF.load(str(tmp_path / "hand.urdf"), load_meshes=False)
     q = {**dict.fromkeys(robot.actuated_joint_names, 0.0), "PSM1_insertion": 0.12}
     command = HAND.command("caliper", 0.3)
