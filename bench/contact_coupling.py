@@ -176,7 +176,7 @@ class Tool(Stepped):
         dt, summed = self.model.opt.timestep, 0.0
         count = round(h * 1e-9 / dt)
         for i in range(count):
-            self.waiting.append(self.side.force((i + 0.5) * dt, pose, twist))
+            self.waiting.append(self.side.force(i * dt, pose, twist))
             force, before = self.waiting.pop(0), pose
             self.data.ctrl[:] = self.wanted(t * 1e-9 + i * dt)
             self.data.qfrc_applied[:] = self.jacobian().T @ force
