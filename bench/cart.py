@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,8 +18,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-
-sys.path.remove(str(Path(__file__).parent))  # else a file beside this one is the package `engines`
 
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams

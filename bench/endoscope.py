@@ -17,12 +17,9 @@ import statistics
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import mujoco
-
-sys.path.remove(str(Path(__file__).parent))  # else bench/engines.py is the package `engines`
 
 from engines.mujoco import opengl
 from engines.mujoco.endoscope_params import EndoscopeParams

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import UnitQuaternion
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState, StringStamped
@@ -57,14 +58,27 @@ class MoveJoints(_Order):
 
 
 class MoveJaw(_Order):
-    """Open or close the jaw."""
+    """Open or close the jaw; where it has a roller, roll what it holds."""
 
     do: Literal["jaw"]
     angle: Angle
+    roll: Angle | None = Field(default=None, description="for a jaw with a roller: by how much to have rolled the needle")
 
     def message(self) -> tuple[str, Message]:
         """Return port and message."""
-        return f"{self.arm}/jaw/move_jp", JointState(position=np.array([self.angle]))
+        return f"{self.arm}/jaw/move_jp", JointState(position=np.array([self.angle] if self.roll is None else [self.angle, self.roll]))
+
+
+class MoveHand(_Order):
+    """Bring the fingers of a hand into a mode."""
+
+    do: Literal["hand"]
+    mode: Literal["folded", "retractor", "grasp", "caliper"]
+    closing: float = Field(default=0.0, ge=0.0, le=1.0, description="from 0, open, to 1, closed")
+
+    def message(self) -> tuple[str, Message]:
+        """Return port and message."""
+        return f"{self.arm}/hand/move_jp", JointState(position=HAND.command(self.mode, self.closing))
 
 
 class ChangeState(_Order):
@@ -85,7 +99,7 @@ class Wait(Params):
     time: Duration = Field(ge=0)
 
 
-Order = Annotated[MoveTip | MoveJoints | MoveJaw | ChangeState, Field(discriminator="do")]
+Order = Annotated[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState, Field(discriminator="do")]
 
 
 class Together(Params):
@@ -95,7 +109,7 @@ class Together(Params):
     orders: tuple[Order, ...] = Field(min_length=1)
 
 
-Step = Annotated[MoveTip | MoveJoints | MoveJaw | ChangeState | Wait | Together, Field(discriminator="do")]
+Step = Annotated[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | Wait | Together, Field(discriminator="do")]
 
 
 class RoutineParams(Params):
@@ -202,7 +216,7 @@ class Routine(Stepped):
         """Nothing to give back."""
 
 
-def _orders(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | ChangeState]:
+def _orders(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState]:
     """Yield what `step` orders arms to do."""
     if isinstance(step, Together):
         yield from step.orders

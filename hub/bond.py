@@ -2,7 +2,8 @@
 
 The force side goes through its sub-steps on the predicted motion of the other side and sums impulse and work; the
 motion side applies the wrench it was given and sums the work it does. Frames (dof 6) use the convention pose
-(x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's frame.
+(x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's frame. In the shapes
+`size` and `linear` are those of the `BondSide`.
 Scheme and rules: docs/decisions/0004-coupling.md.
 """
 
@@ -25,8 +26,8 @@ class ForceSide:
         """Take the declared bond and its plan."""
         self._position, self._velocity, self.force_port = (port.name for port in bond_ports(bond))
         self._plan = plan
-        self._size = bond.dof
-        self._linear = min(bond.dof, 3)
+        self._size = bond.size
+        self._linear = bond.linear
         self.work_port = f"{bond.name}/work"
         self._work = np.zeros(1)
         self._x = np.zeros(self._linear)
@@ -56,17 +57,17 @@ class ForceSide:
         self._summed = 0.0
 
     def position(self, tau: float) -> Vector:
-        """Return the predicted position (m), shape (3,) or (dof,), `tau` seconds into the step."""
+        """Return the predicted position (m), shape (linear,), `tau` seconds into the step."""
         if self._plan.prediction == "hold":
             return self._x
         return self._x + tau * (self._v[: self._linear] + 0.5 * tau * self._a[: self._linear])
 
     def velocity(self, tau: float) -> Vector:
-        """Return the predicted twist (m/s, rad/s), shape (dof,), `tau` seconds into the step."""
+        """Return the predicted twist (m/s, rad/s), shape (size,), `tau` seconds into the step."""
         return self._v + tau * self._a
 
     def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
-        """Count the forces (N, N m; shape (dof,)) with which the other side pushes, in a sub-step of `dt` seconds around `tau`."""
+        """Count the forces (N, N m; shape (size,)) with which the other side pushes, in a sub-step of `dt` seconds around `tau`."""
         force = spring + damper
         self._impulse += dt * force
         self._summed += dt
@@ -76,7 +77,7 @@ class ForceSide:
     def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
         """Return the outputs of the bond: the reaction on the other side (minus the mean force, or the one at the end), and the work.
 
-        `spring`, `damper`: forces (N, N m; shape (dof,)) at the end of the step, on the predicted motion.
+        `spring`, `damper`: forces (N, N m; shape (size,)) at the end of the step, on the predicted motion.
         """
         self._spring = spring[: self._linear].copy()
         force = self._impulse / self._summed if self._plan.mean else spring + damper
@@ -101,7 +102,7 @@ class MotionSide:
         """Take the declared bond and its plan."""
         self.position_port, self.velocity_port, self.force_port = (port.name for port in bond_ports(bond))
         self._correction = plan.correction
-        self._linear = min(bond.dof, 3)
+        self._linear = bond.linear
         self.work_port = f"{bond.name}/work"
         self._work = np.zeros(1)
 
@@ -112,7 +113,7 @@ class MotionSide:
             self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
     def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
-        """Return the force (N, N m; shape (dof,)) on this side in a sub-step around `tau`, given where it is now."""
+        """Return the force (N, N m; shape (size,)) on this side in the sub-step that begins `tau` seconds into the step, given where it is then."""
         if self._correction is None:
             return self._reaction
         c, force = self._correction, self._reaction.copy()
@@ -121,7 +122,7 @@ class MotionSide:
         return force
 
     def add(self, force: Vector, displacement: Vector) -> None:
-        """Count the work done against `force` over `displacement` (m, rad; shape (dof,)) of one sub-step."""
+        """Count the work done against `force` over `displacement` (m, rad; shape (size,)) of one sub-step."""
         self._work[0] -= force.dot(displacement)
 
     def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:

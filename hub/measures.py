@@ -16,20 +16,28 @@ __all__ = ["Measures"]
 
 
 class _Meter:
-    def __init__(self, measure: Measure, part: slice) -> None:
+    def __init__(self, measure: Measure, part: slice, period: float) -> None:
         self.live = measure.live
         self.unit = measure.unit
         self.now = 0.0
         self._kind = measure.kind
         self._part = part
         self._peak: float | None = None
+        self._drop = 0.0
+        self._level, self._period = measure.level, period
+        self._above = self._longest = 0
         self._sum = 0.0
         self._count = 0
 
     def take(self, value: Vector) -> None:
         part = value[self._part]
         self.now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
-        self._peak = self.now if self._peak is None else max(self._peak, self.now)
+        if self._peak is None or self.now > self._peak:
+            self._peak, self._drop = self.now, 0.0
+        self._drop = max(self._drop, self._peak - self.now)
+        if self._level is not None:
+            self._above = self._above + 1 if self.now >= self._level else 0
+            self._longest = max(self._longest, self._above)
         self._sum += self.now
         self._count += 1
 
@@ -37,7 +45,8 @@ class _Meter:
     def result(self) -> float | None:
         if not self._count:
             return None
-        return {"peak-norm": self._peak, "peak": self._peak, "mean": self._sum / self._count, "final": self.now}[self._kind]
+        results = {"peak-norm": self._peak, "peak": self._peak, "mean": self._sum / self._count, "final": self.now}
+        return (results | {"drop": self._drop, "time-above": self._longest * self._period})[self._kind]
 
 
 class Measures:
@@ -49,7 +58,8 @@ class Measures:
         self._lock = threading.Lock()
         for name, measure in scenario.measure.items():
             port, part = measured_port(plan.members[measure.of.participant], measure.of.port)
-            meter = self._meters[name] = _Meter(measure, part)
+            period = 1e-9 * plan.step_ns * plan.stride(measure.of.participant, port.name)
+            meter = self._meters[name] = _Meter(measure, part, period)
             self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
 
     @property

@@ -197,6 +197,8 @@ def _planned_bond(scenario: Scenario, participants: Mapping[str, Stepped | Devic
     motion, force = sides
     if motion.dof != force.dof:
         raise ScenarioError(f"'{bond.motion}' has {motion.dof} degrees of freedom, '{bond.force}' has {force.dof}", path=("bonds", index))
+    if motion.points != force.points:
+        raise ScenarioError(f"'{bond.motion}' bonds {motion.points} points, '{bond.force}' bonds {force.points}", path=("bonds", index))
     if motion.frame and force.frame and motion.frame != force.frame:
         raise ScenarioError(f"'{bond.motion}' is in frame '{motion.frame}', '{bond.force}' in frame '{force.frame}'", path=("bonds", index))
     _check_algorithm(scenario, bond, force, index)

@@ -138,8 +138,9 @@ class _Rig:
         self._work = dict.fromkeys(plans, 0.0)
         self.outputs = self._checked(participant.configure(Setup(period_ns, place, plans)), "configure()")
         _require(self._declared == participant.ports, "configure() does not change the ports")
-        sides = {side.name: (side.side, side.dof) for side in participant.bonds}
-        _require(sides == {name: (s.side, s.dof) for name, s in self._sides.items()}, "configure() does not change name, side or dof of a bond")
+        sides = {side.name: (side.side, side.dof, side.points) for side in participant.bonds}
+        declared = {name: (s.side, s.dof, s.points) for name, s in self._sides.items()}
+        _require(sides == declared, "configure() does not change name, side, dof or points of a bond")
 
     def __enter__(self) -> _Rig:
         return self
@@ -217,13 +218,13 @@ class _Rig:
         return value
 
     def _motion(self) -> dict[str, Vector]:
-        """The position of every motion side, shape (dof,) or (7,)."""
+        """The position of every motion side, shape (size,) or (7,)."""
         return {name: cast("Vector", self.outputs[f"{name}/{_word(side, 0)}"]) for name, side in self._planned("motion")}
 
     def _move(self) -> None:
         """Let the position of every force side go on with its velocity."""
         for name, side in self._planned("force"):
-            position, linear = f"{name}/{_word(side, 0)}", min(side.dof, 3)
+            position, linear = f"{name}/{_word(side, 0)}", side.linear
             moved = cast("Vector", self._values[position]).copy()
             moved[:linear] += cast("Vector", self._values[f"{name}/{_word(side, 1)}"])[:linear] * self._period_ns * 1e-9
             self._values[position] = moved
@@ -238,7 +239,7 @@ class _Rig:
                 power = float(cast("Vector", self.outputs[force]) @ cast("Vector", self._values[velocity]))
                 _check_equal_work(name, done, -power * self._period_ns * 1e-9, "minus its force times the way of the other side")
             elif side.side == "motion" and plan.correction is None:
-                linear = min(side.dof, 3)
+                linear = side.linear
                 way = cast("Vector", self.outputs[f"{name}/{_word(side, 0)}"])[:linear] - before[name][:linear]
                 pushed = cast("Vector", self._values[force])
                 if not pushed[linear:].any():

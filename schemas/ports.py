@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 __all__ = ["BondSide", "Port", "bond_ports"]
 
@@ -54,8 +54,9 @@ class Port(BaseModel):
 class BondSide(BaseModel):
     """One end of a power bond: the motion side gives pose and twist and takes a wrench, the force side the reverse.
 
-    `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity, force).
-    The numbers feed the stable-step rule and the linearised coupling.
+    `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity, force). With
+    `dof` 3 there may be several `points`, the contact spheres of one instrument: their coordinates follow each other.
+    The numbers feed the stable-step rule and the linearised coupling; stiffness, damping and proxy mass are those at each point.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -63,6 +64,8 @@ class BondSide(BaseModel):
     name: str
     side: Literal["motion", "force"]
     dof: Literal[1, 2, 3, 6] = 6
+    points: int = Field(default=1, ge=1)
+    """How many points of `dof` 3 are bonded together; else 1."""
     frame: str = ""
     stiffness: float | None = None
     """Force side: stiffness k of the virtual coupling, N/m."""
@@ -70,17 +73,38 @@ class BondSide(BaseModel):
     """Force side: damping b of the virtual coupling, N s/m."""
     proxy_mass: float | None = None
     """Force side: mass of the proxy, kg."""
+    proxy_step: float = 0.0
+    """Force side: sub-step in which the proxy moves, s; 0: it moves continuously."""
     contact_stiffness: float | None = None
     """Force side: estimate of what the proxy presses on, N/m."""
     effective_mass: float | None = None
-    """Motion side: smallest effective mass at the bond, kg; known once the participant is configured."""
+    """Motion side: smallest effective mass at the bond, kg; known once the participant is configured.
+
+    1 / max eig(J M^-1 J^T) with J, shape (size, nv), of all points together: with n springs on one body each must see a mass of m / n.
+    """
+
+    @model_validator(mode="after")
+    def _points_are_points(self) -> BondSide:
+        if self.points > 1 and self.dof != 3:
+            raise ValueError(f"bond '{self.name}': several points are for dof 3, not for dof {self.dof}")
+        return self
+
+    @property
+    def size(self) -> int:
+        """Number of elements of velocity and force."""
+        return self.dof * self.points
+
+    @property
+    def linear(self) -> int:
+        """Number of elements of a position, or of a pose that are lengths: all but a quaternion."""
+        return 3 if self.dof == 6 else self.size
 
 
 def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
     """Return the three ports of a bond side: position or pose, velocity or twist, force or wrench.
 
     They are named `<bond>/pose`, `<bond>/twist`, `<bond>/wrench` for a frame and
-    `<bond>/position`, `<bond>/velocity`, `<bond>/force` for generalised coordinates.
+    `<bond>/position`, `<bond>/velocity`, `<bond>/force` for generalised coordinates, point after point.
     """
     moves, takes = ("output", "input") if bond.side == "motion" else ("input", "output")
     if bond.dof == 6:
@@ -92,7 +116,7 @@ def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
         size = 1
     else:
         rows = tuple((name, "std_msgs/msg/Float64MultiArray", unit) for name, unit in (("position", "m"), ("velocity", "m/s"), ("force", "N")))
-        size = bond.dof
+        size = bond.size
     position, velocity, force = (
         Port(name=f"{bond.name}/{name}", causality=causality, type=type_, size=size, unit=unit, frame=bond.frame)
         for (name, type_, unit), causality in zip(rows, (moves, moves, takes), strict=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -118,10 +118,19 @@ class Bond(_Part):
 class Measure(_Part):
     """A number for the summary, from the values of one output port: `participant.port` or `participant.port.field`."""
 
-    kind: Literal["peak-norm", "peak", "mean", "final"]
+    kind: Literal["peak-norm", "peak", "mean", "final", "drop", "time-above"] = Field(
+        description="drop: the largest fall after the peak; time-above: the longest time (s) at `level` or above; of several numbers the norm is taken"
+    )
     of: Endpoint
+    level: float | None = Field(default=None, description="for time-above, in the unit of the port")
     unit: str = ""
     live: bool = Field(default=False, description="show the present value in the progress line")
+
+    @model_validator(mode="after")
+    def _level_where_it_counts(self) -> Self:
+        if (self.level is not None) != (self.kind == "time-above"):
+            raise ValueError(f"measure of kind {self.kind}: a level belongs to time-above, and to nothing else")
+        return self
 
 
 def _without_none(value: Any) -> Any:

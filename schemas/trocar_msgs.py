@@ -10,7 +10,7 @@ from pydantic import Field
 from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int64, Message, String, UInt32, UInt32Array, UInt64, UInt64Array
 from schemas.ros import Header
 
-__all__ = ["Ack", "CouplingEnergy", "Grant", "InletSample", "ParticipantStatus", "SessionStatus", "SoftBodyState"]
+__all__ = ["Ack", "CouplingEnergy", "Grant", "InletSample", "ParticipantStatus", "SessionStatus", "SoftBodyState", "TissueGrasp"]
 
 
 class InletSample(Message):
@@ -74,6 +74,20 @@ class SoftBodyState(Message):
     nodes_m: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
     triangles: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
     """Surface triangles as node indices, three after the other; sent with the first state, empty afterwards."""
+
+
+class TissueGrasp(Message):
+    """An instrument has taken hold of tissue, or has lost it."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TissueGrasp"
+    header: Header
+    event: String
+    """`grasped`, `released` (the fingers opened) or `torn` (the pull was too strong)."""
+    body: String
+    nodes: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """The nodes of the body that are, or were, held."""
+    force_n: Float64
+    """Pull of the instrument on the tissue just before."""
 
 
 class ParticipantStatus(Message):

@@ -2,7 +2,7 @@
 
 The layout of a port's message is fixed once its size, names and frame are known: only the stamp and one or more
 blocks of doubles change from step to step. `VectorCodec` writes them into a template that `rosbags` serialised once
-(0.6 us against 24 us through the models, `bench/engines.py`), and reads them back after comparing all other bytes.
+(0.6 us against 24 us through the models, `bench/engine_steps.py`), and reads them back after comparing all other bytes.
 """
 
 from __future__ import annotations

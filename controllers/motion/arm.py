@@ -13,7 +13,7 @@ from controllers.motion.frames import Frames
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import COMMANDS, JAW_COMMANDS
+from controllers.motion.ports import COMMANDS, GRIPPER_COMMANDS
 from controllers.motion.telemetry import Telemetry
 from hub.inputs import Inputs
 from robots.dvrk.setup_joints import CartArm
@@ -45,12 +45,16 @@ class Arm:
         self._lifecycle = Lifecycle(self._drives, self._messages, np.array(arm.home), params.power_time * 1e-9, homed=params.initial_state == "homed")
         heeding = self._commands.handlers
         self._state_port = f"{name}/state_command"
-        names = [*(command for command in COMMANDS if command != "state_command"), *(JAW_COMMANDS if self._drives.jaw else ())]
-        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in names]
+        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in COMMANDS if command != "state_command"]
+        self._prefixes = [name]
+        if (gripper := arm.gripper) is not None:
+            self._prefixes.append(f"{name}/{gripper.name}")
+            commands = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
+            self._ports += [(command, f"{name}/{command}", heed) for command, heed in commands]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
         self.state = (self._started, *self._commands.state, self._lifecycle.flags, self._messages.state, *self._drives.state)
-        self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip((name, f"{name}/jaw"), self._drives.groups, strict=False)]
-        self._jaw_setpoint = np.zeros(3)
+        self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)]
+        self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
         self.events = self._messages.outputs
         """Event outputs of the last step."""
 
@@ -58,10 +62,11 @@ class Arm:
     def outputs(self) -> dict[str, Any]:
         """All outputs; the arrays stay the same ones."""
         outputs: dict[str, Any] = {**self.events, **self._telemetry.outputs, f"drive/{self._name}/control_mode": self._modes}
-        for prefix, axes in zip((self._name, f"{self._name}/jaw"), self._drives.groups, strict=False):
+        for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True):
             outputs |= {f"drive/{prefix}/servo_jp": axes.setpoint.position, f"drive/{prefix}/servo_jf": axes.effort}
-        if self._drives.jaw is not None:
-            outputs |= {f"{self._name}/jaw/measured_js": self._drives.jaw.measured, f"{self._name}/jaw/setpoint_js": self._jaw_setpoint}
+        if self._drives.gripper is not None:
+            prefix = self._prefixes[1]
+            outputs |= {f"{prefix}/measured_js": self._drives.gripper.measured, f"{prefix}/setpoint_js": self._gripper_setpoint}
         return outputs
 
     @property
@@ -92,10 +97,10 @@ class Arm:
 
     def publish(self) -> None:
         """Bring the states that are not published at every step up to date."""
-        joints, jaw = self._drives.joints, self._drives.jaw
+        joints, gripper = self._drives.joints, self._drives.gripper
         self._telemetry.update(joints.measured, joints.commanded, float(self._commands.ratio[0]), self._frames.of(self._name, self._camera()))
-        if jaw is not None:
-            self._jaw_setpoint[:] = jaw.commanded
+        if gripper is not None:
+            self._gripper_setpoint[:] = gripper.commanded
 
     def restored(self) -> None:
         """Bring what is not in `state` up to it."""

@@ -1,4 +1,4 @@
-"""Joints that are driven together, an arm's or its jaw: what is measured of them, and what their drives are told."""
+"""Joints that are driven together, an arm's or its gripper's: what is measured of them, and what their drives are told."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ __all__ = ["Commands"]
 
 
 class Commands:
-    """What carries out the commands of one arm, by their names, in `handlers`."""
+    """What carries out the commands of one arm, by their names, in `handlers`; those of its jaw or hand by `gripper/...`."""
 
     def __init__(self, arm: CartArm, drives: Drives, frames: Frames, camera: Callable[[], Vector | None], period: float) -> None:
         """Take the arm, its drives, the base frames, what returns the ECM's tip in `ECM_base`, and the controller's step (s)."""
@@ -50,9 +50,9 @@ class Commands:
             "move_jp": self._move_jp,
             "move_jr": self._move_jr,
             "move_cp": self._move_cp,
-            "jaw/servo_jp": self._jaw_servo_jp,
-            "jaw/servo_jf": self._jaw_servo_jf,
-            "jaw/move_jp": self._jaw_move_jp,
+            "gripper/servo_jp": self._gripper_servo_jp,
+            "gripper/servo_jf": self._gripper_servo_jf,
+            "gripper/move_jp": self._gripper_move_jp,
         }
 
     def _use_gravity_compensation(self, message: BoolMessage) -> None:
@@ -113,14 +113,14 @@ class Commands:
             tip = inverse_pose(self._frames.of(self._arm, self._camera())) @ tip
         return inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
 
-    def _jaw_servo_jp(self, message: JointState) -> None:
-        if (jaw := self._drives.jaw) is not None:
-            self._drives.follow(jaw, goals.joint_values(jaw.chain, message, "position"), self._period)
+    def _gripper_servo_jp(self, message: JointState) -> None:
+        if (gripper := self._drives.gripper) is not None:
+            self._drives.follow(gripper, goals.joint_values(gripper.chain, message, "position"), self._period)
 
-    def _jaw_servo_jf(self, message: JointState) -> None:
-        if (jaw := self._drives.jaw) is not None:
-            self._drives.apply(jaw, goals.efforts(jaw.chain, message))
+    def _gripper_servo_jf(self, message: JointState) -> None:
+        if (gripper := self._drives.gripper) is not None:
+            self._drives.apply(gripper, goals.efforts(gripper.chain, message))
 
-    def _jaw_move_jp(self, message: JointState) -> None:
-        if (jaw := self._drives.jaw) is not None:
-            self._drives.move(jaw, goals.joint_values(jaw.chain, message, "position"), float(self.ratio[0]))
+    def _gripper_move_jp(self, message: JointState) -> None:
+        if (gripper := self._drives.gripper) is not None:
+            self._drives.move(gripper, goals.joint_values(gripper.chain, message, "position"), float(self.ratio[0]))

@@ -1,4 +1,4 @@
-"""Arm and jaw together: what is done with them, and telling when a move has ended or was given up."""
+"""Arm and gripper (jaw or hand) together: what is done with them, and telling when a move has ended or was given up."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from controllers.motion.axes import Axes, Mode
 from controllers.motion.messages import Messages
 from controllers.motion.params import EcmParams, PsmParams
 from controllers.motion.telemetry import body_to_spatial
-from robots.serial_chain import Joint, SerialChain
+from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
 __all__ = ["Drives", "WrenchFrame"]
@@ -25,28 +25,29 @@ class WrenchFrame(IntEnum):
 
 
 class Drives:
-    """The joints of an arm, and its jaw if it has one."""
+    """The joints of an arm, and its gripper if it has one."""
 
     def __init__(self, arm: PsmParams | EcmParams, messages: Messages) -> None:
         """Take the arm's parameters and where to tell what ends."""
         self._messages = messages
         self.joints = Axes(arm.chain, np.array(arm.start))
-        self.jaw = _jaw(arm)
-        self.groups = (self.joints,) if self.jaw is None else (self.joints, self.jaw)
-        """All that is driven: the arm's joints, then the jaw."""
+        gripper = arm.gripper
+        self.gripper = None if gripper is None else Axes(SerialChain(gripper.joints, np.eye(4)), np.array(gripper.start))
+        self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
+        """All that is driven: the arm's joints, then the gripper."""
         self._wrench = np.zeros(7)
         self._frame = self._wrench[6:]
         self.state = (self._wrench, *(array for axes in self.groups for array in axes.state))
 
     @property
     def is_moving(self) -> bool:
-        """Whether a move of the arm or of the jaw is under way."""
+        """Whether a move of the arm or of the gripper is under way."""
         return any(axes.is_moving for axes in self.groups)
 
     @property
     def modes(self) -> tuple[Mode, Mode]:
-        """What arm and jaw do; a jaw that is not there is off."""
-        return self.joints.mode, Mode.OFF if self.jaw is None else self.jaw.mode
+        """What arm and gripper do; a gripper that is not there is off."""
+        return self.joints.mode, Mode.OFF if self.gripper is None else self.gripper.mode
 
     def power(self, *, on: bool) -> None:
         """Switch all drives off, or on to hold what they hold."""
@@ -56,7 +57,7 @@ class Drives:
             axes.power(on=on)
 
     def rest(self) -> None:
-        """Brake and stay; a jaw that presses goes on pressing."""
+        """Brake and stay; a gripper that presses goes on pressing."""
         self._give_up(*self.groups)
         self._frame[0] = WrenchFrame.NONE
         for axes in self.groups:
@@ -117,10 +118,3 @@ class Drives:
         if self._frame[0] == WrenchFrame.SPATIAL:
             jacobian = body_to_spatial(frames[-1]) @ jacobian
         self.joints.apply(np.clip(jacobian.T @ self._wrench[:6], -chain.effort, chain.effort))
-
-
-def _jaw(arm: PsmParams | EcmParams) -> Axes | None:
-    if not isinstance(arm, PsmParams) or (jaw := arm.gripper) is None:
-        return None
-    joint = Joint("jaw", "revolute", 0.0, 0.0, 0.0, 0.0, jaw.lower, jaw.upper, jaw.velocity, jaw.effort, jaw.acceleration, jaw.jerk)
-    return Axes(SerialChain([joint], np.eye(4)), np.array([arm.jaw]))

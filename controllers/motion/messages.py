@@ -14,7 +14,10 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 
 __all__ = ["Messages"]
 
-_STREAMS = ("servo_jp", "servo_jr", "servo_cp", "servo_jf", "body/servo_cf", "spatial/servo_cf", "jaw/servo_jp", "jaw/servo_jf")
+_STREAMS = (
+    *("servo_jp", "servo_jr", "servo_cp", "servo_jf", "body/servo_cf", "spatial/servo_cf"),
+    *("jaw/servo_jp", "jaw/servo_jf", "hand/servo_jp", "hand/servo_jf"),
+)
 _REPEAT = 2.0
 """s before a refusal of the same words is repeated to a stream (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitArm.cpp, ArmIsReady)."""
 

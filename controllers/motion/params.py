@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk import ecm, psm
-from robots.dvrk.instruments import Jaw, instrument
-from robots.dvrk.parameters import EcmPositions, InstrumentName, PsmPositions, SetupPositions, UnitQuaternion, check_start, settable
+from robots.dvrk.instruments import instrument
+from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
 from robots.dvrk.setup_joints import CartArm
-from robots.serial_chain import SerialChain
+from robots.serial_chain import Joint, SerialChain
 from schemas.quantity import Angle, Duration, Length
 
-__all__ = ["ArmParams", "Arms", "EcmParams", "MotionParams", "PsmParams", "SetupJoints"]
+__all__ = ["ArmParams", "Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJoints"]
+
+
+class Gripper(NamedTuple):
+    """What an instrument grasps with."""
+
+    name: str
+    """Second part of its ports' names: `jaw` or `hand`."""
+    joints: tuple[Joint, ...]
+    """What is commanded: the jaw's angle, with the roller's if it has one, or the closings of the fingers."""
+    start: tuple[float, ...]
+    """Positions at time 0, rad."""
 
 
 class ArmParams(Params):
@@ -29,12 +40,13 @@ class PsmParams(ArmParams):
     """A patient-side manipulator: what it holds, and where it is until it is measured."""
 
     instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
-    start: PsmPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
+    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
+    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.gripper, self.jaw)
+        check_start(self.chain, self.start, instrument(self.instrument), self.jaw, self.hand)
         return self
 
     @property
@@ -43,14 +55,17 @@ class PsmParams(ArmParams):
         return psm.chain(instrument(self.instrument))
 
     @property
-    def gripper(self) -> Jaw | None:
-        """The instrument's jaw, if it has one."""
-        return instrument(self.instrument).jaw
+    def gripper(self) -> Gripper | None:
+        """What the instrument grasps with, if anything."""
+        tool = instrument(self.instrument)
+        if tool.jaw is not None:
+            return Gripper("jaw", tool.jaw_joints, (self.jaw, 0.0)[: len(tool.jaw_joints)])
+        return None if tool.hand is None else Gripper("hand", tool.hand.joints, self.hand)
 
     @property
     def home(self) -> tuple[float, ...]:
         """Where the arm goes to be homed."""
-        return psm.HOME
+        return psm.home(instrument(self.instrument))
 
 
 class EcmParams(ArmParams):
@@ -73,8 +88,8 @@ class EcmParams(ArmParams):
         return ecm.chain(self.endoscope, self.tip_frame)
 
     @property
-    def gripper(self) -> Jaw | None:
-        """None: an endoscope has no jaw."""
+    def gripper(self) -> Gripper | None:
+        """None: an endoscope does not grasp."""
         return None
 
     @property

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from controllers.motion.params import EcmParams, PsmParams
 from schemas.ports import Port
 
-__all__ = ["COMMANDS", "EVENTS", "JAW_COMMANDS", "arm_ports"]
+__all__ = ["COMMANDS", "EVENTS", "GRIPPER_COMMANDS", "arm_ports"]
 
 _JOINT_STATE, _POSE, _TWIST, _WRENCH = (
     "sensor_msgs/msg/JointState",
@@ -38,11 +38,12 @@ COMMANDS = {
 }
 """Command ports of every arm: type and meaning. Of commands that come in the same step they are heeded in this order."""
 
-JAW_COMMANDS = {
-    "jaw/servo_jp": (_JOINT_STATE, "follow this angle"),
-    "jaw/servo_jf": (_JOINT_STATE, "apply this effort"),
-    "jaw/move_jp": (_JOINT_STATE, "go to this angle"),
+GRIPPER_COMMANDS = {
+    "servo_jp": (_JOINT_STATE, "follow this angle of the jaw, these closings of the fingers"),
+    "servo_jf": (_JOINT_STATE, "apply this effort"),
+    "move_jp": (_JOINT_STATE, "go to this angle of the jaw, these closings of the fingers"),
 }
+"""Command ports under `jaw/` or `hand/` of an arm with an instrument that grasps: type and meaning."""
 
 EVENTS = {
     "operating_state": ("crtk_msgs/msg/OperatingState", "whenever it changes, and with each command that is heeded"),
@@ -58,16 +59,18 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
     """Yield all ports of `arm`; states come every `period_ns`, Cartesian ones in the frame `reference` unless they are `local/`."""
     joints = params.chain.joints
     names = tuple(joint.name for joint in joints)
-    jaw = params.gripper is not None
-    for name, (type_, meaning) in (COMMANDS | (JAW_COMMANDS if jaw else {})).items():
+    gripper = params.gripper
+    grasping = {} if gripper is None else {f"{gripper.name}/{name}": row for name, row in GRIPPER_COMMANDS.items()}
+    for name, (type_, meaning) in (COMMANDS | grasping).items():
         yield Port(name=f"{arm}/{name}", causality="input", type=type_, variability="event", description=meaning)
     for name, (type_, meaning) in EVENTS.items():
         yield Port(name=f"{arm}/{name}", causality="output", type=type_, variability="event", description=meaning)
     yield from _states(arm, names, reference, period_ns)
     yield from _robot(arm, names)
-    if jaw:
-        yield from _joint_states(f"{arm}/jaw", ("jaw",), period_ns)
-        yield from _servo(f"{arm}/jaw", ("jaw",))
+    if gripper is not None:
+        driven = tuple(joint.name for joint in gripper.joints)
+        yield from _joint_states(f"{arm}/{gripper.name}", driven, period_ns)
+        yield from _servo(f"{arm}/{gripper.name}", driven)
 
 
 def _joint_states(prefix: str, names: tuple[str, ...], period_ns: int) -> Iterator[Port]:
@@ -93,7 +96,7 @@ def _states(arm: str, names: tuple[str, ...], reference: str, period_ns: int) ->
 
 def _robot(arm: str, names: tuple[str, ...]) -> Iterator[Port]:
     yield from _servo(arm, names)
-    meaning = "of arm and jaw: 0 off, 1 position, 2 effort; 3 and 4 the last two without gravity compensation"
+    meaning = "of arm and gripper: 0 off, 1 position, 2 effort; 3 and 4 the last two without gravity compensation"
     yield Port(name=f"drive/{arm}/control_mode", causality="output", size=2, description=meaning)
 
 

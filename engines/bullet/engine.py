@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from math import ceil, pi, sin
+from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from engines.bullet.anchor import WORLD, RigidParams, add_rigid
 from engines.bullet.client import connect, disconnect
+from engines.bullet.contact import CONTACT_PERIOD_NS, Contacts, Tissue
+from engines.bullet.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
-from engines.bullet.proxy import ProbeParams, Proxy
+from engines.bullet.proxy import Coupling, Probe, ProbeParams
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
-from schemas.errors import ScenarioError, StateError
+from schemas.errors import ScenarioError, StateError, did_you_mean
 from schemas.ports import BondSide, Port
 from schemas.quantity import Acceleration, Duration
 from schemas.ros import Header, Time
@@ -22,11 +26,11 @@ from schemas.trocar_msgs import SoftBodyState
 
 __all__ = ["BulletEngine", "BulletParams"]
 
-_SETTLING_NS = 300_000_000
-"""Simulated before time 0, so that the organs have come to rest under their own weight."""
+_RAMP_S = 0.2
+"""Gravity grows over this time before time 0, or over two periods of the slowest organ if they are longer; half as long again the organs rest."""
 
-_CONTACT_PERIOD_NS = 8_000_000
-"""How often the nodes are read to see where probes touch."""
+_GRAVITY_DIGITS = 6
+"""Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
 
 _NO_CLIENT = -1
 
@@ -35,10 +39,19 @@ class BulletParams(Params):
     """Organs, the probes that may touch them, and the numerics."""
 
     organs: dict[Name, OrganParams] = Field(min_length=1)
+    rigid: dict[Name, RigidParams] = Field(default_factory=dict[Name, RigidParams], description="parts that do not move, and to which organs may be anchored")
     probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
     timestep: Duration = Field(default=1_000_000, gt=0, description="sub-step; the period is a multiple of it")
     node_period: Duration = Field(default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period")
     gravity: Acceleration = Field(default=9.80665, ge=0, description="along -z of `world`; default: standard gravity")
+
+    @model_validator(mode="after")
+    def _known_parts(self) -> Self:
+        for name, organ in self.organs.items():
+            for part in organ.anchored_nodes:
+                if part != WORLD and part not in self.rigid:
+                    raise ValueError(f"organ '{name}' is anchored to '{part}', which is no rigid part.{did_you_mean(part, [WORLD, *self.rigid])}")
+        return self
 
 
 class BulletEngine(Stepped):
@@ -56,12 +69,15 @@ class BulletEngine(Stepped):
         super().__init__(name, params)
         self._client = _NO_CLIENT
         self._organs: list[Organ] = []
-        self._proxies: list[Proxy] = []
+        self._probes: list[Probe] = []
+        self._grasps: list[Grasp] = []
+        self._unused: dict[str, Value] = {}
+        """What probes say that might grasp, but are not bonded."""
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The nodes of every organ."""
-        return tuple(
+        """The nodes of every organ; of every probe with fingers, what they hold."""
+        nodes = tuple(
             Port(
                 name=f"{organ}/nodes",
                 causality="output",
@@ -72,23 +88,12 @@ class BulletEngine(Stepped):
             )
             for organ in self.params.organs
         )
+        return nodes + tuple(port for name, probe in self.params.probes.items() if probe.grasp for port in grasp_ports(name))
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Every probe, with its virtual coupling and the contact stiffness of the stiffest organ."""
-        return tuple(
-            BondSide(
-                name=name,
-                side="force",
-                dof=6,
-                frame="world",
-                stiffness=probe.stiffness,
-                damping=probe.damping,
-                proxy_mass=probe.mass,
-                contact_stiffness=max(organ.contact_stiffness(probe.radius) for organ in self.params.organs.values()),
-            )
-            for name, probe in self.params.probes.items()
-        )
+        """Every probe: a frame, or the points that are its spheres."""
+        return tuple(self._bond(name, probe) for name, probe in self.params.probes.items())
 
     def configure(self, setup: Setup) -> Outputs:
         """Load the organs, let them settle, and add a proxy for every bond. Raises ScenarioError where a step is too long."""
@@ -99,45 +104,58 @@ class BulletEngine(Stepped):
         import pybullet as bullet
 
         self._simulate = bullet.stepSimulation
+        parts = {name: add_rigid(part, client) for name, part in self.params.rigid.items()}
         for name, organ in self.params.organs.items():
-            self._organs.append(Organ(name, organ, client))
+            self._organs.append(Organ(name, organ, client, parts))
         self._check_tissue()
-        for _ in range(_SETTLING_NS // self.params.timestep):
-            self._simulate(physicsClientId=client)
+        self._settle()
         for bond in self.bonds:
             if bond.name in setup.bonds:
-                self._proxies.append(Proxy(self.params.probes[bond.name], bond, setup.bonds[bond.name], self.params.gravity, client))
+                probe = self.params.probes[bond.name]
+                self._probes.append(Probe(probe, self._coupling(probe), bond, setup.bonds[bond.name], self.params.gravity, client))
         self._read_nodes(0)
+        self._contacts = Contacts([Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity) for organ in self._organs])
         outputs = self._nodes(0)
-        for proxy in self._proxies:
-            outputs.update(proxy.idle)
+        self._unused = {
+            port: value for name, probe in self.params.probes.items() if probe.grasp and name not in setup.bonds for port, value in nothing_held(name).items()
+        }
+        outputs.update(self._unused)
+        for probe in self._probes:
+            outputs.update(probe.idle)
+            if grasp := self.params.probes[probe.name].grasp:
+                self._grasps.append(Grasp(grasp, probe, self._organs))
+                outputs.update(self._grasps[-1].outputs)
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Press the probes along their predicted motion; return their reactions, and the nodes where they are due."""
-        seconds, dt, proxies = h * 1e-9, self._dt, self._proxies
-        for proxy in proxies:
-            proxy.begin(inputs, seconds)
+        seconds, dt, probes = h * 1e-9, self._dt, self._probes
+        for probe in probes:
+            probe.begin(inputs, seconds)
         for i in range(h // self.params.timestep):
-            for proxy in proxies:
-                proxy.push((i + 0.5) * dt, dt)
+            for probe in probes:
+                probe.push((i + 0.5) * dt, dt)
             self._simulate(physicsClientId=self._client)
-            for proxy in proxies:
-                proxy.read()
+            for probe in probes:
+                probe.read(dt)
         end = t + h
-        due, touch = end % self.params.node_period == 0, end // _CONTACT_PERIOD_NS != t // _CONTACT_PERIOD_NS
+        due, touch = end % self.params.node_period == 0, end // CONTACT_PERIOD_NS != t // CONTACT_PERIOD_NS
         if due or touch:
             self._read_nodes(end)
         if touch:
-            self._update_gains()
-        outputs = self._nodes(end) if due else {}
-        for proxy in proxies:
-            outputs.update(proxy.result(end, seconds))
+            self._contacts.update(self._probes)
+        outputs = (self._nodes(end) if due else {}) | self._unused
+        for probe in probes:
+            outputs.update(probe.result(end, seconds))
+        for grasp in self._grasps:
+            grasp.update(end, looked=touch)
+            outputs.update(grasp.outputs)
         return outputs
 
     def state_hash(self) -> int:
         """Return 64 bits of the probes' positions, velocities and bonds, and of the nodes as last read."""
-        return state_hash(*(part for proxy in self._proxies for part in proxy.state), *(organ.nodes for organ in self._organs))
+        keepers = (*self._probes, *self._grasps)
+        return state_hash(*(part for keeper in keepers for part in keeper.state), *(organ.nodes for organ in self._organs))
 
     def save(self) -> bytes:
         """Raise StateError: Bullet cannot."""
@@ -153,11 +171,35 @@ class BulletEngine(Stepped):
             disconnect(self._client)
         self._client = _NO_CLIENT
         self._organs.clear()
-        self._proxies.clear()
+        self._probes.clear()
+        self._grasps.clear()
 
     @property
     def _no_state(self) -> str:
         return f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies. Re-simulate from the recorded grants instead"
+
+    def _contact_stiffness(self, probe: ProbeParams) -> float:
+        """Return the largest stiffness (N/m) that one of the spheres may meet."""
+        return max(organ.contact_stiffness(radius) for organ in self.params.organs.values() for radius in probe.radii.tolist())
+
+    def _coupling(self, probe: ProbeParams) -> Coupling:
+        damping = min(organ.elastic.damping for organ in self.params.organs.values())
+        return probe.coupling(self._contact_stiffness(probe), damping, self.params.timestep * 1e-9)
+
+    def _bond(self, name: str, probe: ProbeParams) -> BondSide:
+        coupling = self._coupling(probe)
+        return BondSide(
+            name=name,
+            side="force",
+            dof=6 if probe.spheres is None else 3,
+            points=probe.spheres or 1,
+            frame="world",
+            stiffness=coupling.stiffness,
+            damping=coupling.damping,
+            proxy_mass=coupling.mass,
+            proxy_step=self.params.timestep * 1e-9,
+            contact_stiffness=self._contact_stiffness(probe),
+        )
 
     def _nodes(self, t: int) -> dict[str, Value]:
         header = Header(stamp=Time.from_ns(t), frame_id="world")
@@ -171,9 +213,20 @@ class BulletEngine(Stepped):
         for organ in self._organs:
             organ.sample(t)
 
-    def _update_gains(self) -> None:
-        for proxy in self._proxies:
-            proxy.gain = max(organ.contact_gain(proxy.position, proxy.radius) for organ in self._organs)
+    def _settle(self) -> None:
+        """Let gravity grow as slowly as the organs can follow: seized at once, they would swing for long.
+
+        It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window on.
+        """
+        import pybullet as bullet
+
+        ramp = max(_RAMP_S, *(2.0 * organ.period for organ in self._organs))
+        steps = ceil(1.5 * ramp / self._dt)
+        for i in range(steps):
+            s = min(1.0, 1.5 * (i + 1) / steps)
+            share = round(s - sin(2.0 * pi * s) / (2.0 * pi), _GRAVITY_DIGITS)
+            bullet.setGravity(0.0, 0.0, -self.params.gravity * share, physicsClientId=self._client)
+            self._simulate(physicsClientId=self._client)
 
     def _check_steps(self, period_ns: int) -> None:
         params, where = self.params, f"participant '{self.name}'"
@@ -182,9 +235,10 @@ class BulletEngine(Stepped):
         if params.node_period % period_ns:
             raise ScenarioError(f"{where}: node_period {params.node_period} ns is no multiple of the period {period_ns} ns")
         for name, probe in params.probes.items():
-            if params.timestep * 1e-9 > probe.longest_step:
+            longest = self._coupling(probe).longest_step * 1e9
+            if params.timestep > longest * (1.0 + 1e-9):
                 raise ScenarioError(
-                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass / stiffness) = {probe.longest_step * 1e9:.0f} ns, "
+                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass / stiffness) = {longest:.0f} ns, "
                     f"up to which the virtual coupling is stable. Shorten it, or take a heavier or softer probe"
                 )
 

@@ -1,9 +1,10 @@
-"""Tetrahedral meshes of organs: generation, surface, and the .vtk file that Bullet reads."""
+"""Tetrahedral meshes of organs: surface, quality, and the .vtk file that Bullet reads."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from functools import cached_property
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -11,27 +12,15 @@ from numpy.typing import NDArray
 
 from schemas.vectors import Vector
 
-__all__ = ["FEWEST_NODES", "Indices", "TetMesh", "block", "block_cells", "volumes"]
+__all__ = ["Indices", "TetMesh", "compact", "dihedral_angles", "shape_quality", "volumes"]
 
 Indices = NDArray[np.int64]
-
-FEWEST_NODES = 18
-"""Nodes of the smallest symmetric block, 2 x 2 x 1 cells."""
-
-_COUNT_TOLERANCE = 0.05
-"""Of all grids whose node count is this near to the requested one, the one with the most cubic cells is taken."""
-
-_CORNERS = np.array(list(product((0, 1), repeat=3)))  # (8, 3): corner number 4 i + 2 j + k stands at (i, j, k)
-_CELL = np.array([[0, 4, 2, 1], [6, 2, 4, 7], [5, 4, 1, 7], [3, 1, 2, 7], [4, 2, 1, 7]])
-"""Five positively oriented tetrahedra of a cube, four at the corners and one in the middle."""
-_MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
-"""The same, mirrored in x: neighbouring cells must alternate for their diagonals to meet."""
 
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 """Faces of a positively oriented tetrahedron, counter-clockwise seen from outside."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TetMesh:
     """A body of linear tetrahedra, each with positive volume."""
 
@@ -40,12 +29,36 @@ class TetMesh:
     tetrahedra: Indices
     """Shape (m, 4), node indices."""
 
-    @property
+    @cached_property
     def triangles(self) -> Indices:
         """The surface, shape (f, 3), counter-clockwise seen from outside: the faces that belong to one tetrahedron only."""
-        faces = self.tetrahedra[:, _FACES].reshape(-1, 3)
-        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-        return faces[np.sort(first[count == 1])]
+        return self._faces[self._shared == 1]
+
+    @property
+    def crowded(self) -> Indices:
+        """Faces that belong to more than two tetrahedra, shape (f, 3): there are none in a sound mesh."""
+        return self._faces[self._shared > 2]
+
+    @cached_property
+    def face_numbers(self) -> Indices:
+        """Of the four faces of every tetrahedron, shape (m, 4); the same number means the same three nodes."""
+        _, numbers = np.unique(np.sort(self._faces, axis=1), axis=0, return_inverse=True)
+        return numbers.reshape(-1, 4)
+
+    @property
+    def volume(self) -> float:
+        """Volume, m^3."""
+        return float(volumes(self.nodes, self.tetrahedra).sum())
+
+    @property
+    def _faces(self) -> Indices:
+        return self.tetrahedra[:, _FACES].reshape(-1, 3)
+
+    @property
+    def _shared(self) -> Indices:
+        """By how many tetrahedra every face is shared, shape (4 m,)."""
+        numbers = self.face_numbers.ravel()
+        return np.bincount(numbers)[numbers]
 
     def write_vtk(self, path: Path) -> None:
         """Write a legacy ASCII .vtk file, the only tetrahedral format that Bullet reads, without losing a bit of the nodes."""
@@ -64,42 +77,26 @@ def volumes(nodes: Vector, tetrahedra: Indices) -> Vector:
     return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
 
 
-def block(size: Vector, nodes: int) -> TetMesh:
-    """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes; its top face is centred on the origin.
+def compact(nodes: Vector, tetrahedra: Indices) -> TetMesh:
+    """Return a mesh of the nodes that tetrahedra use, in their order."""
+    used, renumbered = np.unique(tetrahedra, return_inverse=True)
+    return TetMesh(nodes[used], renumbered.reshape(-1, 4))
 
-    A regular grid whose cells are cut into five tetrahedra each, the fewest there are, mirrored from cell to cell. With an
-    even number of cells along x and y the mesh is its own mirror image in both, so it has no preferred diagonal.
+
+def shape_quality(nodes: Vector, tetrahedra: Indices) -> Vector:
+    """Return how near every tetrahedron is to a regular one (1), by its mean ratio 12 (3 volume)^(2/3) / sum of squared edges, shape (m,).
+
+    Liu, Joe, Relationship between tetrahedron shape measures, BIT 34 (1994). Zero is flat, negative inverted.
     """
-    cells = block_cells(size, nodes)
-    points = (_grid(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
-    strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
-    origins = _grid(*cells)  # (c, 3)
-    corners = (origins @ strides)[:, None] + _CORNERS @ strides  # (c, 8)
-    odd = origins.sum(axis=1) % 2 == 1
-    tetrahedra = np.where(odd[:, None, None], corners[:, _MIRRORED_CELL], corners[:, _CELL])  # (c, 5, 4)
-    return TetMesh(points, tetrahedra.reshape(-1, 4))
+    corners = nodes[tetrahedra]  # (m, 4, 3)
+    squares = sum(((corners[:, i] - corners[:, j]) ** 2).sum(axis=1) for i, j in combinations(range(4), 2))
+    return 12.0 * np.cbrt(3.0 * volumes(nodes, tetrahedra)) ** 2 * np.sign(volumes(nodes, tetrahedra)) / squares
 
 
-def block_cells(size: Vector, nodes: int) -> tuple[int, int, int]:
-    """Return the cells along x, y (even) and z of the grid that suits a box of `size` (m) and about `nodes` nodes."""
-
-    def unfitness(cells: tuple[int, int, int]) -> tuple[float, ...]:
-        edges = size / cells
-        miss = abs(np.prod(np.add(cells, 1)) / nodes - 1.0)
-        elongation = edges.max() / edges.min()
-        return (0.0, elongation, miss, *cells) if miss <= _COUNT_TOLERANCE else (1.0, miss, elongation, *cells)
-
-    most = max(1, nodes // 9)
-    layouts = ((ny, nz) for nz in range(1, most + 1) for ny in range(2, nodes // (3 * (nz + 1)) + 2, 2))
-    candidates = ((nx, ny, nz) for ny, nz in layouts for nx in _even_neighbours(nodes / ((ny + 1) * (nz + 1)) - 1.0))
-    return min(candidates, key=unfitness)
-
-
-def _grid(nx: int, ny: int, nz: int) -> Indices:
-    """Return all (i, j, k) of a grid, shape (nx ny nz, 3), k the fastest."""
-    return np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-def _even_neighbours(x: float) -> tuple[int, int]:
-    lower = max(2, 2 * int(x // 2))
-    return lower, lower + 2
+def dihedral_angles(nodes: Vector, tetrahedra: Indices) -> Vector:
+    """Return the six angles (rad) between the faces of every tetrahedron, shape (m, 6)."""
+    faces = nodes[tetrahedra[:, _FACES]]  # (m, 4, 3, 3)
+    normals = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    cosines = [-np.einsum("mi,mi->m", normals[:, i], normals[:, j]) for i, j in combinations(range(4), 2)]
+    return np.arccos(np.clip(np.stack(cosines, axis=1), -1.0, 1.0))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from engines.mujoco import opengl
 from engines.mujoco.endoscope_params import EndoscopeParams
 from engines.mujoco.positions import position_count
+from engines.mujoco.skins import SoftBody
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
@@ -25,6 +26,7 @@ from schemas.errors import MissingExtraError, StateError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
+from schemas.trocar_msgs import SoftBodyState
 
 if TYPE_CHECKING:
     from engines.mujoco.endoscope_scene import EndoscopeScene
@@ -44,11 +46,12 @@ class Endoscope(Stepped):
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._positions = np.zeros(position_count(params))
+        self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.skins}
         self._frame = f"{name}_left_optical"
-        kinds: dict[str, type[Message]] = {"camera_info": CameraInfo}
-        if params.images != "compressed":
+        kinds: dict[str, type[Message]] = {} if params.images == "none" else {"camera_info": CameraInfo}
+        if params.images in ("raw", "both"):
             kinds["image_raw"] = Image
-        if params.images != "raw":
+        if params.images in ("compressed", "both"):
             kinds["image_raw/compressed"] = CompressedImage
         self._pictures = tuple(
             Port(name=f"{eye}/{kind}", causality="output", type=model.ros_type, variability="event", frame=self._frame)
@@ -56,38 +59,51 @@ class Endoscope(Stepped):
             for kind, model in kinds.items()
         )
         self._scene: EndoscopeScene | None = None
+        self._gl = ""
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """`qpos` of the same scene in; per eye, with ROS's names, pictures and their calibration out.
+        """`qpos` of the same scene and the nodes of soft bodies in; per eye, with ROS's names, pictures and their calibration out.
 
         Pictures are events: none comes before the first step, and none at all on a machine without OpenGL.
         """
         qpos = Port(name="qpos", causality="input", size=self._positions.size, description="joint positions of the scene, as the mujoco engine publishes them")
-        return (qpos, *self._pictures)
+        nodes = "positions of the nodes of a soft body; the first message brings its surface"
+        bodies = (Port(name=f"{organ}/nodes", causality="input", type=SoftBodyState.ros_type, frame="world", description=nodes) for organ in self._bodies)
+        return (qpos, *bodies, *self._pictures)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
-        """Build the scene. Where there is no OpenGL, say so once and publish no pictures."""
+        """Build the scene, unless soft bodies are missing from it. Where there is no OpenGL, say so once and publish no pictures."""
+        if not self._pictures:
+            return {}
         for package in ("mujoco", "PIL"):
             if find_spec(package) is None:
                 raise MissingExtraError(f"participant '{self.name}' (kind endoscope)", "mujoco", "pillow" if package == "PIL" else package)
         opengl.import_mujoco()
         found = opengl.find()
-        if found.name:
-            from engines.mujoco.endoscope_scene import EndoscopeScene
-
-            self._scene = EndoscopeScene(self.params, found.name)
-        else:
+        self._gl = found.name
+        if found.name and not self._bodies:
+            self._build()
+        elif not found.name:
             _log.warning("participant '%s' publishes no pictures: no OpenGL works here (%s). To mend it: %s", self.name, found.detail, opengl.REMEDY)
         return self._outputs({})
 
+    def _build(self) -> EndoscopeScene:
+        from engines.mujoco.endoscope_scene import EndoscopeScene
+
+        self._scene = EndoscopeScene(self.params, self._gl, self._bodies)
+        return self._scene
+
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Draw the state at `t`."""
+        """Draw the state at `t`. Raises SessionError if a soft body is not what it was, or its surface unknown."""
         self._positions[:] = inputs["qpos"]
-        if self._scene is None:
+        for organ, body in self._bodies.items():
+            body.take(inputs.message(f"{organ}/nodes"))
+        if not self._gl:
             return self._outputs({})
+        scene = self._scene or self._build()
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
-        pictures = self._scene.draw(self._positions)
+        pictures = scene.draw(self._positions)
         return self._outputs(
             {f"{eye}/{name}": message for eye, pixels in zip(EYES, pictures, strict=True) for name, message in self._messages(eye, pixels, header)}
         )
@@ -113,20 +129,23 @@ class Endoscope(Stepped):
         return np.frombuffer(file.getvalue(), np.uint8)
 
     def state_hash(self) -> int:
-        """Return the hash of the positions last drawn; of no pixel, since two machines need not draw the same ones."""
-        return state_hash(self._positions)
+        """Return the hash of what was last drawn, positions and nodes; of no pixel, since two machines need not draw the same ones."""
+        return state_hash(self.save())
 
     def save(self) -> bytes:
-        """Return the positions last drawn."""
-        return self._positions.tobytes()
+        """Return the positions last drawn, and what is known of the soft bodies."""
+        return self._positions.tobytes() + b"".join(body.save() for body in self._bodies.values())
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it is none of this scene's."""
-        if len(state) != self._positions.nbytes:
-            raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, this scene's has {self._positions.nbytes}; was it saved elsewhere?"
-            )
-        self._positions[:] = np.frombuffer(state)
+        size, rest = self._positions.nbytes, state[self._positions.nbytes :]
+        for body in self._bodies.values():
+            rest = body.restore(rest)
+        if len(state) < size or rest:
+            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes is none of this scene; was it saved elsewhere?")
+        self._positions[:] = np.frombuffer(state, np.float64, self._positions.size)
+        if self._bodies:
+            self.close()  # their surfaces may be others
 
     def close(self) -> None:
         """Give the OpenGL context back."""

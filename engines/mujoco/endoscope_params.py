@@ -7,10 +7,12 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from engines.mujoco.params import SceneParams
+from engines.mujoco.skin_params import SkinParams
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
 from schemas.quantity import Angle, Length
+from schemas.scenario import Name
 
 __all__ = ["EndoscopeParams", "ViewParams"]
 
@@ -43,7 +45,10 @@ class EndoscopeParams(SceneParams):
     view: ViewParams | None = Field(
         default=None, description="cameras that stand in the world; without it they are at the ECM's tip or, in a scene without ECM, look at all of it"
     )
-    images: Literal["raw", "compressed", "both"] = Field(default="raw", description="what is published of each picture")
+    skins: dict[Name, SkinParams] = Field(
+        default_factory=dict[Name, SkinParams], description="soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
+    )
+    images: Literal["raw", "compressed", "both", "none"] = Field(default="raw", description="what is published of each picture; none: the camera is off")
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
     quality: int = Field(default=95, ge=1, le=95, description="of a JPEG; beyond 95 files grow and pictures do not get better")
     shadows: bool = Field(default=False, description="draw shadows and reflections: without a GPU several times as slow")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +12,7 @@ from numpy.typing import NDArray
 from engines.mujoco.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.model import spec
 from engines.mujoco.params import EcmParams
+from engines.mujoco.skins import Skins, SoftBody
 from engines.mujoco.stereo import StereoRenderer
 from robots.dvrk.endoscope import FAR, optical_in_roll
 from schemas.vectors import Vector
@@ -22,11 +26,12 @@ _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 class EndoscopeScene:
     """The model of the scene, its state, and the cameras in it."""
 
-    def __init__(self, params: EndoscopeParams, gl: str) -> None:
-        """Build the scene, and prepare to draw it with the OpenGL that MUJOCO_GL calls `gl`."""
+    def __init__(self, params: EndoscopeParams, gl: str, bodies: Mapping[str, SoftBody] = MappingProxyType({})) -> None:
+        """Build the scene with the soft `bodies`, and prepare to draw it with the OpenGL that MUJOCO_GL calls `gl`."""
         scene, ecm = spec(params), params.arms.get("ECM")
         if params.view is not None or ecm is None:
             _add_sky(scene)
+        self._skins = Skins(scene, bodies, params.skins)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
         self._carrier = -1
@@ -44,6 +49,7 @@ class EndoscopeScene:
     def draw(self, positions: Vector) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,)."""
         model, data = self._model, self._data
+        self._skins.show(model)
         data.qpos[:] = positions
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)

@@ -1,4 +1,4 @@
-"""The MuJoCo engine: dVRK arms with joint servos, things to hold, a power bond at each probe, and exact checkpoints.
+"""The MuJoCo engine: dVRK arms with joint servos, things to hold, power bonds at probes and contact spheres, and exact checkpoints.
 
 A sub-step is `mj_step2` (actuation to integration) followed by `mj_step1` (kinematics, velocities, sensors): the same
 work as `mj_step`, in the order that leaves every output at the end of the step instead of one sub-step behind.
@@ -23,6 +23,7 @@ from schemas.vectors import Vector
 
 if TYPE_CHECKING:
     from engines.mujoco.probe import Probe
+    from engines.mujoco.spheres import Spheres
 
 __all__ = ["MujocoEngine"]
 
@@ -46,7 +47,7 @@ class MujocoEngine(Stepped):
     def __init__(self, name: str, params: MujocoParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._probes: list[Probe] = []
+        self._touching: list[Probe | Spheres] = []
         self._keepers: list[_Keeper] = []
         self._effective_mass: dict[str, float] = {}
         self._outputs: dict[str, Value] = {}
@@ -58,7 +59,7 @@ class MujocoEngine(Stepped):
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Per palpation probe `<arm>/probe`: its sphere, in the world."""
+        """Per palpation probe `<arm>/probe`: its sphere; per instrument with contact spheres `<arm>/contact`: their centres; in the world."""
         return tuple(side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)}) for side in bond_sides(self.params))
 
     def configure(self, setup: Setup) -> Outputs:
@@ -94,7 +95,7 @@ class MujocoEngine(Stepped):
         self._couple(setup)
         self._readings.refresh()
         self._holding.refresh()
-        self._keepers = [self._servos, self._brakes, self._holding, *(probe.motion for probe in self._probes)]
+        self._keepers = [self._servos, self._brakes, self._holding, *(touching.motion for touching in self._touching)]
         trouble = mujoco.mjtWarning
         self._trouble = self._data.warning.number.data[trouble.mjWARN_BADQPOS : trouble.mjWARN_BADCTRL + 1]
         self._signature = self._what_is_state()
@@ -103,38 +104,42 @@ class MujocoEngine(Stepped):
         return self._outputs
 
     def _couple(self, setup: Setup) -> None:
-        from engines.mujoco.probe import Probe, effective_mass
+        from engines.mujoco.probe import Probe
+        from engines.mujoco.spheres import Spheres
         from hub.bond import MotionSide
 
+        kinds = {"probe": Probe, "contact": Spheres}
         for bond in self.bonds:
-            arm = bond.name.partition("/")[0]
-            self._effective_mass[bond.name] = effective_mass(arm, self._model, self._data)
+            arm, _, kind = bond.name.partition("/")
+            self._effective_mass[bond.name] = kinds[kind].least_mass(arm, self._model, self._data)
+            self._outputs[f"{arm}/tip_wrench"] = np.zeros(6)
             if plan := setup.bonds.get(bond.name):
-                self._probes.append(Probe(arm, MotionSide(bond, plan), self._model, self._data))
-                self._outputs.update(self._probes[-1].outputs)
-        self._corrected = [probe for probe in self._probes if setup.bonds[probe.bond].correction is not None]
+                touching = kinds[kind](arm, MotionSide(bond, plan), self._model, self._data)
+                self._touching.append(touching)
+                self._outputs.update(touching.outputs)
+        self._renewed = [touching for touching in self._touching if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None]
 
     def _what_is_state(self) -> int:
-        """Return which parts of MuJoCo's data are state: without a probe nothing ever applies a force, and half of its numbers stay 0."""
+        """Return which parts of MuJoCo's data are state: without a bond nothing ever applies a force, and half of its numbers stay 0."""
         state = self._mujoco.mjtState
         applied = int(state.mjSTATE_QFRC_APPLIED | state.mjSTATE_XFRC_APPLIED)
-        return int(state.mjSTATE_INTEGRATION) & ~(0 if self._probes else applied)
+        return int(state.mjSTATE_INTEGRATION) & ~(0 if self._touching else applied)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
         model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
         self._servos.begin(inputs)
         self._brakes.set(on="ECM" in self._servos.off)
-        for probe in self._probes:
-            probe.begin(inputs)
+        for touching in self._touching:
+            touching.begin(inputs)
         for tau in range(0, h, self.params.timestep):
             if tau:
-                for probe in self._corrected:
-                    probe.correct(tau * 1e-9)
+                for touching in self._renewed:
+                    touching.renew(tau * 1e-9)
             step2(model, data)
             step1(model, data)
-        for probe in self._probes:
-            probe.end()
+        for touching in self._touching:
+            touching.end()
         self._readings.update()
         if (t + h) % self.params.publish_period == 0:
             self._readings.refresh()
@@ -146,7 +151,7 @@ class MujocoEngine(Stepped):
     def _diagnosis(self, t: int, inputs: Inputs) -> str:
         bad = self._mujoco.mjtWarning(self._mujoco.mjtWarning.mjWARN_BADQPOS + list(map(bool, self._trouble)).index(True))
         where = f"MuJoCo reports {bad.name} in the step from {t * 1e-9:g} s"
-        for port in [port.name for port in self.ports if port.causality == "input"] + [probe.motion.force_port for probe in self._probes]:
+        for port in [port.name for port in self.ports if port.causality == "input"] + [touching.motion.force_port for touching in self._touching]:
             if not np.isfinite(inputs[port]).all():
                 return f"{where}: input '{port}' is {inputs[port]}; every number must be finite"
         return (
@@ -187,11 +192,11 @@ class MujocoEngine(Stepped):
         self._readings.update()
         self._readings.refresh()
         self._holding.refresh()
-        for probe in self._probes:
-            probe.refresh()
+        for touching in self._touching:
+            touching.refresh()
 
     def close(self) -> None:
         """Let go of model and data."""
-        self._probes.clear()
+        self._touching.clear()
         self._keepers.clear()
         self._outputs.clear()

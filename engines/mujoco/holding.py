@@ -6,6 +6,8 @@ comes and goes with that; with `grasp: friction` nothing but contact acts, and t
 
 from __future__ import annotations
 
+from math import acos
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -98,21 +100,21 @@ class Holding:
         self._contacts = np.zeros((*shape, 2, 4))  # per finger: how many, sum of their positions
         welds = [model.equality(f"{thing}/{arm}/weld").id for thing in things for arm in arms] if scene.grasp == "weld" else []
         self._welds = np.array(welds, int).reshape(shape) if welds else None
-        sizes = np.cumsum([shape[0] * shape[1], shape[0], 6 * shape[0] * shape[1]])
+        sizes = np.cumsum([shape[0] * shape[1], shape[0], 10 * shape[0] * shape[1]])
         self._state = np.concatenate([np.zeros(sizes[2]), model.eq_data[welds].ravel()])
         touched, self._holder, grip, weld_data = np.split(self._state, sizes)
         self._touched = touched.reshape(shape)  # how often in succession both fingers were seen to touch
         self._holder[:] = -1.0  # index of an arm
-        self._grip = grip.reshape(*shape, 6)  # where the fingers took hold: in the object, and in the left finger
+        self._grip = grip.reshape(*shape, 10)  # where the fingers took hold: in the object, and in the left finger; the object's orientation in that finger
         self._weld_data = weld_data.reshape(-1, model.eq_data.shape[1])
         joints = [int(model.joint(thing).qposadr[0]) + _POSE for thing in things]
         self._where, self._positions = np.array(joints, int).reshape(-1, 7), data.qpos
-        self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 3))
+        self._poses, self._values = np.zeros((len(things), 7)), np.zeros((len(things), 4))
         self._height = data.xpos[self._bodies, 2].copy()
         self.outputs: dict[str, Vector] = {}
         for i, thing in enumerate(things):
-            held_by, slip, lift = self._values[i, 0:1], self._values[i, 1:2], self._values[i, 2:3]
-            self.outputs |= {f"{thing}/pose": self._poses[i], f"{thing}/held_by": held_by, f"{thing}/slip": slip, f"{thing}/lift": lift}
+            values = {f"{thing}/{name}": self._values[i, k : k + 1] for k, name in enumerate(("held_by", "slip", "turn", "lift"))}
+            self.outputs |= {f"{thing}/pose": self._poses[i], **values}
 
     def update(self) -> None:
         """Look at the contacts, set welds, and bring the outputs up to date."""
@@ -147,11 +149,11 @@ class Holding:
     def refresh(self) -> None:
         """Bring the outputs up to the model's present state."""
         self._positions.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
-        np.subtract(self._poses[:, 2], self._height, out=self._values[:, 2])
-        self._values[:, :2] = 0.0
+        np.subtract(self._poses[:, 2], self._height, out=self._values[:, 3])
+        self._values[:, :3] = 0.0
         for i, holder in enumerate(map(int, self._holder.tolist())):
             if holder >= 0:
-                self._values[i, :2] = self._numbers[holder], self._slip(i, holder)
+                self._values[i, :3] = self._numbers[holder], self._slip(i, holder), self._turn(i, holder)
 
     def _choose_holder(self, i: int) -> None:
         """Keep the arm that holds object `i` as long as it does; then take the first that does."""
@@ -165,7 +167,8 @@ class Holding:
         contacts = self._contacts[i, j]
         point = (contacts[:, 1:] / contacts[:, :1]).mean(axis=0)
         self._grip[i, j, :3] = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
-        self._grip[i, j, 3:] = data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger])
+        self._grip[i, j, 3:6] = data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger])
+        self._grip[i, j, 6:] = self._orientation(i, j)
         if self._welds is not None:
             wrist, weld = self._wrists[j], self._welds[i][j]
             position, turn, back = np.zeros(3), np.zeros(4), np.zeros(4)
@@ -179,7 +182,19 @@ class Holding:
     def _slip(self, i: int, j: int) -> float:
         data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self._grip[i, j, :3]
-        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:]))
+        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:6]))
+
+    def _turn(self, i: int, j: int) -> float:
+        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` since it was taken."""
+        w = abs(float(self._grip[i, j, 6:] @ self._orientation(i, j)))
+        return 2.0 * acos(min(w, 1.0))
+
+    def _orientation(self, i: int, j: int) -> Vector:
+        """Return the orientation of object `i` in the left finger of arm `j`, quaternion (w, x, y, z)."""
+        back, turn = np.zeros(4), np.zeros(4)
+        mujoco.mju_negQuat(back, self._data.xquat[self._fingers[j]])
+        mujoco.mju_mulQuat(turn, back, self._data.xquat[self._bodies[i]])
+        return turn
 
     @property
     def state(self) -> Vector:
@@ -194,9 +209,12 @@ class Holding:
 
 
 def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> NDArray[np.intp]:
-    """Return for every geom of `model` i + 1 if it is of the object i, -(i + 1) if it is of the finger i, else 0."""
+    """Return for every geom of `model` i + 1 if it is of the object i, -(i + 1) if it is of the finger i or of a pad on it, else 0."""
     ends = np.zeros(model.nbody, int)
     for sign, bodies in (1, things), (-1, fingers):
         for i, body in enumerate(bodies, 1):
             ends[model.body(body).id] = sign * i
+    for body, parent in enumerate(model.body_parentid.tolist()):  # which comes before it
+        if ends[parent] < 0:
+            ends[body] = ends[parent]
     return ends[model.geom_bodyid]

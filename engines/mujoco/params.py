@@ -16,7 +16,7 @@ from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import EcmPositions, InstrumentName, PsmPositions, SetupPositions, UnitQuaternion, check_start, settable
+from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
 from robots.serial_chain import SerialChain
 from schemas.keys import valid_name
 from schemas.quantity import Angle, Duration, Length
@@ -39,8 +39,9 @@ class PsmParams(ArmParams):
 
     instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
-    start: PsmPositions = Field(default=psm.HOME, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}")
+    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
+    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
 
     @cached_property
     def tool(self) -> Instrument:
@@ -54,7 +55,7 @@ class PsmParams(ArmParams):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.tool.jaw, self.jaw)
+        check_start(self.chain, self.start, self.tool, self.jaw, self.hand)
         return self
 
 
@@ -132,6 +133,13 @@ class SceneParams(Params):
         placed = [name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}]
         if self.mounting == "cart" and placed:
             raise ValueError(f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart setup_joints say where an arm stands")
+        return self
+
+    @model_validator(mode="after")
+    def _rolls_by_friction(self) -> Self:
+        rolling = [name for name, arm in self.arms.items() if isinstance(arm, PsmParams) and arm.tool.roller is not None]
+        if rolling and self.objects and self.grasp == "weld":
+            raise ValueError(f"grasp: weld would hold what the instrument of {', '.join(rolling)} is to roll; take grasp: friction")
         return self
 
 

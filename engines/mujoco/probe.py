@@ -5,12 +5,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from engines.mujoco.effective_mass import effective_mass
 from engines.mujoco.model import probe_body
 from hub.bond import MotionSide
 from hub.inputs import Inputs
 from schemas.vectors import Vector
 
-__all__ = ["Probe", "effective_mass"]
+__all__ = ["Probe"]
 
 _POSE = np.array([0, 1, 2, 4, 5, 6, 3])
 """Where a pose (x, y, z, qx, qy, qz, qw) stands among MuJoCo's sensors, with quaternions w first."""
@@ -20,6 +21,9 @@ _W_FIRST = [6, 3, 4, 5]
 
 class Probe:
     """Views of the model's data that belong to one probe; nothing is allocated in a step."""
+
+    acts_off_centre = False
+    """A wrench that does not change need not be renewed in a step: it acts at the centre of mass of its link."""
 
     def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Let `motion` act on the probe of `arm`."""
@@ -32,7 +36,10 @@ class Probe:
         self._pose = np.empty(7)
         self._moved, self._turned = np.zeros(6), np.empty(3)
         self._translation, self._rotation = self._moved[:3], self._moved[3:]
-        self.outputs = motion.result(self._pose, self._twist)
+        to_base = data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).T
+        self._to_base: Vector = np.kron(np.eye(2), to_base)
+        self._tip_wrench = np.zeros(6)
+        self.outputs = {**motion.result(self._pose, self._twist), f"{arm}/tip_wrench": self._tip_wrench}
         self.refresh()
 
     def begin(self, inputs: Inputs) -> None:
@@ -40,12 +47,17 @@ class Probe:
         self.motion.begin(inputs, self._pose, self._twist)
         self._wrench[:] = self.motion.force(0.0, self._pose, self._twist)
 
-    def correct(self, tau: float) -> None:
+    def renew(self, tau: float) -> None:
         """Follow the bond's correction: a new wrench from `tau` seconds into the step on."""
-        self.end()
+        self._book()
         self._wrench[:] = self.motion.force(tau, self._pose, self._twist)
 
     def end(self) -> None:
+        """Book what was done, and say what the tip, which is the probe's centre, feels."""
+        self._book()
+        self._to_base.dot(self._wrench, self._tip_wrench)
+
+    def _book(self) -> None:
         """Book the work of the wrench since it was set, and bring the pose up to the model's present state."""
         np.subtract(self._position, self._pose[:3], out=self._translation)  # the pose is still the one before
         if any(self._torque):  # a sphere in contact feels none
@@ -58,26 +70,9 @@ class Probe:
         """Bring the pose up to the model's present state."""
         self._sensors.take(_POSE, None, self._pose, "clip")  # three times as fast as the default mode
 
-
-def effective_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Return the least mass (kg) that a force on the probe of `arm` meets in any direction: 1 / max eig(J M^-1 J^T).
-
-    The joints of the linkage go with those they follow: J and M are those of the independent joints.
-    """
-    jacobian, inertia = np.zeros((3, model.nv)), np.zeros((model.nv, model.nv))
-    mujoco.mj_jacBody(model, data, jacobian, None, model.body(probe_body(arm)).id)
-    mujoco.mj_fullM(model, data, inertia)
-    ties = _followers(model)
-    jacobian, inertia = jacobian @ ties, ties.T @ inertia @ ties
-    return float(1.0 / np.linalg.eigvalsh(jacobian @ np.linalg.solve(inertia, jacobian.T))[-1])
-
-
-def _followers(model: mujoco.MjModel) -> Vector:
-    """Return T, shape (nv, independent), with dq = T dq_independent: the joint equalities of the model as ratios of velocities."""
-    ties, led = np.eye(model.nv), list[int]()
-    for i in range(model.neq):
-        if model.eq_type[i] == mujoco.mjtEq.mjEQ_JOINT and model.eq_active0[i]:
-            follower, leader = model.jnt_dofadr[model.eq_obj1id[i]], model.jnt_dofadr[model.eq_obj2id[i]]
-            ties[follower] = model.eq_data[i, 1] * ties[leader]
-            led.append(int(follower))
-    return np.delete(ties, led, axis=1)
+    @staticmethod
+    def least_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+        """Return the least mass (kg) that a force on the probe of `arm` meets in any direction."""
+        jacobian = np.zeros((3, model.nv))
+        mujoco.mj_jacBody(model, data, jacobian, None, model.body(probe_body(arm)).id)
+        return effective_mass(jacobian, model, data)

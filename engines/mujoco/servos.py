@@ -16,6 +16,7 @@ import numpy as np
 from engines.mujoco.model import FINGERS
 from engines.mujoco.params import EcmParams, PsmParams, SceneArm
 from hub.inputs import Inputs
+from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
@@ -62,6 +63,15 @@ class Servos:
                 self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
                 shares += [(actuator, len(rows), 0.5) for actuator in self._groups[-1].actuators]
                 rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
+                if (roller := params.tool.roller) is not None:
+                    self._groups[-1].part = slice(len(rows) - 1, len(rows) + 1)
+                    self._groups[-1].actuators.append(model.actuator(f"{arm}/{ROLLER}").id)
+                    shares.append((self._groups[-1].actuators[-1], len(rows), 1.0))
+                    rows.append((0.0, roller.joint.lower, roller.joint.upper, roller.joint.velocity))
+            elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+                self._add_group(arm, f"{arm}/hand/", [motor.name for motor in hand.joints], len(rows), len(hand.joints))
+                shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
+                rows += [(q, motor.lower, motor.upper, motor.velocity) for q, motor in zip(params.hand, hand.joints, strict=True)]
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
@@ -86,9 +96,10 @@ class Servos:
     def _add_group(self, arm: str, ports: str, joints: list[str], first: int, count: int) -> None:
         model = self._model
         actuators = [model.actuator(f"{arm}/{joint}").id for joint in joints]
-        fingers = {f"{arm}/{finger}" for finger in FINGERS}
-        own = fingers if joints == list(FINGERS) else {name for i in range(model.nbody) if (name := model.body(i).name).startswith(f"{arm}/")} - fingers
-        bodies = [i for i in range(model.nbody) if model.body(i).name in own]
+        grasps = ports != f"{arm}/"
+        grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, *PADS, "finger"))  # those of a jaw with its pads, and the phalanges of a hand
+        own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
+        bodies = [i for i in own if model.body(i).name.startswith(grasping) == grasps]
         weighed = [i for i in bodies if model.body(i).name == "ECM/roll"]
         self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports, weighed))
 
@@ -101,15 +112,24 @@ class Servos:
             layout[at, drive] = share
             layout[at + 1, [drive, n + drive]] = share / period, -share / period
             layout[at + 2, 2 * n + drive] = 1.0  # both fingers with the jaw's torque: their work is then that of the jaw
-            measure[drive, model.jnt_qposadr[model.actuator_trnid[actuator, 0]]] = 1.0
+            for joint, coefficient in self._moved(actuator):
+                measure[drive, model.jnt_qposadr[joint]] = coefficient
         return layout, measure
+
+    def _moved(self, actuator: int) -> list[tuple[int, float]]:
+        """Return the joints whose positions, each times its factor, add up to the actuator's: one, or those of a tendon from the palm outwards."""
+        model, target = self._model, int(self._model.actuator_trnid[actuator, 0])
+        if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
+            return [(target, 1.0)]
+        wraps = range(int(model.tendon_adr[target]), int(model.tendon_adr[target] + model.tendon_num[target]))
+        return [(int(model.wrap_objid[i]), float(model.wrap_prm[i])) for i in wraps]
 
     def _elasticity(self, shares: list[tuple[int, int, float]], n: int) -> tuple[Vector, Vector]:
         """Return stiffness of the joints' own springs and where these are at rest, both shape (n,)."""
         model = self._model
         stiffness, rest = np.zeros(n), np.zeros(n)
         for actuator, drive, _share in shares:
-            joint = int(model.actuator_trnid[actuator, 0])
+            joint = self._moved(actuator)[0][0]
             stiffness[drive], rest[drive] = np.ravel(model.jnt_stiffness[joint])[0], model.qpos_spring[model.jnt_qposadr[joint]]
         return stiffness, rest
 

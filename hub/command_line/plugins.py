@@ -1,4 +1,7 @@
-"""Commands that other packages bring: a `typer.Typer` under an entry point of the group `trocar.commands` is mounted under its name."""
+"""Commands that other packages bring: a `typer.Typer` under an entry point of the group `trocar.commands` is mounted under its name.
+
+One that has a single command is that command, as it would be by itself; any other is a group.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from importlib.metadata import entry_points
 
 import typer
 import typer.main
+from typer.core import TyperGroup
 
 __all__ = ["GROUP", "mount"]
 
@@ -28,9 +32,14 @@ def mount(app: typer.Typer) -> None:
             loaded = entry.load()
             if not isinstance(loaded, typer.Typer):
                 raise TypeError(f"expected a typer.Typer, got {type(loaded).__name__}")
-            typer.main.get_group(loaded)  # what is wrong with its commands shows here
+            command = typer.main.get_command(loaded)  # what is wrong with its commands shows here
         except Exception as error:  # noqa: BLE001  # whatever a plug-in's module does on import
             log.warning("%s is left out, it cannot be loaded: %s: %s", brought, type(error).__name__, error)
             continue
         taken.add(entry.name)
-        app.add_typer(loaded, name=entry.name)
+        if isinstance(command, TyperGroup):
+            app.add_typer(loaded, name=entry.name)
+        else:
+            (only,) = loaded.registered_commands
+            only.name = entry.name
+            app.registered_commands.append(only)

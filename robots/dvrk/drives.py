@@ -10,7 +10,7 @@ rotor inertia belong to the discs. Each joint gets the diagonal of its share; th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -18,7 +18,9 @@ import numpy as np
 
 from robots.dvrk import ecm
 from robots.dvrk import psm as psm_arm
+from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import Instrument
+from robots.dvrk.rolling_needle_driver import ROLLER
 
 __all__ = ["ECM", "FINGERS", "SMOOTHING", "Disc", "Drive", "discs", "friction", "psm"]
 
@@ -83,7 +85,7 @@ _ECM_GAINS = {"yaw": (400.0, 30.0), "pitch": (1000.0, 80.0), "insertion": (10000
 
 
 def psm(tool: Instrument) -> Mapping[str, Drive]:
-    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw included."""
+    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw or hand and the roller included."""
     chain = psm_arm.chain(tool)
     drives = {joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity) for joint in chain.joints[:3]}
     square = {name: sum(disc.shares.get(name, 0.0) ** 2 for disc in discs(tool)) for name in _moved(tool)}
@@ -95,18 +97,35 @@ def psm(tool: Instrument) -> Mapping[str, Drive]:
     for name, share in square.items():
         elastic = (_ROLL_ELASTICITY, _ROLL_OFFSET) if name == "roll" else (0.0, 0.0)
         drives[name] = Drive(_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, *elastic, _DISC_INERTIA * share, *limits[name])
+    if tool.roller is not None:
+        share = (tool.roller.wire_radius / tool.roller.pulley) ** 2
+        of_disc = (_DISC_STIFFNESS * share, _DISC_DAMPING * share, 0.0, 0.0, 0.0, 0.0, _DISC_INERTIA * share)
+        drives[ROLLER] = Drive(*of_disc, tool.roller.joint.effort, tool.roller.joint.velocity)
+    if tool.hand is not None:
+        drives |= {joint.name: drive for joint, drive in zip(tool.hand.joints, _motors(tool.hand), strict=True)}
     return MappingProxyType(drives)
 
 
+def _motors(hand: Hand) -> Iterator[Drive]:
+    """Yield the drives of `hand` in the order of its joints.
+
+    A closing is turned by a disc that winds a tendon up and lets it go; its friction stays with the motor, as the springs that open a finger do
+    not turn it. A spread moves the end of a spring, with the friction of the first joints.
+    """
+    spring, friction = hand.phalanges[0].stiffness, float(hand.damping[0])
+    for joint in hand.joints:
+        gains = (_DISC_STIFFNESS, _DISC_DAMPING) if joint.name in hand.fingers else (spring, friction)
+        armature = _DISC_INERTIA if joint.name in hand.fingers else 0.0
+        yield Drive(*gains, 0.0, 0.0, 0.0, 0.0, armature, joint.effort, joint.velocity)
+
+
 def discs(tool: Instrument) -> tuple[Disc, ...]:
-    """Return the four discs that turn `tool`; the inverse of SAW's matrix from discs to joints says by how much."""
+    """Return the discs that turn roll, wrist and jaw of `tool`; the inverse of SAW's matrix from discs to joints says by how much."""
     shares = np.linalg.inv(tool.actuator_to_joint)  # (disc, joint)
     names = _moved(tool)
     columns = [_column(name) for name in names]
-    return tuple(
-        Disc({name: float(row[column]) for name, column in zip(names, columns, strict=True) if abs(row[column]) > 1e-9}, *losses)
-        for row, losses in zip(shares, _DISC_FRICTION, strict=True)
-    )
+    turned = [{name: float(row[column]) for name, column in zip(names, columns, strict=True) if abs(row[column]) > 1e-9} for row in shares]
+    return tuple(Disc(moved, *losses) for moved, losses in zip(turned, _DISC_FRICTION, strict=True) if moved)
 
 
 def _moved(tool: Instrument) -> tuple[str, ...]:

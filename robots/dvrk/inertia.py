@@ -20,9 +20,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from robots.dvrk.contact_spheres import FINGER_HALF_WIDTH
 from robots.dvrk.ecm import chain as ecm_chain
+from robots.dvrk.hand import Hand
 from robots.dvrk.instruments import SHAFT_RADIUS, STEEL_DENSITY, WRIST_RADIUS, Instrument
 from robots.dvrk.psm import chain as psm_chain
+from robots.dvrk.rolling_needle_driver import PADS
 from schemas.vectors import Vector
 
 __all__ = ["ENDOSCOPE_MASS", "PROBE_RADIUS", "SHAFT_MASS", "Inertia", "ecm", "instrument", "psm"]
@@ -66,8 +69,6 @@ _YAW_LINK_MASS = 6.63661e-6
 """kg of what turns with the wrist yaw beside the fingers (dvrk_env tool_lnd.urdf.xacro, CAD of the large needle driver, for all)."""
 _FINGER_MASS = 3.90696e-5
 """kg of one finger (same file)."""
-_FINGER_RADIUS = 0.0024
-"""m (dvrk_env, bounds of tool_gripper1_link.STL)."""
 
 PROBE_RADIUS = 5e-3
 """m, of the sphere of a palpation probe unless a scene says otherwise."""
@@ -92,7 +93,7 @@ def _arm_of_psm() -> Mapping[str, Inertia]:
 
 
 def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[str, Inertia]:
-    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe."""
+    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe; or shaft and phalanges (straight)."""
     chain = psm_chain(tool)
     frames = chain.frames(np.zeros(len(chain.joints)))
     origins, ahead = frames[:-1, :3, 3], frames[-1, :3, 2]  # (n, 3), (3,)
@@ -100,13 +101,38 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
     bodies = {"roll": Inertia.of_rod(tool.roll_mass + SHAFT_MASS, origins[first - 1], origins[first], SHAFT_RADIUS)}
     for i in range(first + 1, len(chain.joints) - 1):
         bodies[chain.joints[i].name] = Inertia.of_rod(tool.pitch_mass, origins[i], origins[i + 1], WRIST_RADIUS)
+    if tool.hand is not None:
+        return {**bodies, **_hand(tool.hand, frames[-2])}
     last, end = chain.joints[-1].name, origins[-1]
     if tool.jaw is None:
         mass = STEEL_DENSITY * 4.0 / 3.0 * pi * probe_radius**3
         return {**bodies, last: Inertia(mass, end, 0.4 * mass * probe_radius**2 * np.eye(3))}
     bodies[last] = Inertia(_YAW_LINK_MASS, end, 0.4 * _YAW_LINK_MASS * WRIST_RADIUS**2 * np.eye(3))
-    finger = Inertia.of_rod(_FINGER_MASS, end, end + tool.jaw.length * ahead, _FINGER_RADIUS)
-    return {**bodies, "jaw_left": finger, "jaw_right": finger}
+    finger = Inertia.of_rod(_FINGER_MASS, end, end + tool.jaw.length * ahead, FINGER_HALF_WIDTH)
+    return {**bodies, "jaw_left": finger, "jaw_right": finger, **_pads(tool, end, ahead, frames[-2, :3, 2])}
+
+
+def _pads(tool: Instrument, end: Vector, ahead: Vector, axis: Vector) -> Mapping[str, Inertia]:
+    """Return the pads of a roller, of steel; the wrist yaw axis passes `end` along `axis`, which like `ahead` is one of the base frame's, shape (3,)."""
+    if tool.roller is None:
+        return {}
+    along, across, thickness = tool.roller.size
+    side = np.cross(axis, ahead)  # of the left finger
+    size = np.abs(along * ahead + across * axis + thickness * side)
+    middle = end + tool.roller.distance * ahead
+    return {
+        pad: Inertia.of_box(STEEL_DENSITY * along * across * thickness, middle + way * thickness / 2.0 * side, size)
+        for pad, way in zip(PADS, (1.0, -1.0), strict=True)
+    }
+
+
+def _hand(hand: Hand, shaft: Vector) -> Mapping[str, Inertia]:
+    """Return the phalanges of `hand`, its frame being `shaft`, shape (4, 4)."""
+    bodies: dict[str, Inertia] = {}
+    for link, mass in zip(hand.links, np.tile(hand.masses, len(hand.fingers)).tolist(), strict=True):
+        pose = shaft @ link.pose
+        bodies[link.name] = Inertia.of_rod(mass, pose[:3, 3], pose[:3, 3] + link.phalanx.length * pose[:3, 0], hand.radius)
+    return bodies
 
 
 _ECM_CAD = {

@@ -1,4 +1,4 @@
-"""Instruments of the PSM: joints, tip frame, jaw, and what their links weigh. SI units, radians.
+"""Instruments of the PSM: joints, tip frame, jaw or hand, and what their links weigh. SI units, radians.
 
 The numbers of all 54 instruments that the dVRK's controller knows are in `data/instruments.json`, each with the file they come
 from; right angles are exact there. An instrument is called by its name (`LARGE_NEEDLE_DRIVER_400006`) or by its number alone.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from importlib.resources import files
 from math import radians
 from types import MappingProxyType
@@ -17,7 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from robots.dvrk.contact_spheres import ContactSphere, on_jaw
+from robots.dvrk.hand import Hand
 from robots.dvrk.limits import jerk
+from robots.dvrk.musha import HAND
+from robots.dvrk.rolling_needle_driver import NAME as ROLLING
+from robots.dvrk.rolling_needle_driver import Roller, roller
 from robots.serial_chain import Joint
 from schemas.errors import MotionError, did_you_mean
 from schemas.vectors import Vector
@@ -46,6 +51,9 @@ _OTHER_JAW_LENGTH = _JAW_LENGTHS["049"]
 _PROBE = "palpation-probe"
 """A steel sphere centred on the tip frame in place of the jaws of a large needle driver 400006."""
 
+_MUSHA = "MUSHA_HAND"
+"""A hand (`robots.dvrk.musha`) on the shaft of a large needle driver 400006."""
+
 
 @dataclass(frozen=True)
 class Jaw:
@@ -62,6 +70,11 @@ class Jaw:
     acceleration: float = _WRIST_ACCELERATION
     jerk: float = jerk(_WRIST_ACCELERATION)
 
+    @property
+    def joint(self) -> Joint:
+        """The angle as a joint."""
+        return Joint("jaw", "revolute", 0.0, 0.0, 0.0, 0.0, self.lower, self.upper, self.velocity, self.effort, self.acceleration, self.jerk)
+
 
 @dataclass(frozen=True)
 class Instrument:
@@ -71,23 +84,39 @@ class Instrument:
     number: str
     """Intuitive's part number, first six digits; empty for what Intuitive does not make."""
     joints: tuple[Joint, ...]
-    """Roll, wrist pitch, wrist yaw; roll and four wrist joints where the wrist is a snake."""
+    """Roll, wrist pitch, wrist yaw; roll and four wrist joints where the wrist is a snake; roll alone where a hand is in place of the wrist."""
     tip: Vector
     """Pose of the tip frame in the frame of the last link, shape (4, 4)."""
     jaw: Jaw | None
-    """None where there is nothing that opens: probe, cautery hook and spatula."""
+    """None where there is no jaw: probe, cautery hook and spatula, hand."""
     actuator_to_joint: Vector
-    """Joint positions (roll, wrist pitch, wrist yaw, jaw) of disc positions (rad), shape (4, 4)."""
+    """Joint positions (roll, wrist pitch, wrist yaw, jaw; with a hand roll and the closings of its fingers) of disc positions (rad), shape (4, 4)."""
     source: str
     roll_mass: float = 3.428938e-4
     """Mass of the link that rolls, kg (WPI-AIM/dvrk_env, tool_lnd.urdf.xacro: CAD of the large needle driver, taken for all)."""
     pitch_mass: float = 2.491212e-4
     """Mass of the link between wrist pitch and wrist yaw, kg (same file)."""
+    hand: Hand | None = None
+    """In place of wrist and jaw."""
+    roller: Roller | None = None
+    """In the jaw: turns a needle between the fingers."""
 
     @property
     def has_snake_wrist(self) -> bool:
         """Whether the wrist is that of a 5 mm instrument: four bending joints in place of wrist pitch and wrist yaw."""
-        return len(self.joints) != 3
+        return len(self.joints) > 3
+
+    @property
+    def jaw_joints(self) -> tuple[Joint, ...]:
+        """What is commanded of the jaw: its angle and, where it has a roller, that of the needle; empty where there is no jaw."""
+        return () if self.jaw is None else (self.jaw.joint,) if self.roller is None else (self.jaw.joint, self.roller.joint)
+
+    @cached_property
+    def spheres(self) -> tuple[ContactSphere, ...]:
+        """What touches tissue; empty for a palpation probe, which is a sphere itself, and for what has no jaw."""
+        if self.hand is not None:
+            return self.hand.spheres
+        return () if self.jaw is None else on_jaw(self.jaw.length, self.tip[:3, 2])
 
 
 def instrument(name: str) -> Instrument:
@@ -105,7 +134,18 @@ def instruments() -> Mapping[str, Instrument]:
     made = {name: _from_data(name, row, data) for name, row in data["instruments"].items()}
     driver = made["LARGE_NEEDLE_DRIVER_400006"]
     made[_PROBE] = Instrument(_PROBE, "", driver.joints, driver.tip, None, driver.actuator_to_joint, driver.source)
+    made[_MUSHA] = _with_hand(_MUSHA, HAND, driver)
+    source = f"{driver.source}; robots.dvrk.rolling_needle_driver"
+    made[ROLLING] = replace(driver, name=ROLLING, number="", source=source, roller=None if driver.jaw is None else roller(driver.jaw.effort))
     return MappingProxyType(made)
+
+
+def _with_hand(name: str, hand: Hand, shaft: Instrument) -> Instrument:
+    """Return an instrument that has `hand` on the shaft of another; its tip is the end of the straight fingers, at home turned as that of the other one."""
+    tip = np.diag([-1.0, -1.0, 1.0, 1.0])
+    tip[2, 3] = hand.reach
+    coupling = np.diag([shaft.actuator_to_joint[0, 0], 1.0, 1.0, 1.0])  # a disc winds up tendon as the first pulley does
+    return Instrument(name, "", shaft.joints[:1], tip, None, coupling, f"{shaft.source} (shaft); robots.dvrk.musha", hand=hand)
 
 
 @cache

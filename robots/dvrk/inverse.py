@@ -10,8 +10,9 @@ branches. Where the yaw axis passes the RCM any x5 will do: the wrist yaw of `ne
 15.6 mm with the instruments of the Classic) any d perpendicular to z5 will do: the shaft stays as near to that of `near` as the
 wrist pitch allows.
 
-ECM. Four joints cannot take any pose. As on the real arm the position decides yaw, pitch and insertion, and the roll is what comes
-nearest to the orientation asked for; what remains is accepted up to `ORIENTATION_TOLERANCE` and refused beyond.
+ECM, and a PSM with a hand in place of the wrist. Four joints cannot take any pose. As on the real ECM the position decides yaw, pitch and
+insertion, and the roll is what comes nearest to the orientation asked for; what remains is accepted up to `ORIENTATION_TOLERANCE` and
+refused beyond.
 
 Of the branches inside all joint ranges the one nearest to `near` is taken, by the time that each joint would need at its velocity limit.
 """
@@ -29,7 +30,7 @@ from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["ORIENTATION_TOLERANCE", "inverse"]
+__all__ = ["ORIENTATION_TOLERANCE", "branches", "inverse"]
 
 ORIENTATION_TOLERANCE = radians(20.0)
 """Between the ECM's goal and the nearest orientation at its position, rad. The real controller (jhu-dvrk/sawIntuitiveResearchKit,
@@ -56,7 +57,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     """Return joint positions, shape (..., n), inside the joint ranges, at which the tip has `pose`.
 
     Args:
-        chain: a PSM with a wrist of three joints, or an ECM.
+        chain: a PSM with a wrist of three joints or none, or an ECM.
         pose: of the tip in the chain's base frame, shape (..., 4, 4).
         near: joint positions that decide between solutions, shape (n,) or (..., n).
 
@@ -69,7 +70,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     ends = poses @ inverse_pose(chain.tip)
     if n == len(ecm.JOINTS):
         _require(chain, ecm.JOINTS[3:])
-        branches = _ecm_branches(chain, ends)
+        branches = _branches_without_wrist(chain, poses[:, :3, 3], ends[:, :3, :3])
     else:
         _require(chain, chain.joints[3:])
         branches = _psm_branches(chain, ends, start)
@@ -112,23 +113,40 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
     return poses, start
 
 
+def branches(chain: SerialChain, pose: Vector) -> Vector:
+    """Return the joint positions of all four branches, shape (4, ..., 6), in range or not, revolute ones within half a turn of 0.
+
+    Where a singular pose leaves a joint free, it is at 0.
+
+    Args:
+        chain: a PSM with a wrist of three joints.
+        pose: of the tip in the chain's base frame, shape (..., 4, 4), finite.
+    """
+    _require(chain, chain.joints[3:])
+    ends = (pose @ inverse_pose(chain.tip)).reshape(-1, 4, 4)
+    near = np.zeros((1, len(chain.joints)))
+    return _unwind(chain, _psm_branches(chain, ends, near), near).reshape(4, *pose.shape[:-2], len(chain.joints))
+
+
 def _require(chain: SerialChain, wrist: tuple[Joint, ...]) -> None:
     """Refuse a chain that the closed form is not for."""
     rows = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in chain.joints[:3])
     alphas = tuple(joint.alpha for joint in wrist)
     if rows != _RCM_ROWS or alphas != _WRIST_ALPHAS[: len(wrist)] or len(chain.joints) != 3 + len(wrist) or len(wrist) not in (1, 3):
         names = ", ".join(joint.name for joint in chain.joints)
-        raise MotionError(f"no closed form for the joints {names}: it is for a PSM with roll, wrist pitch and wrist yaw, and for the ECM")
+        raise MotionError(f"no closed form for the joints {names}: it is for a PSM with roll, wrist pitch and wrist yaw or with roll alone, and for the ECM")
 
 
-def _ecm_branches(chain: SerialChain, ends: Vector) -> Vector:
-    """Return the joint positions, shape (2, N, 4), of poses of the last link, shape (N, 4, 4)."""
-    position, rotation = ends[:, :3, 3], ends[:, :3, :3]
+def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vector) -> Vector:
+    """Return the joint positions, shape (2, N, 4), at which the tip, on the axis of the last link, is at `position`, shape (N, 3).
+
+    `rotation`, shape (N, 3, 3), is the one asked for of the last link.
+    """
     distance = np.linalg.norm(position, axis=-1, keepdims=True)
     outwards = np.where(distance > _POINT, position / np.maximum(distance, _POINT), rotation[:, :, 2])
     shaft = outwards * _BRANCH_SIGNS[0][:2]  # (2, N, 3)
-    q = np.empty((2, len(ends), 4))
-    x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, position), q)
+    q = np.empty((2, len(position), 4))
+    x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, position) - chain.tip[2, 3], q)
     # The turn about the shaft that brings x4, y4 nearest to the goal's x and y (least squares of the matrices' difference).
     x, y = rotation[:, :, 0], rotation[:, :, 1]
     q[..., 3] = np.arctan2(_dot(x, y3) - _dot(y, x3), _dot(x, x3) + _dot(y, y3)) - chain.joints[3].theta
@@ -211,7 +229,7 @@ def _unreachable(chain: SerialChain, branches: Vector, index: np.intp, count: in
 
 
 def _check_orientation(reached: Vector, asked: Vector) -> None:
-    """Refuse goals whose orientation the ECM misses by more than `ORIENTATION_TOLERANCE`."""
+    """Refuse goals whose orientation four joints miss by more than `ORIENTATION_TOLERANCE`."""
     difference = np.linalg.norm(reached[:, :3, :3] - asked[:, :3, :3], axis=(-2, -1))
     angles: NDArray[np.float64] = 2.0 * np.arcsin(np.minimum(difference / np.sqrt(8.0), 1.0))
     worst = int(angles.argmax())
@@ -219,5 +237,5 @@ def _check_orientation(reached: Vector, asked: Vector) -> None:
         where = f" {worst}" if len(asked) > 1 else ""
         raise MotionError(
             f"pose{where} cannot be reached: four joints leave its orientation {degrees(angles[worst]):.1f} degrees away at this position, "
-            f"allowed are {degrees(ORIENTATION_TOLERANCE):g}; the endoscope looks away from the remote centre of motion"
+            f"allowed are {degrees(ORIENTATION_TOLERANCE):g}; the shaft points away from the remote centre of motion"
         )

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
 
-from robots.dvrk import setup_joints
-from robots.dvrk.instruments import Jaw, instrument
+from robots.dvrk import psm, setup_joints
+from robots.dvrk.instruments import Instrument, instrument
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
 from schemas.quantity import Angle, Length
 
-__all__ = ["ArmName", "EcmPositions", "InstrumentName", "PsmPositions", "SetupPositions", "UnitQuaternion", "check_start", "settable"]
+__all__ = [
+    "ArmName",
+    "EcmPositions",
+    "HandPositions",
+    "InstrumentName",
+    "MountedPositions",
+    "PsmPositions",
+    "SetupPositions",
+    "UnitQuaternion",
+    "check_start",
+    "home",
+    "settable",
+]
 
 ArmName = Literal["PSM1", "PSM2", "PSM3"]
 
@@ -26,7 +38,7 @@ def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
     return value
 
 
-def _with_three_wrist_joints(name: str) -> str:
+def _mountable(name: str) -> str:
     try:
         found = instrument(name)
     except MotionError as error:
@@ -43,7 +55,7 @@ def _text(name: Any) -> Any:
 InstrumentName = Annotated[
     str,
     BeforeValidator(_text),  # a number in YAML needs no quotes
-    AfterValidator(_with_three_wrist_joints),
+    AfterValidator(_mountable),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer"}], "examples": ["LARGE_NEEDLE_DRIVER_400006", 400006]}),
 ]
 """Name or number of an instrument that can be mounted on a PSM; the name, once it is validated."""
@@ -57,20 +69,41 @@ EcmPositions = tuple[Angle, Angle, Length, Angle]
 SetupPositions = tuple[Length, Angle, Angle, Angle, Angle, Angle]
 """Of the setup joints that carry one arm: the lift (m), then five angles."""
 
+MountedPositions = tuple[Angle, Angle, Length, Angle] | tuple[Angle, Angle, Length, Angle, Angle, Angle]
+"""Positions of a PSM's joints (rad, m), as many as it has with its instrument: four with a hand, else six."""
+
 UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
 """A rotation as quaternion (x, y, z, w)."""
 
+HandPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+"""Closings, then spreads, of three fingers."""
 
-def check_start(chain: SerialChain, start: Sequence[float], jaw: Jaw | None = None, opening: float = 0.0) -> None:
-    """Raise ValueError, as pydantic's validators do, if `start` or the `opening` of the jaw (rad) is not inside its range."""
+
+def home(arm: dict[str, Any]) -> MountedPositions:
+    """Return `psm.home` for the `instrument` of an arm whose fields are being validated; any where that is none."""
+    try:
+        return cast("MountedPositions", psm.home(instrument(arm.get("instrument", ""))))
+    except MotionError:
+        return psm.HOME  # not looked at: the instrument has been refused
+
+
+def check_start(chain: SerialChain, start: Sequence[float], tool: Instrument | None = None, jaw: float = 0.0, hand: Sequence[float] = ()) -> None:
+    """Raise ValueError, as pydantic's validators do, if `start`, or how far `jaw` or `hand` (rad) of the tool are open, is not inside its range."""
     try:
         chain.check(np.array(start, np.float64))
     except MotionError as error:
         raise ValueError(str(error)) from error
-    if jaw is None and opening:
-        raise ValueError(f"jaw at {opening:g} rad, but what the arm holds has no jaw; leave it out")
-    if jaw is not None and not jaw.lower <= opening <= jaw.upper:
-        raise ValueError(f"jaw at {opening:g} rad, allowed are {jaw.lower:g} .. {jaw.upper:g}")
+    range_ = tool.jaw if tool is not None else None
+    if range_ is None and jaw:
+        raise ValueError(f"jaw at {jaw:g} rad, but what the arm holds has no jaw; leave it out")
+    if range_ is not None and not range_.lower <= jaw <= range_.upper:
+        raise ValueError(f"jaw at {jaw:g} rad, allowed are {range_.lower:g} .. {range_.upper:g}")
+    joints = tool.hand.joints if tool is not None and tool.hand is not None else ()
+    if not joints and any(hand):
+        raise ValueError("closings of a hand, but what the arm holds is none; leave them out")
+    for joint, closing in zip(joints, hand, strict=bool(joints)):
+        if not joint.lower <= closing <= joint.upper:
+            raise ValueError(f"{joint.name} at {closing:g} rad, allowed are {joint.lower:g} .. {joint.upper:g}")
 
 
 def settable(arm: setup_joints.CartArm) -> AfterValidator:

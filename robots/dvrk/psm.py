@@ -12,7 +12,7 @@ from robots.dvrk.instruments import Instrument
 from robots.dvrk.limits import jerk
 from robots.serial_chain import Joint, SerialChain
 
-__all__ = ["ARM_JOINTS", "HOME", "JOINT_NAMES", "chain"]
+__all__ = ["ARM_JOINTS", "HOME", "JOINT_NAMES", "chain", "home"]
 
 _RCM_TO_CARRIAGE = 0.4318
 """Distance (m) of the instrument carriage from the RCM at insertion 0 (SAW share/kinematic/PSM.json, offset of joint 3)."""
@@ -32,6 +32,12 @@ JOINT_NAMES = ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
 
 HOME = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Where the real controller homes a simulated arm (SAW mtsIntuitiveResearchKitPSM.cpp): straight, insertion 0.12 m."""
+
+
+def home(instrument: Instrument) -> tuple[float, ...]:
+    """Return `HOME` for the joints of the arm with `instrument`: what is beyond stands at 0."""
+    joints = len(ARM_JOINTS) + len(instrument.joints)
+    return (*HOME, *(0.0,) * joints)[:joints]
 
 
 def chain(instrument: Instrument) -> SerialChain:

@@ -104,3 +104,10 @@ def test_it_keeps_the_contract_of_a_controller():
 def test_steps_that_mean_nothing_are_refused(step):
     with pytest.raises(ValidationError):
         RoutineParams.model_validate({"steps": [step]})
+
+
+def test_a_jaw_with_a_roller_is_told_two_angles():
+    step = RoutineParams.model_validate({"steps": [{"do": "jaw", "arm": "PSM1", "angle": "-20 deg", "roll": "90 deg"}]}).steps[0]
+    port, message = step.message()
+    assert port == "PSM1/jaw/move_jp"
+    assert message.position == pytest.approx(np.radians([-20, 90]))

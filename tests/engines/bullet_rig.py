@@ -21,15 +21,19 @@ def params(block=BLOCK, probe=None, **rest):
 
 
 class Rig:
-    """Moves the probe from `start` (m) on straight lines at constant speed, and keeps what came out."""
+    """Moves the probe from `start` (m; of every sphere) on straight lines at constant speed, and keeps what came out."""
 
     def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=IMPULSE):
         self.engine = BulletEngine("tissue", model or params())
         self.period, self.t = period, 0
         self.outputs = dict(self.engine.configure(Setup(period, Path(), {"probe": plan})))
-        self.pose = np.array([*start, 0.0, 0.0, 0.0, 1.0])
-        self.twist = np.zeros(6)
-        self.inputs = Inputs({"probe/pose": self.pose, "probe/twist": self.twist})
+        on_frame = self.engine.params.probes["probe"].spheres is None
+        position, velocity, force = ("pose", "twist", "wrench") if on_frame else ("position", "velocity", "force")
+        self.pose = np.array([*np.ravel(start), *([0.0, 0.0, 0.0, 1.0] if on_frame else [])])
+        self.twist = np.zeros(6 if on_frame else self.pose.size)
+        self.at, self.speed = (part[: np.size(start)].reshape(np.shape(start)) for part in (self.pose, self.twist))  # views
+        self.inputs = Inputs({f"probe/{position}": self.pose, f"probe/{velocity}": self.twist})
+        self._force = f"probe/{force}"
         self.wrenches, self.hashes, self.power = [], [], []
 
     def __enter__(self):
@@ -39,26 +43,31 @@ class Rig:
         self.engine.close()
 
     def move(self, target, seconds):
-        """Return the wrenches of this stretch, shape (steps, 6)."""
+        """Return the wrenches (or the forces on all spheres) of this stretch, shape (steps, 6 or 3 n)."""
+        start = self.at.copy()
+        way = np.asarray(target) - start
+        return self.follow(lambda t: (start + way * t / seconds, way / seconds), seconds)
+
+    def follow(self, motion, seconds):
+        """Like `move`, on the way whose position (m) and velocity (m/s) `motion` returns for the seconds since now."""
         steps = round(seconds * 1e9 / self.period)
-        start = self.pose[:3].copy()
-        self.twist[:3] = (np.asarray(target) - start) / seconds
         for i in range(steps):
-            self.pose[:3] = start + (np.asarray(target) - start) * i / steps
+            self.at[...], self.speed[...] = motion(i * self.period * 1e-9)
             self.outputs |= self.engine.step(self.t, self.period, self.inputs)
             self.t += self.period
-            self.wrenches.append(self.outputs["probe/wrench"].copy())
+            self.wrenches.append(self.outputs[self._force].copy())
             self.power.append(-self.wrenches[-1] @ self.twist)
             self.hashes.append(self.engine.state_hash())
-        self.pose[:3], self.twist[:3] = target, 0.0
+        self.at[...], self.speed[...] = motion(seconds)[0], 0.0
         return np.array(self.wrenches[-steps:])
 
     def hold(self, seconds):
-        return self.move(self.pose[:3].copy(), seconds)
+        return self.move(self.at.copy(), seconds)
 
     @property
     def force(self):
-        return self.wrenches[-1][:3]
+        """On the instrument, N, shape (3,) or (n, 3)."""
+        return self.wrenches[-1][: self.at.size].reshape(self.at.shape)
 
     @property
     def nodes(self):

@@ -90,7 +90,7 @@ def test_the_work_is_force_times_motion_and_a_cycle_loses_energy():
         pressed = rig.outputs["probe/work"][0]
         rig.hold(0.1)
         rig.move((0, 0, RADIUS + 1e-3), 0.2)
-        assert 0 < rig.outputs["probe/work"][0] < 0.5 * pressed
+        assert -0.01 * pressed < rig.outputs["probe/work"][0] < 0.5 * pressed
         booked, spent = rig.outputs["probe/work"][0], 1e-3 * sum(rig.power)
         assert booked == pytest.approx(spent, abs=0.02 * pressed)
 
@@ -118,7 +118,7 @@ def test_unphysical_organs_are_refused(wrong):
     [
         (params(timestep="0.3 ms"), "does not divide the period"),
         (params(node_period="2.5 ms"), "no multiple of the period"),
-        (params(probe={"stiffness": "10 kN/m"}), "0.5 sqrt\\(mass / stiffness\\)"),
+        (params(probe={"stiffness": "10 kN/m", "mass": "20 g"}), "0.5 sqrt\\(mass / stiffness\\)"),
         (params({**BLOCK, "young_modulus": "200 kPa"}), "organ 'block'.*highest natural frequency"),
         (params({**BLOCK, "young_modulus": "30 kPa", "damping": 0}), "raise the damping"),
     ],

@@ -36,10 +36,10 @@ def test_free_tissue_is_stable_up_to_the_longest_step(damping_ns, ratio, stable)
 def ripple(phase, monkeypatch):
     """Return the ripple of the force over its mean, at `phase` = timestep x highest frequency."""
     monkeypatch.setattr(material, "_LARGEST_PHASE", 10.0)
-    mesh = OrganParams.model_validate(SMALL_BLOCK).mesh
+    mesh = OrganParams.model_validate(SMALL_BLOCK).rest
     free = np.where(mesh.nodes[:, 2] > mesh.nodes[:, 2].min(), 1.0, 0.0)
     soft = OrganParams.model_validate(SMALL_BLOCK)
-    young_modulus = soft.young_modulus * (phase / (1e-3 * material.highest_frequency(mesh, free, soft.material))) ** 2
+    young_modulus = soft.young_modulus * (phase / (1e-3 * material.highest_frequency(mesh, free, soft.elastic))) ** 2
     with Rig(
         params({**SMALL_BLOCK, "young_modulus": young_modulus}),
     ) as rig:

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.bullet.material import Material, highest_frequency, longest_step
-from engines.bullet.mesh import block
+from engines.bullet.material import Material, highest_frequency, longest_step, lowest_frequency
+from engines.bullet.organs.grid import block
 from tests.engines.finite_elements import energy, internal_forces
 
 MATERIALS = st.builds(Material, st.floats(1e2, 1e6), st.floats(0.01, 0.495), st.just(1000.0), st.just(0.0))
@@ -41,19 +41,31 @@ def test_the_truth_is_the_derivative_of_its_energy():
     assert -np.sum(internal_forces(CUBE.nodes, CUBE.tetrahedra, nodes, 3e3, 2e4) * direction) == pytest.approx(slope, rel=1e-6)
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.1, 0.4, 0.49])
-def test_highest_frequency_against_all_frequencies(poisson_ratio):
-    mesh = block(np.array([0.04, 0.03, 0.02]), 45)
-    material = Material(1e4, poisson_ratio, 1000.0, 0.0)
-    free = np.where(mesh.nodes[:, 2] > mesh.nodes[:, 2].min(), 1.0, 0.0)
+def frequencies(mesh, free, material):
+    """Return all natural frequencies (rad/s) by differences of the truth."""
     moving = np.repeat(free, 3) > 0
     h, columns = 1e-9, []
     for i in np.flatnonzero(moving):
         moved = mesh.nodes.copy()
         moved.flat[i] += h
         columns.append(-internal_forces(mesh.nodes, mesh.tetrahedra, moved, *material.bullet_lame).ravel()[moving] / h)
-    squares = np.linalg.eigvals(np.array(columns)).real / (1000.0 * 0.04 * 0.03 * 0.02 / len(mesh.nodes))
-    assert highest_frequency(mesh, free, material) == pytest.approx(np.sqrt(squares.max()), rel=0.01)
+    return np.sqrt(np.linalg.eigvals(np.array(columns)).real / (material.density * mesh.volume / len(mesh.nodes)))
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.1, 0.4, 0.49])
+def test_highest_frequency_against_all_frequencies(poisson_ratio):
+    mesh = block(np.array([0.04, 0.03, 0.02]), 45)
+    material = Material(1e4, poisson_ratio, 1000.0, 0.0)
+    free = np.where(mesh.nodes[:, 2] > mesh.nodes[:, 2].min(), 1.0, 0.0)
+    assert highest_frequency(mesh, free, material) == pytest.approx(frequencies(mesh, free, material).max(), rel=0.01)
+
+
+def test_lowest_frequency_against_all_frequencies_of_a_beam():
+    mesh = block(np.array([0.06, 0.015, 0.01]), 60)
+    material = Material(1e4, 0.4, 1000.0, 0.0)
+    free = np.where(mesh.nodes[:, 0] > mesh.nodes[:, 0].min(), 1.0, 0.0)
+    lowest = frequencies(mesh, free, material).min()
+    assert lowest * 0.999 < lowest_frequency(mesh, free, material) < 1.03 * lowest
 
 
 @given(st.floats(10, 1e4), st.floats(0, 5e-3), st.floats(0.5, 2))

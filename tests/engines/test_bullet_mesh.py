@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engines.bullet.client import connect, disconnect
-from engines.bullet.mesh import FEWEST_NODES, block, block_cells, volumes
+from engines.bullet.mesh import volumes
 from engines.bullet.organ import Organ, OrganParams
+from engines.bullet.organs.grid import FEWEST_NODES, block, block_cells
 
 SIZES = st.tuples(*3 * [st.floats(5e-3, 0.2)]).map(np.array)
 NODES = st.integers(FEWEST_NODES, 600)
@@ -61,7 +62,7 @@ def test_bullet_keeps_the_order_and_every_bit_of_the_nodes():
     client = connect("test", 1e-3, 9.81)
     try:
         organ = Organ("block", params, client)
-        np.testing.assert_array_equal(organ.nodes, params.mesh.nodes)
+        np.testing.assert_array_equal(organ.nodes, params.rest.nodes)
         assert organ.nodes[~organ.anchored].max(axis=0) == pytest.approx([0.05, 0.023, 0.0333])
         assert organ.nodes[organ.anchored][:, 2] == pytest.approx(0.0133)
     finally:

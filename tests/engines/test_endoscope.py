@@ -143,6 +143,14 @@ def test_only_what_is_asked_for_has_a_port() -> None:
     }
 
 
+def test_a_camera_that_is_off_draws_nothing_and_has_the_same_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opengl, "find", lambda: pytest.fail("it looked for OpenGL"))
+    endoscope = make(images="none")
+    assert [port.name for port in endoscope.ports] == ["qpos"]
+    assert shoot(endoscope) == {}
+    assert np.frombuffer(endoscope.save()).tolist() == state(endoscope).tolist()
+
+
 def test_cameras_that_stand_in_the_world_look_at_their_target(gl: str) -> None:
     target = [0.1, -0.2, 0.3]
     outputs = shoot(make(np.array([target]), view={"position": [0.25, -0.2, 0.35], "target": target}, baseline="0 mm"))

@@ -16,9 +16,9 @@ def bond(algorithm, **rest):
     return Bond.model_validate({"motion": "robot.tip", "force": "tissue.tip", "algorithm": algorithm, **rest})
 
 
-def sides(mass=None, stiffness=None, damping=None, contact=None):
+def sides(mass=None, stiffness=None, damping=None, contact=None, proxy=0.02):
     motion = BondSide(name="tip", side="motion", effective_mass=mass)
-    return motion, BondSide(name="tip", side="force", stiffness=stiffness, damping=damping, proxy_mass=0.02, contact_stiffness=contact)
+    return motion, BondSide(name="tip", side="force", stiffness=stiffness, damping=damping, proxy_mass=proxy, contact_stiffness=contact)
 
 
 @pytest.mark.parametrize(
@@ -65,17 +65,25 @@ def test_a_critically_damped_proxy_is_taken_over_wholly_in_short_steps():
     assert linearised_gain(1e-7, 500.0, 2 * math.sqrt(500.0 * 0.02), 0.02) == pytest.approx(1.0, rel=1e-3)
 
 
+@given(positive, positive, positive, st.floats(0.01, 1.0))
+def test_a_proxy_of_long_sub_steps_is_heavier_at_once(step, stiffness, mass, share):
+    proxy_step, damping = share * step, 2 * math.sqrt(stiffness * mass)
+    gains = [linearised_gain(step, stiffness, damping, mass, sub_step) for sub_step in (0.0, 1e-6 * proxy_step, proxy_step)]
+    assert gains[1] == pytest.approx(gains[0], rel=1e-3)
+    assert gains[0] <= gains[2] * (1 + 1e-9)
+    assert gains[2] * (stiffness * step**2 / 6 + damping * step / 2) <= mass * (1 + 1e-9)
+
+
 def limit(algorithm, mass, stiffness, damping, contact):
     if algorithm == "impulse-linearised":
-        return 0.5 * math.sqrt(mass * (1 / stiffness + 1 / contact))
-    held = 0.5 * mass / damping
-    return held if algorithm == "impulse" else min(held, 0.5 * math.sqrt(mass / stiffness))
+        return min(0.5 * math.sqrt(mass * (1 / stiffness + 1 / contact)), 0.25 * math.sqrt(mass / contact))
+    return min(0.5 * mass / damping, 0.25 * math.sqrt(mass / contact) if algorithm == "impulse" else 0.5 * math.sqrt(mass / stiffness))
 
 
 @given(st.sampled_from(ALGORITHMS), positive, positive, positive, positive, st.floats(0.01, 100.0))
 def test_a_step_is_refused_just_beyond_its_limit(algorithm, mass, stiffness, damping, contact, share):
     allowed = limit(algorithm, mass, stiffness, damping, contact)
-    problem = stable_step_problem(bond(algorithm, order=["tissue", "robot"]), *sides(mass, stiffness, damping, contact), share * allowed)
+    problem = stable_step_problem(bond(algorithm, order=["tissue", "robot"]), *sides(mass, stiffness, damping, contact, proxy=None), share * allowed)
     if share <= 0.999:
         assert problem is None
     if share >= 1.001:
@@ -86,9 +94,16 @@ def test_a_step_is_refused_just_beyond_its_limit(algorithm, mass, stiffness, dam
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_a_number_that_is_not_stated_is_not_checked(algorithm):
     assert stable_step_problem(bond(algorithm), *sides(stiffness=1e9, damping=1e9), 1.0) is None
-    assert stable_step_problem(bond(algorithm), *sides(mass=1e-9), 1.0) is None
+    assert stable_step_problem(bond(algorithm), *sides(mass=1e-9, proxy=None), 1.0) is None
 
 
 def test_the_problem_names_rule_and_numbers():
     problem = stable_step_problem(bond("impulse"), *sides(mass=0.01, stiffness=500.0, damping=10.0), 1e-3)
-    assert "a step of 1 ms breaks the rule H <= 0.5 m/b of 'impulse', which allows 0.5 ms (m = 0.01, k = 500, b = 10 in SI units)" in problem
+    assert "a step of 1 ms breaks the rule H <= 0.5 m/b of 'impulse', which allows 0.5 ms (m = 0.01, k = 500, b = 10, m_proxy = 0.02 in SI units)" in problem
+
+
+def test_a_tool_much_lighter_than_the_proxy_is_refused():
+    assert stable_step_problem(bond("impulse-linearised"), *sides(mass=0.01, stiffness=500.0, damping=6.0), 1e-3) is None
+    problem = stable_step_problem(bond("impulse-linearised"), *sides(mass=0.009, stiffness=500.0, damping=6.0), 1e-3)
+    assert problem is not None
+    assert "the rule m >= 0.5 m_proxy of 'impulse-linearised' is broken (m = 0.009, k = 500, b = 6, m_proxy = 0.02 in SI units)" in problem

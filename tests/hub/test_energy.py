@@ -28,8 +28,8 @@ def spring_step(side, h, x, v, substeps=3):
     dt = h / substeps
     for i in range(substeps):
         tau = (i + 0.5) * dt
-        side.add(K * side.position(tau), np.zeros(3), tau, dt)
-    return side.result(K * side.position(h), np.zeros(3))
+        side.add(K * side.position(tau), np.zeros_like(x), tau, dt)
+    return side.result(K * side.position(h), np.zeros_like(x))
 
 
 @given(moves)
@@ -59,6 +59,18 @@ def test_with_held_inputs_the_spring_is_moved_between_the_steps_only(steps):
         np.testing.assert_allclose(outputs["tip/force"], -K * x, atol=1e-9)
     ends = [0.5 * K * np.sum(steps[i][1] ** 2) for i in (0, -1)]
     assert outputs["tip/work"][0] == pytest.approx(ends[1] - ends[0], abs=1e-9)
+
+
+@given(moves, vectors(6).map(np.tanh))
+def test_a_bond_of_two_points_is_two_bonds_of_one(steps, apart):
+    together = ForceSide(FORCE.model_copy(update={"points": 2}), HELD_VELOCITY)
+    alone = [ForceSide(FORCE, HELD_VELOCITY) for _ in range(2)]
+    for h, x, v in steps:
+        positions, velocities = np.tile(x, 2) + apart, np.tile(v, 2) - apart
+        both = spring_step(together, h, positions, velocities)
+        each = [spring_step(side, h, positions[i : i + 3], velocities[i : i + 3]) for i, side in zip((0, 3), alone, strict=True)]
+        np.testing.assert_allclose(both["tip/force"], np.concatenate([result["tip/force"] for result in each]), atol=1e-9)
+        assert both["tip/work"][0] == pytest.approx(sum(result["tip/work"][0] for result in each), abs=1e-9)
 
 
 @given(st.floats(1e-3, 0.02), st.integers(1, 200), st.floats(0.1, 10.0))

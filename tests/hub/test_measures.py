@@ -2,14 +2,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from hub.measures import Measures
-from schemas.scenario import Scenario
+from schemas.scenario import Measure, Scenario
 from tests.hub.parts import Part, out, plan_of
 from tests.strategies import vectors
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
-KINDS = ("peak", "peak-norm", "mean", "final")
+KINDS = ("peak", "peak-norm", "mean", "final", "drop")
 
 
 def measures(of, part):
@@ -24,7 +25,8 @@ def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
     for value in values:
         found.take("a", "out", value)
     norms = [np.linalg.norm(value[:3]) for value in values]
-    assert found.results() == pytest.approx({"peak": max(norms), "peak_norm": max(norms), "mean": np.mean(norms), "final": norms[-1]})
+    drop = max(norms) - min(norms[np.argmax(norms) :])
+    assert found.results() == pytest.approx({"peak": max(norms), "peak_norm": max(norms), "mean": np.mean(norms), "final": norms[-1], "drop": drop})
     assert found.live() == {"final": (pytest.approx(norms[-1]), "N")}
 
 
@@ -35,7 +37,24 @@ def test_a_single_number_keeps_its_sign_unless_the_norm_is_asked_for(values):
         found.take("a", "out", value)
     numbers = np.concatenate(values)
     expected = {"peak": numbers.max(), "peak_norm": np.abs(numbers).max(), "mean": numbers.mean(), "final": numbers[-1]}
+    expected["drop"] = numbers.max() - numbers[numbers.argmax() :].min()
     assert found.results() == pytest.approx(expected)
+
+
+def test_the_time_above_a_level_is_that_of_the_longest_stretch():
+    measure = {"held_s": {"kind": "time-above", "of": "a.out", "level": 0.5}}
+    part = Part("a", out(period_ns=4_000_000))
+    scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
+    found = Measures(scenario, plan_of(part, measure=measure))
+    for value in (0.6, 0.6, 0.4, 0.5, 0.6, 0.7, 0.1):
+        found.take("a", "out", np.array([value]))
+    assert found.results() == {"held_s": pytest.approx(0.012)}
+
+
+@pytest.mark.parametrize("measure", [{"kind": "time-above"}, {"kind": "peak", "level": 1.0}])
+def test_a_level_belongs_to_time_above(measure):
+    with pytest.raises(ValidationError, match="a level belongs to time-above"):
+        Measure.model_validate({"of": "a.out", **measure})
 
 
 def test_a_port_that_never_spoke_has_no_measure():

@@ -87,3 +87,10 @@ def test_trocar_mounts_them_and_says_on_stderr_what_it_leaves_out(install_plugin
     ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert ran.stdout == "7.0 kg\n"
     assert "command 'broken' of 'scales' (scales:nothing) is left out" in ran.stderr
+
+
+def test_one_with_a_single_command_is_that_command(command_line, install_plugin):
+    single = SCALES.partition("@app.command()\ndef tare")[0]
+    install_plugin("scales", {"trocar.commands": {"scale": "scales:app"}}, text=single)
+    plugins.mount(command_line)
+    assert run(command_line, "scale", "2.5").stdout == "2.5 kg\n"

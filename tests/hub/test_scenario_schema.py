@@ -32,7 +32,7 @@ def test_installed_scenarios_fit_the_schema(validator, file: Path):
         ({"stepp": "1 ms"}, []),
         ({"pace": "fats"}, ["pace"]),
         ({"participants": {"tissue": {"kind": "bulet"}}}, ["participants", "tissue", "kind"]),
-        ({"participants": {"tissue": {"kind": "bullet", "organs": {"a": {"size": [1, 2, 3]}}}}}, ["participants", "tissue", "organs", "a"]),
+        ({"participants": {"tissue": {"kind": "bullet", "organs": {"a": {"sise": [1, 2, 3]}}}}}, ["participants", "tissue", "organs", "a"]),
         ({"participants": {"tissue": {"kind": "bullet", "organ": {}}}}, ["participants", "tissue"]),
         ({"connections": ["a.b => c.d"]}, ["connections", 0]),
     ],

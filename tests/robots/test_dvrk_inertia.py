@@ -106,7 +106,9 @@ def test_a_rod_and_a_box_weigh_what_they_should():
 def test_every_instrument_has_drives_for_all_it_moves(tool):
     tool = instrument(tool)
     found = drives.psm(tool)
-    assert set(found) == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *(drives.FINGERS if tool.jaw else ())}
+    grasping = drives.FINGERS if tool.jaw else (*tool.hand.fingers, *tool.hand.spreads) if tool.hand else ()
+    rolling = {"roller"} if tool.roller else set()
+    assert set(found) == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *grasping} | rolling
     assert all(drive.stiffness > 0 and drive.damping > 0 and drive.effort > 0 and drive.velocity > 0 for drive in found.values())
     assert all(set(disc.shares) <= set(found) for disc in drives.discs(tool))
 

@@ -9,7 +9,7 @@ from robots.dvrk.inverse import ORIENTATION_TOLERANCE, inverse
 from robots.serial_chain import Joint
 from schemas.errors import MotionError
 
-CASES = [("PSM1", "400006"), ("PSM2", "420006"), ("PSM3", "400205"), ("ECM", "straight"), ("ECM", "up"), ("ECM", "down")]
+CASES = [("PSM1", "400006"), ("PSM2", "420006"), ("PSM3", "400205"), ("ECM", "straight"), ("ECM", "up"), ("ECM", "down"), ("PSM1", "MUSHA_HAND")]
 PSM, ECM = arms.chain("PSM1", "400006"), arms.chain("ECM")
 HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
 LOOK = np.array([0.1, -0.2, 0.12, 0.3])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from schemas.codec import decode, encode
 from schemas.errors import MessageError
@@ -139,12 +140,19 @@ def test_types_without_a_vector() -> None:
 
 
 @pytest.mark.parametrize("side", ["motion", "force"])
-@pytest.mark.parametrize("dof", [1, 2, 3, 6])
-def test_every_port_of_a_bond_has_a_vector(side: str, dof: int) -> None:
-    position, velocity, force = bond_ports(BondSide.model_validate({"name": "tip", "side": side, "dof": dof, "frame": "world"}))
-    assert VectorCodec(velocity).size == VectorCodec(force).size == dof
-    assert VectorCodec(position).size == (7 if dof == 6 else dof)
+@pytest.mark.parametrize(("dof", "points"), [(1, 1), (2, 1), (3, 1), (3, 9), (6, 1)])
+def test_every_port_of_a_bond_has_a_vector(side: str, dof: int, points: int) -> None:
+    bond = BondSide.model_validate({"name": "tip", "side": side, "dof": dof, "points": points, "frame": "world"})
+    position, velocity, force = bond_ports(bond)
+    assert VectorCodec(velocity).size == VectorCodec(force).size == bond.size == dof * points
+    assert VectorCodec(position).size == (7 if dof == 6 else dof * points)
     assert position.causality == velocity.causality == ("output" if side == "motion" else "input") != force.causality
+
+
+@pytest.mark.parametrize("dof", [1, 2, 6])
+def test_only_a_bond_of_positions_in_space_has_several_points(dof: int) -> None:
+    with pytest.raises(ValidationError, match="several points are for dof 3"):
+        BondSide.model_validate({"name": "tip", "side": "force", "dof": dof, "points": 2})
 
 
 def test_a_matrix_stands_in_the_layout_row_after_row():

@@ -1,8 +1,8 @@
 """The model as URDF.
 
 A link is called `<arm>_<link>_link`, its joint `<arm>_<link>`. The bars of the linkage mimic the pitch or the insertion. The two fingers mimic a
-joint `<arm>_jaw`, which moves a link without shape: its position is the angle between them. What can be moved about freely and
-the world's own shapes are left out, a URDF being one robot.
+joint `<arm>_jaw`, which moves a link without shape: its position is the angle between them; likewise the pads of a roller
+a joint `<arm>_roller`. What can be moved about freely and the world's own shapes are left out, a URDF being one robot.
 
 Links that stand for a frame alone have all but no mass: PyBullet takes one without inertia for 1 kg, and MuJoCo refuses it where it moves.
 """
@@ -18,6 +18,7 @@ import numpy as np
 from engines.mujoco.export.assets import FOLDER, file_of, numbers
 from engines.mujoco.model.names import FINGERS
 from robots import rotation
+from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from schemas.vectors import Vector
 
 __all__ = ["urdf"]
@@ -41,9 +42,13 @@ def urdf(spec: mujoco.MjSpec) -> Element:
         _add_link(robot, spec, model, body)
         _add_joint(robot, spec, model, body)
         for site in body.sites:
+            if "/contact/" in site.name:
+                continue  # where tissue is touched concerns no one who reads a URDF
             _add_frame(robot, model, body, site)
-    for arm in sorted({body.name.split("/")[0] for body in spec.bodies if body.name.endswith(FINGERS)}):
-        _add_jaw(robot, spec, arm)
+    for finger, leader in ((FINGERS[0], "jaw"), (PADS[0], ROLLER)):
+        for body in spec.bodies:
+            if body.name.endswith(f"/{finger}"):
+                _add_leader(robot, spec, body, body.name.replace(finger, leader))
     return robot
 
 
@@ -109,7 +114,7 @@ def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body:
     leader, ratio = _leader(spec, moving.name)
     if leader:
         SubElement(joint, "mimic", joint=_joint(leader), multiplier=repr(ratio), offset="0")
-    _add_limit(joint, spec, moving.range, leader or moving.name)
+    _add_limit(joint, spec, moving.range, leader or moving.name, ratio if joint.get("type") == "prismatic" and leader.endswith(ROLLER) else 1.0)
     SubElement(joint, "dynamics", damping=repr(float(moving.damping[0])), friction=repr(float(moving.frictionloss)))
 
 
@@ -118,25 +123,29 @@ def _leader(spec: mujoco.MjSpec, joint: str) -> tuple[str, float]:
     arm, _, link = joint.rpartition("/")
     if link in FINGERS:
         return f"{arm}/jaw", 0.5
+    if link in PADS:
+        return f"{arm}/{ROLLER}", float(spec.joint(joint).range[1] / spec.actuator(f"{arm}/{ROLLER}").ctrlrange[1])  # m for rad
     tie = spec.equality(joint)
     return (tie.name2, float(tie.data[1])) if tie else ("", 0.0)
 
 
-def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str) -> None:
+def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str, way: float = 1.0) -> None:
+    """State range, effort and velocity; `way` is that of a pad for an angle of its roller, m/rad."""
     servo = spec.actuator(f"{driven.rpartition('/')[0]}/{FINGERS[0]}" if driven.endswith("/jaw") else driven)
+    servo = servo or spec.actuator(driven.rpartition("_")[0])  # that of the finger, for a phalanx
     lower, upper = (repr(float(end)) for end in span)
-    SubElement(joint, "limit", lower=lower, upper=upper, effort=repr(float(servo.forcerange[1])), velocity=repr(float(servo.velrange[1])))
+    SubElement(joint, "limit", lower=lower, upper=upper, effort=repr(float(servo.forcerange[1]) / way), velocity=repr(float(servo.velrange[1]) * way))
 
 
-def _add_jaw(robot: Element, spec: mujoco.MjSpec, arm: str) -> None:
-    left = spec.body(f"{arm}/{FINGERS[0]}")
-    name = f"{arm}/jaw"
+def _add_leader(robot: Element, spec: mujoco.MjSpec, follower: mujoco.MjsBody, name: str) -> None:
+    """Add the joint that the joint of `follower` and its twin mimic."""
     _add_frame_link(robot, _link(name))
     joint = SubElement(robot, "joint", name=_joint(name), type="revolute")
-    SubElement(joint, "parent", link=_link(left.parent.name))
+    SubElement(joint, "parent", link=_link(follower.parent.name))
     SubElement(joint, "child", link=_link(name))
     SubElement(joint, "axis", xyz="0 0 1")
-    _add_limit(joint, spec, 2.0 * left.joints[0].range, name)
+    moving = follower.joints[0]
+    _add_limit(joint, spec, moving.range / _leader(spec, moving.name)[1], name)
 
 
 def _add_frame(robot: Element, model: mujoco.MjModel, body: mujoco.MjsBody, site: mujoco.MjsSite) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from engines.mujoco.looks import cart as cart_look
 from engines.mujoco.looks import ecm as ecm_look
-from engines.mujoco.looks import fingers, instruments
+from engines.mujoco.looks import fingers, instruments, musha, roller
 from engines.mujoco.looks import psm as psm_look
 from engines.mujoco.looks import setup_joints as setup_look
 from engines.mujoco.looks.part import Collisions, Looks, Part, Primitive
@@ -51,6 +51,10 @@ def instrument(tool: Instrument) -> Collisions:
     """Return what collides of an instrument in its PSM: housing, shaft, wrist, and fingers or electrode."""
     looks: Looks = instruments.parts(tool)
     frames = psm_arm.chain(tool).frames(np.zeros(3 + len(tool.joints)))
+    if tool.hand is not None:
+        housing, shaft = looks["insertion"], looks["roll"][0].vertices[:, 2]
+        tube = _upright("shaft", SHAFT_RADIUS, float(shaft.min()), float(shaft.max()))
+        return {"insertion": (_hull("housing", housing),), "roll": (tube,), **musha.capsules(tool.hand, frames[3])}
     pitch, yaw = frames[4][2, 3], frames[-2][2, 3]
     collisions: dict[str, tuple[Part | Primitive, ...]] = {
         "insertion": (_hull("housing", looks["insertion"]),),
@@ -62,6 +66,8 @@ def instrument(tool: Instrument) -> Collisions:
         form, pose = fingers.shape(tool, tool.jaw), instruments.finger_frame(tool)
         for name, side in zip(instruments.FINGERS, (1, -1), strict=True):
             collisions[name] = (fingers.grip(name, form, side, pose),)
+        if tool.roller is not None:
+            collisions |= {name: (box,) for name, box in roller.boxes(tool.roller, pose)}
     return collisions
 
 

@@ -37,6 +37,8 @@ class Shape:
     """An opening through the pad, as grasping forceps have."""
     curve: float = 0.0
     """How far the tip lies off the middle, along the yaw axis."""
+    recess: float = 0.0
+    """How far the finger stands back from the pad's plane, where a pad slides before it."""
 
 
 _DRIVER = Shape(0.0, 0.00235, 0.00170, 0.0024, 0.0014)
@@ -59,13 +61,14 @@ _KINDS = {
 def shape(tool: Instrument, jaw: Jaw) -> Shape:
     """Return the shape of the fingers of `tool`."""
     kind = next((kind for word, kind in _KINDS.items() if word in tool.name), _FORCEPS)
-    return replace(kind, length=jaw.length)
+    return replace(kind, length=jaw.length, recess=0.0 if tool.roller is None else tool.roller.size[2])
 
 
 def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
     """Return the meshes of the finger on the side +1 (left) or -1 (right), drawn in the frame `pose`, shape (4, 4)."""
     length, back = form.length, form.thickness
-    profile = [(_ROOT, 0.0), (length, 0.0), (length, 0.6 * form.tip_thickness), (length - 0.0006, form.tip_thickness), (0.45 * length, back), (_ROOT, back)]
+    front, tip = form.recess, form.tip_thickness
+    profile = [(_ROOT, front), (length, front), (length, 0.6 * tip), (length - 0.0006, tip), (0.45 * length, back), (_ROOT, back)]
     blade = plate("y", outline(profile), -0.01, 0.01) ^ plate("x", outline(_top_view(form, _ROOT / length), 0.0004), -0.01, 0.01)
     low, high = sorted((-side * _HUB_WIDTH, 0.0))
     hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
@@ -75,17 +78,17 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
         half, low_end, high_end = 0.45 * form.width, 0.50 * length, 0.86 * length
         hole = plate("x", outline([(-half, low_end), (half, low_end), (half, high_end), (-half, high_end)], 0.0004), -0.01, 0.01)
         blade, pad = blade - hole, pad - hole
-    finished = [(name, union(hub, arm, blade - pad), STEEL), (f"{name}_pad", pad, DARK)]
+    finished = [(name, union(hub, arm, blade - pad), STEEL)] + ([] if form.recess else [(f"{name}_pad", pad, DARK)])
     solids = [(label, solid if side > 0 else solid.mirror((1.0, 0.0, 0.0)), material) for label, solid, material in finished]
     return tuple(part(label, placed(solid, pose[:3, :3], pose[:3, 3]), material) for label, solid, material in solids)
 
 
 def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
-    """Return the box of a finger for contact: its pad's face is exactly the pad's plane."""
-    centre = np.array([side * form.tip_thickness / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0])
+    """Return the box of a finger for contact: its pad's face is exactly the pad's plane, or stands back from it."""
+    centre = np.array([side * (form.tip_thickness + form.recess) / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0])
     box = pose.copy()
     box[:3, 3] += pose[:3, :3] @ centre
-    return Primitive(name, "box", (form.tip_thickness / 2.0, (form.width + form.tip_width) / 2.0, (form.length - _ROOT) / 2.0), box)
+    return Primitive(name, "box", ((form.tip_thickness - form.recess) / 2.0, (form.width + form.tip_width) / 2.0, (form.length - _ROOT) / 2.0), box)
 
 
 def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -> list[tuple[float, float]]:

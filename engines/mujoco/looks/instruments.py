@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from engines.mujoco.looks import musha, roller
 from engines.mujoco.looks.fingers import finger, shape
 from engines.mujoco.looks.part import BLACK, BLUE, SLATE, STEEL, Looks, Part
 from engines.mujoco.looks.solids import block, outline, part, placed, plate, rod, union
@@ -29,6 +30,8 @@ _ELECTRODE_LENGTH = 0.0155
 def parts(tool: Instrument) -> Looks:
     """Return the meshes by body."""
     frames = psm.chain(tool).frames(np.zeros(3 + len(tool.joints)))[3:-1]
+    if tool.hand is not None:
+        return {"insertion": _housing(), **_with_shaft(musha.parts(tool.hand, frames[0]), frames[0])}
     looks = {"insertion": _housing(), "roll": _shaft(frames[1])}
     for joint, frame, below in zip(tool.joints[1:-1], frames[1:-1], frames[2:], strict=True):
         looks[joint.name] = (_wrist_link(joint.name, frame, below),)
@@ -37,9 +40,17 @@ def parts(tool: Instrument) -> Looks:
         pose = finger_frame(tool)
         for name, side in zip(FINGERS, (1, -1), strict=True):
             looks[name] = finger(name, shape(tool, tool.jaw), side, pose)
+        if tool.roller is not None:
+            looks |= roller.parts(tool.roller, pose)
     elif tool.number:
         looks[tool.joints[-1].name] += (_electrode(finger_frame(tool)),)
     return looks
+
+
+def _with_shaft(hand: Looks, end: Vector) -> Looks:
+    """Add a shaft down to `end`, shape (4, 4), to the look of a hand."""
+    tube = rod((0.0, 0.0, end[2, 3]), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=14)
+    return {**hand, "roll": (part("shaft", tube, BLACK), *hand["roll"])}
 
 
 def finger_frame(tool: Instrument) -> Vector:

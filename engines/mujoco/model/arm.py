@@ -5,14 +5,18 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from engines.mujoco.model import hand as hands
+from engines.mujoco.model import roller as rollers
 from engines.mujoco.model import transform
-from engines.mujoco.model.names import FINGERS
+from engines.mujoco.model.names import FINGERS, sphere_site
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
 from engines.mujoco.params import EcmParams, PsmParams
 from robots.dvrk import drives, inertia
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.contact_spheres import ContactSphere
 from robots.dvrk.drives import Drive
+from robots.dvrk.rolling_needle_driver import ROLLER
 from schemas.vectors import Vector
 
 __all__ = ["add"]
@@ -24,6 +28,7 @@ _TIE = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 _POSE = ((mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"), (mujoco.mjtSensor.mjSENS_FRAMEQUAT, "quaternion"))
 _TWIST = ((mujoco.mjtSensor.mjSENS_FRAMELINVEL, "linear"), (mujoco.mjtSensor.mjSENS_FRAMEANGVEL, "angular"))
 _JOINT = ((mujoco.mjtSensor.mjSENS_JOINTPOS, "position"), (mujoco.mjtSensor.mjSENS_JOINTVEL, "velocity"), (mujoco.mjtSensor.mjSENS_JOINTACTFRC, "effort"))
+_MOTOR = ((mujoco.mjtSensor.mjSENS_ACTUATORPOS, "position"), (mujoco.mjtSensor.mjSENS_ACTUATORVEL, "velocity"), (mujoco.mjtSensor.mjSENS_ACTUATORFRC, "effort"))
 
 
 def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose: Vector) -> Bodies:
@@ -41,6 +46,13 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     chain = params.chain
     bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip))
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
+    if isinstance(params, PsmParams):
+        if (hand := params.tool.hand) is not None:
+            _add_sensors_of(spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [motor.name for motor in hand.joints])
+            _add_joint_sensors(spec, name, [link.name for link in hand.links])
+        if params.tool.roller is not None:
+            _add_sensors_of(spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [ROLLER])
+        _add_spheres(spec, name, params.tool.spheres, bodies)
     return bodies
 
 
@@ -56,8 +68,16 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
 def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
     """Give each independent joint its drive, and an instrument's discs the friction that wrist and jaw share."""
     is_psm = isinstance(params, PsmParams)
-    for name, drive in (drives.psm(params.tool) if is_psm else drives.ECM).items():
-        _add_drive(spec, f"{arm}/{name}", drive)
+    driven = drives.psm(params.tool) if is_psm else drives.ECM
+    hand, roller = (params.tool.hand, params.tool.roller) if is_psm else (None, None)
+    for name, drive in driven.items():
+        if name != ROLLER and (hand is None or name not in (*hand.fingers, *hand.spreads)):
+            _add_drive(spec, f"{arm}/{name}", drive)
+    if hand is not None:
+        hands.add_drives(spec, arm, hand, driven)
+        hands.add_contacts(spec, arm, hand)
+    if roller is not None:
+        rollers.add_drive(spec, arm, roller, driven[ROLLER])
     for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
         tendon = spec.add_tendon(name=f"{arm}/disc_{i}", damping=[disc.viscous_friction, 0.0, 0.0], frictionloss=disc.coulomb_friction)
         for name, share in disc.shares.items():
@@ -98,6 +118,16 @@ def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
         body.fullinertia = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
 
 
+def _add_spheres(spec: mujoco.MjSpec, arm: str, spheres: tuple[ContactSphere, ...], bodies: Bodies) -> None:
+    """Mark the contact spheres by sites, and let MuJoCo lay out their positions and velocities in the world."""
+    for sphere in spheres:
+        bodies[sphere.link][0].add_site(name=sphere_site(arm, sphere.name), pos=sphere.position, size=[sphere.radius, 0.0, 0.0], group=_HIDDEN)
+    for kind, what in ((mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"), (mujoco.mjtSensor.mjSENS_FRAMELINVEL, "velocity")):
+        for sphere in spheres:
+            site = sphere_site(arm, sphere.name)
+            spec.add_sensor(name=f"{site}/{what}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
+
+
 def _add_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str], has_jaw: bool) -> None:
     """Let MuJoCo lay out what the ports say, in the order that `first_sensor` tells."""
     _add_joint_sensors(spec, arm, joints)
@@ -111,6 +141,11 @@ def _add_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str], has_jaw: bool
 
 
 def _add_joint_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str]) -> None:
-    for kind, what in _JOINT:
-        for joint in joints:
-            spec.add_sensor(name=f"{arm}/{what}/{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=f"{arm}/{joint}")
+    _add_sensors_of(spec, arm, _JOINT, mujoco.mjtObj.mjOBJ_JOINT, joints)
+
+
+def _add_sensors_of(spec: mujoco.MjSpec, arm: str, kinds: tuple[tuple[mujoco.mjtSensor, str], ...], what: mujoco.mjtObj, names: list[str]) -> None:
+    """Let MuJoCo lay out positions, then velocities, then efforts of joints or motors."""
+    for kind, label in kinds:
+        for name in names:
+            spec.add_sensor(name=f"{arm}/{label}/{name}", type=kind, objtype=what, objname=f"{arm}/{name}")

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-__all__ = ["FINGERS", "finger", "first_sensor", "probe_body"]
+__all__ = ["CONTACT", "FINGERS", "finger", "first_sensor", "probe_body", "sphere_site"]
 
 FINGERS = ("jaw_left", "jaw_right")
 """Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right one towards -y."""
+
+CONTACT = "contact"
+"""Of an arm: the bond at its contact spheres, and what the names of their sites begin with."""
 
 
 def probe_body(arm: str) -> str:
     """Return the name of the body whose origin and centre of mass is the centre of a palpation probe."""
     return f"{arm}/wrist_yaw"
+
+
+def sphere_site(arm: str, sphere: str) -> str:
+    """Return the name of the site that is the centre of the contact sphere of this name."""
+    return f"{arm}/{CONTACT}/{sphere}"
 
 
 def finger(arm: str, side: str) -> str:
@@ -22,7 +30,8 @@ def first_sensor(arm: str) -> str:
     """Return the name of the first of the arm's sensors.
 
     They lie in this order: positions, velocities and efforts of the n joints; tip in the base frame (position 3, quaternion w, x,
-    y, z); tip in the world (the same, then linear and angular velocity); and, where there is a jaw, positions, velocities and
-    efforts of the two fingers, left before right.
+    y, z); tip in the world (the same, then linear and angular velocity); where there is a jaw, positions, velocities and
+    efforts of the two fingers, left before right, and then of a roller; or of the fingers of a hand and then of its phalanges; positions of all contact
+    spheres in the world, then their velocities.
     """
     return f"{arm}/position/yaw"

@@ -8,6 +8,7 @@ import numpy as np
 from engines.mujoco import objects
 from engines.mujoco.model import arm, setup_joints, shapes
 from engines.mujoco.params import ArmParams, SceneParams
+from engines.mujoco.ports import has_hand
 from robots import rotation
 from schemas.vectors import Vector
 
@@ -30,7 +31,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result.modelname = scene.model
     result.compiler.degree = False
     result.option.timestep = _TIMESTEP
-    _set_options(result.option, grasping=bool(scene.objects))
+    _set_options(result.option, grasping=bool(scene.objects) or any(has_hand(arm) for arm in scene.arms.values()))
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
@@ -44,7 +45,10 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
 
 
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
-    """Choose how the model is stepped; where there is something to hold, so that friction holds it (docs/decisions/0012)."""
+    """Choose how the model is stepped; where there are things to hold or a hand, so that friction holds them and light fingers rest at their stops.
+
+    See docs/decisions/0012 and 0018.
+    """
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     if grasping:
         option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE

@@ -6,6 +6,7 @@ fingers hang on it; their joint axis is z of their own frame, as everywhere.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,7 +14,9 @@ import numpy as np
 
 from engines.mujoco.model.names import FINGERS
 from engines.mujoco.params import EcmParams, PsmParams
+from robots.dvrk.instruments import Instrument
 from robots.dvrk.linkage import LINKAGES
+from robots.dvrk.rolling_needle_driver import PADS
 from schemas.vectors import Vector
 
 __all__ = ["BASE", "Follow", "Link", "links"]
@@ -45,7 +48,10 @@ class Link:
 
 
 def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
-    """Return all moving links of `arm`, parents before children: its joints, then the linkage, then the fingers."""
+    """Return all moving links of `arm`, parents before children.
+
+    They are its joints, then the linkage, then the fingers of a jaw with the pads of a roller, or the phalanges of a hand.
+    """
     chain = params.chain
     poses = chain.frames(np.zeros(len(chain.joints)))
     parents = (BASE, *(joint.name for joint in chain.joints[:-1]))
@@ -63,7 +69,23 @@ def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
         wrist = tree[chain.joints[-1].name]
         for name, turn in zip(FINGERS, (np.eye(4), _HALF_TURN), strict=True):
             tree[name] = Link(name, wrist.name, "revolute", wrist.pose @ turn, jaw.lower / 2, jaw.upper / 2)
+        tree |= {pad.name: pad for pad in _pads(params.tool, wrist.pose, poses[-1][:3, 2])}
+    if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+        shaft = tree[chain.joints[-1].name].pose
+        for bone in hand.links:
+            tree[bone.name] = Link(bone.name, bone.parent, "revolute", shaft @ bone.pose, bone.phalanx.lower, bone.phalanx.upper)
     return tuple(tree.values())
+
+
+def _pads(tool: Instrument, wrist: Vector, ahead: Vector) -> Iterator[Link]:
+    """Yield the pads of a roller, each in its finger: the left one slides ahead, the right one back."""
+    if (roller := tool.roller) is None:
+        return
+    for name, finger, way in zip(PADS, FINGERS, (ahead, -ahead), strict=True):
+        pose = wrist.copy()
+        pose[:3, :3] = np.column_stack([wrist[:3, 2], np.cross(way, wrist[:3, 2]), way])
+        reach = roller.wire_radius * roller.joint.upper
+        yield Link(name, finger, "prismatic", pose, -reach, reach)
 
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])

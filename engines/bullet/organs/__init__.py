@@ -1,0 +1,1 @@
+"""The shapes of organs and the materials they are made of."""

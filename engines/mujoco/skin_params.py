@@ -1,0 +1,40 @@
+"""What a scenario may say about how a soft body looks."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hub.participant import Params
+
+__all__ = ["Rgb", "SkinParams"]
+
+Rgb = tuple[Annotated[float, Field(ge=0.0, le=1.0)], Annotated[float, Field(ge=0.0, le=1.0)], Annotated[float, Field(ge=0.0, le=1.0)]]
+"""Red, green and blue, each from 0 to 1."""
+
+_COLOURS: dict[str, Rgb] = {
+    "tissue": (0.80, 0.38, 0.33),
+    "adrenal": (0.83, 0.60, 0.28),
+    "colon": (0.86, 0.55, 0.48),
+    "fat": (0.90, 0.76, 0.42),
+    "kidney": (0.60, 0.24, 0.20),
+    "liver": (0.52, 0.20, 0.15),
+}
+"""Chosen by eye for a white lamp at the camera, after what anatomy says of the living organs: liver and kidney red-brown, the liver
+darker; the colon a greyish pink; the adrenal gland the yellow of its cortex; `tissue`, which is all else, the pink of muscle."""
+
+
+class SkinParams(Params):
+    """The look of one soft body."""
+
+    colour: Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"] | Rgb | None = Field(
+        default=None,
+        description="name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue with whose name the body's ends, if there is one",
+    )
+
+    def rgb(self, name: str) -> Rgb:
+        """Return red, green and blue, each from 0 to 1, of the body `name`."""
+        if isinstance(self.colour, tuple):
+            return self.colour
+        return _COLOURS[self.colour or next(filter(name.endswith, _COLOURS), "tissue")]
