@@ -53,7 +53,16 @@ CASES = [Case(*numbers) for numbers in product((0.01, 0.02, 0.05, 0.15), (500.0,
 
 def sides(case: Case) -> tuple[BondSide, BondSide]:
     """Return motion side and force side as engines would declare them."""
-    force = BondSide(name="tip", side="force", dof=1, stiffness=case.stiffness, damping=case.damping, proxy_mass=case.proxy, contact_stiffness=case.contact)
+    force = BondSide(
+        name="tip",
+        side="force",
+        dof=1,
+        stiffness=case.stiffness,
+        damping=case.damping,
+        proxy_mass=case.proxy,
+        contact_stiffness=case.contact,
+        proxy_step=SUB_STEP_S,
+    )
     return BondSide(name="tip", side="motion", dof=1, effective_mass=case.tool), force
 
 

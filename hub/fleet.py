@@ -36,7 +36,8 @@ class Fleet:
         command = [sys.executable, "-P", "-m", "hub.host_process", "--connect", endpoint, "--session", session, "--host", host]
         environment = dict(os.environ)
         pin_blas(environment)
-        self._processes[host] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env=environment, start_new_session=True)
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env=environment, start_new_session=True)
+        self._processes = {**self._processes, host: process}  # a new one: the watchdog's thread may be looking through the old one
 
     def dead(self) -> dict[str, str]:
         """Return how each host ended that is no longer there."""

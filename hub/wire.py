@@ -27,8 +27,8 @@ __all__ = ["Drops", "PortCodec", "PortPublisher", "PortReceiver", "Tag", "Wire",
 
 log = logging.getLogger(__name__)
 
-LEASE_MS = 1000
-"""A peer that is silent for this long is gone; Zenoh's own default of 10 s would keep hosts of a dead hub alive."""
+LEASE_MS = 10_000
+"""A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
 
 _TAG = struct.Struct("<QIqqHH")
 

@@ -9,13 +9,13 @@ from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots.dvrk import ecm, psm
-from robots.dvrk.instruments import instrument
-from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
-from robots.serial_chain import Joint, SerialChain
-from schemas.quantity import Angle, Duration, Length
+from robots.serial_chain import Joint
+from schemas.quantity import Duration
 
-__all__ = ["ArmParams", "Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJoints"]
+__all__ = ["Arms", "EcmParams", "Gripper", "MotionParams", "PsmParams", "SetupJoints"]
 
 
 class Gripper(NamedTuple):
@@ -29,35 +29,13 @@ class Gripper(NamedTuple):
     """Positions at time 0, rad."""
 
 
-class ArmParams(Params):
-    """One arm: where it stands if it hangs on no setup joint."""
-
-    position: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="of the remote centre of motion in the world")
-    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the arm's base frame in the world: quaternion x, y, z, w")
-
-
-class PsmParams(ArmParams):
+class PsmParams(MountedPsm):
     """A patient-side manipulator: what it holds, and where it is until it is measured."""
-
-    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
-    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
-    jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
-
-    @model_validator(mode="after")
-    def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, instrument(self.instrument), self.jaw, self.hand)
-        return self
-
-    @property
-    def chain(self) -> SerialChain:
-        """The arm's kinematics, from `<arm>_base` to the tip."""
-        return psm.chain(instrument(self.instrument))
 
     @property
     def gripper(self) -> Gripper | None:
         """What the instrument grasps with, if anything."""
-        tool = instrument(self.instrument)
+        tool = self.tool
         if tool.jaw is not None:
             return Gripper("jaw", tool.jaw_joints, (self.jaw, 0.0)[: len(tool.jaw_joints)])
         return None if tool.hand is None else Gripper("hand", tool.hand.joints, self.hand)
@@ -65,27 +43,11 @@ class PsmParams(ArmParams):
     @property
     def home(self) -> tuple[float, ...]:
         """Where the arm goes to be homed."""
-        return psm.home(instrument(self.instrument))
+        return psm.home(self.tool)
 
 
-class EcmParams(ArmParams):
+class EcmParams(MountedEcm):
     """The endoscope camera manipulator: which endoscope it holds, and where it is until it is measured."""
-
-    endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    tip_frame: ecm.TipFrame = Field(
-        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
-    )
-    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
-
-    @model_validator(mode="after")
-    def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start)
-        return self
-
-    @property
-    def chain(self) -> SerialChain:
-        """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope, self.tip_frame)
 
     @property
     def gripper(self) -> Gripper | None:

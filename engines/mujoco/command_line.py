@@ -16,9 +16,10 @@ from pydantic import ValidationError
 from typer.core import TyperCommand
 
 from engines.mujoco.opengl import import_mujoco
-from engines.mujoco.params import SceneArm, SceneParams
+from engines.mujoco.params import SceneParams
 from robots import command_line as kinematics
 from robots.dvrk.arms import ARMS, DEFAULT_INSTRUMENT
+from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MissingExtraError, MotionError, did_you_mean
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ __all__ = ["app"]
 
 app = typer.Typer(help="Numbers and files of the robot's model.", no_args_is_help=True)
 
-_CART: tuple[SceneArm, ...] = get_args(SceneArm)
+_CART: tuple[CartArm, ...] = get_args(CartArm)
 
 
 class _NumbersInARow(TyperCommand):
@@ -60,7 +61,7 @@ def _checked(text: str | None) -> str | None:
 
 
 Arm = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(ARMS)}.", autocompletion=lambda: list(ARMS))]
-CartArm = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(_CART)}.", autocompletion=lambda: list(_CART))]
+ArmArgument = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(_CART)}.", autocompletion=lambda: list(_CART))]
 Tool = Annotated[
     str | None,
     typer.Option("--instrument", metavar="N", help="Of a PSM: its instrument, by name or number (400006 unless given); of the ECM: straight, up or down."),
@@ -81,7 +82,7 @@ def fk(arm: Arm, *, instrument: Tool = None, q: Positions, as_json: Json = False
 
 
 @app.command(cls=_NumbersInARow)
-def dynamics(arm: CartArm, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False) -> None:
+def dynamics(arm: ArmArgument, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False) -> None:
     """Print an arm's joint-space inertia, gravity, friction and elasticity, its base upright; SI units."""
     _need_mujoco("dynamics")
     name, positions = _cart_arm(arm), _numbers(q) or []
@@ -140,7 +141,7 @@ def export(
     form = form or known or "mjcf"
     if known is None:
         path = path / {"mjcf": "dvrk.xml", "urdf": "dvrk.urdf"}[form]
-    named: list[SceneArm] = [_cart_arm(arm) for arm in arms.replace(",", " ").split()]
+    named: list[CartArm] = [_cart_arm(arm) for arm in arms.replace(",", " ").split()]
     if not named:
         raise typer.BadParameter(f"name at least one of {', '.join(_CART)}", param_hint="--arms")
     scene = _scene(named, instrument or [], mounting)
@@ -151,7 +152,7 @@ def export(
     typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")
 
 
-def _scene(arms: list[SceneArm], instruments: list[str], mounting: str) -> SceneParams:
+def _scene(arms: list[CartArm], instruments: list[str], mounting: str) -> SceneParams:
     tools = {arm: {} if arm == "ECM" else {"instrument": DEFAULT_INSTRUMENT} for arm in arms}
     for text in instruments:
         arm, _, tool = text.partition("=")
@@ -165,7 +166,7 @@ def _scene(arms: list[SceneArm], instruments: list[str], mounting: str) -> Scene
         return SceneParams.model_validate({"arms": tools, "mounting": mounting})
 
 
-def _cart_arm(arm: str) -> SceneArm:
+def _cart_arm(arm: str) -> CartArm:
     if arm not in _CART:
         raise typer.BadParameter(f"no arm '{arm}' in the model.{did_you_mean(arm, _CART)}")
     return arm

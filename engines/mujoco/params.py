@@ -6,7 +6,6 @@ Lengths in m, angles in rad, quaternions (x, y, z, w), poses in the world unless
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, model_validator, with_config
@@ -14,69 +13,23 @@ from typing_extensions import TypedDict  # pydantic's wish before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
-from robots.dvrk import ecm, psm
-from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, SetupPositions, UnitQuaternion, check_start, home, settable
-from robots.serial_chain import SerialChain
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.parameters import SetupPositions, settable
+from robots.dvrk.setup_joints import CartArm
 from schemas.keys import valid_name
-from schemas.quantity import Angle, Duration, Length
+from schemas.quantity import Duration, Length
 
-__all__ = ["ArmParams", "EcmParams", "MujocoParams", "PsmParams", "SceneArm", "SceneParams"]
-
-SceneArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
-"""The arms of the patient's cart."""
+__all__ = ["EcmParams", "MujocoParams", "PsmParams", "SceneParams"]
 
 
-class ArmParams(Params):
-    """One arm: where it stands if it hangs on no setup joint."""
-
-    position: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="of the remote centre of motion in the world")
-    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the arm's base frame in the world: quaternion x, y, z, w")
-
-
-class PsmParams(ArmParams):
+class PsmParams(MountedPsm):
     """A patient-side manipulator: what it holds and where it starts."""
 
-    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
     probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
-    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
-    jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
-
-    @cached_property
-    def tool(self) -> Instrument:
-        """The instrument's numbers."""
-        return instrument(self.instrument)
-
-    @cached_property
-    def chain(self) -> SerialChain:
-        """The arm's kinematics, from `<arm>_base` to the tip."""
-        return psm.chain(self.tool)
-
-    @model_validator(mode="after")
-    def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.tool, self.jaw, self.hand)
-        return self
 
 
-class EcmParams(ArmParams):
-    """The endoscope camera manipulator: which endoscope it holds and where it starts."""
-
-    endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    tip_frame: ecm.TipFrame = Field(
-        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
-    )
-    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
-
-    @model_validator(mode="after")
-    def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start)
-        return self
-
-    @cached_property
-    def chain(self) -> SerialChain:
-        """The arm's kinematics, from `ECM_base` to the camera frame."""
-        return ecm.chain(self.endoscope, self.tip_frame)
+EcmParams = MountedEcm
+"""The endoscope camera manipulator."""
 
 
 @with_config(ConfigDict(extra="forbid"))
@@ -111,12 +64,12 @@ class SceneParams(Params):
     """What stands where: arms of a da Vinci Research Kit, a table and things to hold."""
 
     model: Literal["dvrk"] = "dvrk"
-    arms: Annotated[dict[SceneArm, PsmParams | EcmParams], _validated_as(_Arms), Field(min_length=1)]
+    arms: Annotated[dict[CartArm, PsmParams | EcmParams], _validated_as(_Arms), Field(min_length=1)]
     mounting: Literal["free", "cart"] = Field(
         default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
     )
-    setup_joints: Annotated[dict[SceneArm, SetupPositions], _validated_as(_SetupJoints)] = Field(
-        default_factory=dict[SceneArm, SetupPositions],
+    setup_joints: Annotated[dict[CartArm, SetupPositions], _validated_as(_SetupJoints)] = Field(
+        default_factory=dict[CartArm, SetupPositions],
         description="where the braked setup joints are set; an arm that is not named has the simulated positions",
     )
     table: TableParams | None = None

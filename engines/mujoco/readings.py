@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from engines.mujoco.model import FINGERS, first_sensor
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import EcmParams, PsmParams, SceneArm
+from engines.mujoco.params import EcmParams, PsmParams
 from engines.mujoco.ports import has_jaw
 from engines.mujoco.servos import Servos
 from robots.dvrk.rolling_needle_driver import PADS
+from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
 __all__ = ["Readings", "place"]
@@ -27,7 +28,7 @@ _ROLLING_JAW = np.zeros((6, 9))
 _ROLLING_JAW[::2, :6], _ROLLING_JAW[1::2, 6:] = _JAW, np.eye(3)
 
 
-def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams]) -> None:
+def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams]) -> None:
     """Put the joints of `arms`, with linkages and fingers, where they start."""
     for arm, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
@@ -47,7 +48,7 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, Ps
 class Readings:
     """Views of the model's sensors by output port; what is no view is copied when it is due."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams], servos: Servos) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams], servos: Servos) -> None:
         """Report on `arms`."""
         self._sensors, self._qpos = data.sensordata, np.empty(model.nq)
         self._positions = data.qpos

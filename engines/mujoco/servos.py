@@ -14,9 +14,10 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import FINGERS
-from engines.mujoco.params import EcmParams, PsmParams, SceneArm
+from engines.mujoco.params import EcmParams, PsmParams
 from hub.inputs import Inputs
 from robots.dvrk.rolling_needle_driver import PADS, ROLLER
+from robots.dvrk.setup_joints import CartArm
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
@@ -48,7 +49,7 @@ class _Group:
 class Servos:
     """Takes commands and modes, and keeps the setpoints."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[SceneArm, PsmParams | EcmParams], period: float) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams], period: float) -> None:
         """Drive `arms`, which are stepped every `period` seconds, from where they start."""
         self._model, self._data = model, data
         self._groups: list[_Group] = []

@@ -12,7 +12,7 @@ import pytest
 from hub.endpoint import free_endpoint
 from hub.recording import Recording
 from hub.recover import recover
-from tests.hub.processes import processes
+from tests.hub.processes import hosts, processes
 
 ENDLESS = """\
 name: endless
@@ -52,8 +52,13 @@ class Hub:
         self.errors = (directory / "stderr").open("w+")
         self.process = subprocess.Popen([sys.executable, "-P", "-m", "hub.command_line", *run], cwd=directory, stderr=self.errors, **options)
 
+    @property
+    def recorded(self):
+        """Bytes of recording."""
+        return sum(file.stat().st_size for file in self.recording.glob("*.mcap"))
+
     def wait_until_it_records(self):
-        wait_until(lambda: any(file.stat().st_size > 50_000 for file in self.recording.glob("*.mcap")))
+        wait_until(lambda: self.recorded > 50_000)
 
     def end(self):
         """Wait for the end; return exit code and stderr."""
@@ -108,6 +113,19 @@ def test_a_run_in_the_background_of_a_script_ends_by_sigterm(hub):
     code, errors = run.end()
     assert (code, processes(run.endpoint)) == (1, [])
     assert "killing it" not in errors
+
+
+def test_a_host_that_stands_still_for_seconds_is_waited_for(hub):
+    run = hub(ENDLESS)
+    run.wait_until_it_records()
+    (host,) = hosts(run.endpoint)
+    os.kill(host, signal.SIGSTOP)
+    sleep(2.0)
+    recorded = run.recorded
+    os.kill(host, signal.SIGCONT)
+    wait_until(lambda: run.recorded > recorded + 50_000)
+    os.kill(run.process.pid, signal.SIGINT)
+    assert "interrupted at step" in run.end()[1]
 
 
 def test_the_hosts_of_a_killed_hub_end_by_themselves_and_its_recording_is_recovered(hub, tmp_path):

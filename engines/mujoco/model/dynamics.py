@@ -14,8 +14,9 @@ import numpy as np
 
 from engines.mujoco.model.scene import build
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import PsmParams, SceneArm, SceneParams
+from engines.mujoco.params import PsmParams, SceneParams
 from robots.dvrk import drives
+from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
 __all__ = ["JointDynamics", "dynamics"]
@@ -42,7 +43,7 @@ class JointDynamics:
     """Effort that holds the arm against its springs, shape (n,)."""
 
 
-def dynamics(arm: SceneArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
+def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
     """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m) and velocities `dq` (rad/s, m/s).
 
     Args:

@@ -7,9 +7,10 @@ import numpy as np
 
 from engines.mujoco import objects
 from engines.mujoco.model import arm, setup_joints, shapes
-from engines.mujoco.params import ArmParams, SceneParams
+from engines.mujoco.params import SceneParams
 from engines.mujoco.ports import has_hand
 from robots import rotation
+from robots.dvrk.mounted import MountedArm
 from schemas.vectors import Vector
 
 __all__ = ["build", "spec"]
@@ -56,7 +57,7 @@ def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
         option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # dearer than what they save here
 
 
-def _free_pose(params: ArmParams) -> Vector:
+def _free_pose(params: MountedArm) -> Vector:
     pose = np.eye(4)
     pose[:3, :3] = rotation.matrix(np.array(params.orientation))
     pose[:3, 3] = params.position

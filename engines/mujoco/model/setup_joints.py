@@ -6,9 +6,10 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import shapes, transform
-from engines.mujoco.params import SceneArm, SceneParams
+from engines.mujoco.params import SceneParams
 from robots.dvrk import setup_joints
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
 __all__ = ["CART", "add"]
@@ -17,11 +18,11 @@ CART = "cart"
 """The body of the cart; its frame, which is the world's, is the one in which the setup joints are told."""
 
 
-def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[SceneArm, Vector]:
+def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
     """Add the cart and the setup joint of every arm in `scene`; return the poses of the arms' base frames in the world, shape (4, 4)."""
     cart = spec.worldbody.add_body(name=CART)
     shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=scene.looks)
-    mounts: dict[SceneArm, Vector] = {}
+    mounts: dict[CartArm, Vector] = {}
     for arm in scene.arms:
         chain = setup_joints.chain(arm)
         *poses, mounts[arm] = chain.frames(np.array(scene.setup_joints.get(arm, setup_joints.SIMULATED[arm])))

@@ -16,9 +16,10 @@ import numpy as np
 
 from engines.mujoco import looks
 from engines.mujoco.model import transform
-from engines.mujoco.params import EcmParams, PsmParams, SceneArm
+from engines.mujoco.params import EcmParams, PsmParams
 from engines.mujoco.ports import has_probe
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
 __all__ = ["Bodies", "add", "add_arm"]
@@ -30,13 +31,13 @@ _SEEN, _COLLIDING = 1, 3
 """Groups of geoms; MuJoCo's viewer hides the latter unless asked."""
 _THINGS = 1
 """The collision bit of table and objects, which is MuJoCo's default."""
-_BIT: Mapping[str, int] = {arm: 2 << i for i, arm in enumerate(get_args(SceneArm))}
+_BIT: Mapping[str, int] = {arm: 2 << i for i, arm in enumerate(get_args(CartArm))}
 """The collision bit of what each arm holds."""
 _KINDS = {"box": mujoco.mjtGeom.mjGEOM_BOX, "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE}
 _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEEN}
 
 
-def add_arm(spec: mujoco.MjSpec, arm: SceneArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool) -> None:
+def add_arm(spec: mujoco.MjSpec, arm: CartArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool) -> None:
     """Give an arm and what it holds its collision shapes and, if it is to be `seen`, its looks."""
     whats = ("ecm",) if isinstance(params, EcmParams) else ("psm", f"instrument/{params.tool.name}")
     for what in whats:

@@ -1,0 +1,69 @@
+"""The arms of a patient cart as a scenario states them to any participant: where each stands, what it holds, where it starts. SI units, radians."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from robots.dvrk import ecm, psm
+from robots.dvrk.instruments import Instrument, instrument
+from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, UnitQuaternion, check_start, home
+from robots.serial_chain import SerialChain
+from schemas.quantity import Angle, Length
+
+__all__ = ["MountedArm", "MountedEcm", "MountedPsm"]
+
+
+class MountedArm(BaseModel):
+    """One arm: where it stands if it hangs on no setup joint."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    position: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="of the remote centre of motion in the world")
+    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the arm's base frame in the world: quaternion x, y, z, w")
+
+
+class MountedPsm(MountedArm):
+    """A patient-side manipulator: what it holds and where it starts."""
+
+    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
+    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
+    jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
+    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
+
+    @cached_property
+    def tool(self) -> Instrument:
+        """The instrument's numbers."""
+        return instrument(self.instrument)
+
+    @cached_property
+    def chain(self) -> SerialChain:
+        """The arm's kinematics, from `<arm>_base` to the tip."""
+        return psm.chain(self.tool)
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(self.chain, self.start, self.tool, self.jaw, self.hand)
+        return self
+
+
+class MountedEcm(MountedArm):
+    """The endoscope camera manipulator: which endoscope it holds and where it starts."""
+
+    endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    )
+    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+
+    @cached_property
+    def chain(self) -> SerialChain:
+        """The arm's kinematics, from `ECM_base` to the camera frame."""
+        return ecm.chain(self.endoscope, self.tip_frame)
+
+    @model_validator(mode="after")
+    def _starts_in_range(self) -> Self:
+        check_start(self.chain, self.start)
+        return self
