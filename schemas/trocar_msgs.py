@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int64, Message, String, UInt32, UInt32Array, UInt64, UInt64Array
-from schemas.ros import Header
+from schemas.ros import Header, Vector3
 
-__all__ = ["Ack", "CouplingEnergy", "Grant", "InletSample", "ParticipantStatus", "SessionStatus", "SoftBodyState", "TissueGrasp"]
+__all__ = [
+    "Ack",
+    "ContactModel",
+    "ContactPlane",
+    "CouplingEnergy",
+    "Grant",
+    "InletSample",
+    "ParticipantStatus",
+    "SessionStatus",
+    "SoftBodyState",
+    "TissueGrasp",
+]
 
 
 class InletSample(Message):
@@ -63,6 +74,36 @@ class CouplingEnergy(Message):
     force_work_j: Float64
     residual_j: Float64
     """`force_work_j - motion_work_j`: energy that the coupling created (positive) or lost."""
+
+
+class ContactPlane(Message):
+    """A surface near a hand, as flat: it pushes what is below it back along its normal.
+
+    With depth = distance + velocity age - normal . x of a hand at x, the force is normal max(0, stiffness depth - damping v_n), and friction across it.
+    """
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ContactPlane"
+    normal: Vector3
+    """Unit vector out of the body, towards where the hand is free."""
+    distance: Float64
+    """Of the surface from the frame's origin along the normal, m, at the stamp of the model."""
+    velocity: Float64 = 0.0
+    """Of the surface along its normal, m/s."""
+    stiffness: Annotated[Float64, Field(ge=0.0)]
+    """N/m."""
+    damping: Annotated[Float64, Field(ge=0.0)] = 0.0
+    """N s/m."""
+    friction: Annotated[Float64, Field(ge=0.0)] = 0.0
+    """Coefficient."""
+
+
+class ContactModel(Message):
+    """All that a haptic device needs to render contact until the next one comes; in `header.frame_id`, the device's base frame."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ContactModel"
+    header: Header
+    planes: Annotated[list[ContactPlane], Field(max_length=4)] = Field(default_factory=list[ContactPlane])
+    """None: the hand is free."""
 
 
 class SoftBodyState(Message):
