@@ -91,6 +91,8 @@ def _states(arm: str, names: tuple[str, ...], reference: str, period_ns: int) ->
         shape = (6, len(names))
         meaning = f"twist of the tip in {frame}, linear part first, from joint velocities" + (", of the point at its origin" if kind == "spatial" else "")
         yield Port(name=f"{arm}/{kind}/jacobian", causality="output", size=6 * len(names), shape=shape, period_ns=period_ns, description=meaning)
+    meaning = "of the arm's base frame: where the setup joints hold it"
+    yield Port(name=f"SUJ/{arm}/measured_cp", causality="output", type=_POSE, frame=reference, period_ns=period_ns, description=meaning)
     yield Port(name=f"{arm}/trajectory_j/ratio", causality="output", type="std_msgs/msg/Float64", period_ns=period_ns)
 
 

@@ -38,7 +38,8 @@ class Telemetry:
         sizes |= {"body/jacobian": 6 * n, "spatial/jacobian": 6 * n, "trajectory_j/ratio": 1}
         sizes |= {f"{prefix}{kind}_{part}": size for prefix in ("", "local/") for kind in ("measured", "setpoint") for part, size in (("cp", 7), ("cv", 6))}
         self._values = {name: np.zeros(size) for name, size in sizes.items()}
-        self.outputs = {f"{arm}/{name}": value for name, value in self._values.items()}
+        self._base = np.zeros(7)
+        self.outputs = {f"{arm}/{name}": value for name, value in self._values.items()} | {f"SUJ/{arm}/measured_cp": self._base}
 
     def update(self, measured: Vector, setpoint: Vector, ratio: float, base: Vector) -> None:
         """Bring all outputs up to date.
@@ -51,6 +52,7 @@ class Telemetry:
         """
         values, n = self._values, len(self._chain.joints)
         values["measured_js"][:], values["setpoint_js"][:], values["trajectory_j/ratio"][:] = measured, setpoint, ratio
+        self._base[:] = pose(base)
         self._tell("setpoint", setpoint, base)
         tip, jacobian = self._tell("measured", measured, base)
         to_tip = tip[:3, :3].T

@@ -363,9 +363,12 @@ def test_the_tip_is_seen_from_the_camera_through_the_setup_joints(arm):
     assert np.allclose(rotation.matrix(measured[3:]), expected["R"], atol=1e-8)
     local = arms.chain(arm, "400006" if arm != "ECM" else None).forward(np.array([0, 0, 0.12, 0, 0, 0])[: 4 if arm == "ECM" else 6])
     assert np.allclose(rig.outputs[f"{arm}/local/measured_cp"][:3], local[:3, 3], atol=1e-12)
+    base = rig.outputs[f"SUJ/{arm}/measured_cp"]
+    assert np.allclose(base[:3] + rotation.matrix(base[3:]) @ local[:3, 3], measured[:3], atol=1e-12)
     frames = {port.name: port.frame for port in rig.motion.ports}
     assert frames[f"{arm}/measured_cp"] == ("Cart" if arm == "ECM" else "ECM")
     assert frames[f"{arm}/local/measured_cp"] == f"{arm}_base"
+    assert frames[f"SUJ/{arm}/measured_cp"] == frames[f"{arm}/measured_cp"]
 
 
 def test_with_the_frame_of_the_view_the_tip_is_seen_a_quarter_turned_about_the_line_of_sight():
