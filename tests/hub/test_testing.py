@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.teleoperation import Teleoperation, TeleoperationParams
+from controllers.teleoperation.controller import Teleoperation, TeleoperationParams
 from devices.scripted.device import ScriptedDevice, ScriptedParams
 from engines.bullet.engine import BulletEngine, BulletParams
 from engines.fmu.engine import FmuEngine, FmuParams

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.teleoperation import Teleoperation, TeleoperationParams
+from controllers.teleoperation.controller import Teleoperation, TeleoperationParams
 from hub.inputs import Inputs
 from hub.participant import Setup
 from robots import rotation
