@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, sqrt
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from schemas.trocar_msgs import ContactModel
+from devices.vendor_axes import Vector3
 
-__all__ = ["ZERO", "Plane", "Vector3", "checked", "planes_of"]
+if TYPE_CHECKING:  # a servo process has no use for pydantic
+    from schemas.trocar_msgs import ContactModel
 
-Vector3 = tuple[float, float, float]
-"""Three floats in the device's base frame."""
+__all__ = ["ZERO", "Plane", "checked", "planes_of"]
 
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from devices.haptics.contact import Plane, Vector3, checked
+from devices.haptics.contact import Plane, checked
 from devices.haptics.limits import Limits
 from devices.haptics.passivity import Passivity
 from devices.haptics.rendering import Renderer
 from devices.haptics.safety import Condition, SafetyChain
+from devices.vendor_axes import Vector3
 
 __all__ = ["HapticLoop"]
 

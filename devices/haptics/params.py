@@ -24,9 +24,7 @@ class SafetyParams(Params):
     damping: Annotated[Damping, Field(ge=0.0, le=_WIDEST.damping, description="the same")] = _WIDEST.damping
     slew: Annotated[Force, Field(gt=0.0, le=_WIDEST.slew, description="growth or turn of the force in one tick")] = _WIDEST.slew
     speed: Annotated[Speed, Field(gt=0.0, le=_WIDEST.speed, description="a faster hand gets no force until it lets go of the dead-man")] = _WIDEST.speed
-    hold: Annotated[Duration, Field(gt=0, le=100_000_000, description="silence up to which the last contact model counts in full")] = (
-        100_000_000
-    )
+    hold: Annotated[Duration, Field(gt=0, le=100_000_000, description="silence up to which the last contact model counts in full")] = 100_000_000
     decay: Annotated[Duration, Field(gt=0, le=20_000_000, description="time constant of the force's decay after that")] = 20_000_000
     silence: Annotated[Duration, Field(gt=0, le=150_000_000, description="silence after which there is no force")] = 150_000_000
     ramp: Annotated[Duration, Field(ge=1_000_000_000, description="time in which the force comes in after it was off")] = 1_000_000_000
@@ -58,5 +56,5 @@ class SafetyParams(Params):
             if getattr(self, name) > bearable[name]:
                 unit = {"force": "N", "stiffness": "N/m", "damping": "N s/m"}[name]
                 asked, borne = f"{getattr(self, name):g} {unit}", f"{bearable[name]:g} {unit}"
-                raise ScenarioError(f"safety.{name} is {asked}, but the device bears {borne}. A scenario may lower a limit, never raise it.", path=("safety", name))
+                raise ScenarioError(f"safety.{name} is {asked}, but the device bears {borne}. A scenario may only lower a limit.", path=("safety", name))
         return self.limits.bounded(device)

@@ -7,7 +7,8 @@ does not pay for the next.
 
 from __future__ import annotations
 
-from devices.haptics.contact import ZERO, Vector3
+from devices.haptics.contact import ZERO
+from devices.vendor_axes import Vector3
 
 __all__ = ["Passivity"]
 

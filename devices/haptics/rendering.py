@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import sqrt
 
-from devices.haptics.contact import ZERO, Plane, Vector3
+from devices.haptics.contact import ZERO, Plane
+from devices.vendor_axes import Vector3
 
 __all__ = ["DEAD_RECKONING", "Renderer"]
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 from enum import Enum
 from math import exp, hypot, isfinite
 
-from devices.haptics.contact import ZERO, Vector3
+from devices.haptics.contact import ZERO
 from devices.haptics.limits import Limits
+from devices.vendor_axes import Vector3
 
 __all__ = ["Condition", "SafetyChain"]
 
@@ -47,8 +48,8 @@ class SafetyChain:
     def tick(self, wanted: Vector3, velocity: Vector3, *, age: float, permitted: bool, dt: float) -> Vector3:
         """Return the force (N) that the hand is given until the next tick.
 
-        `wanted` is the force that the contact asks for (N), `velocity` the hand's (m/s), `age` the time since a contact model arrived (s; infinite if none did),
-        `dt` the time since the last tick (s). `permitted`: the dead-man is held, the device calibrated and well.
+        `wanted` is the force that the contact asks for (N), `velocity` the hand's (m/s), `age` the time since a contact model arrived (s; infinite if none
+        did), `dt` the time since the last tick (s). `permitted`: the dead-man is held, the device calibrated and well.
         """
         limits = self._limits
         size = hypot(*wanted)
