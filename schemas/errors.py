@@ -9,6 +9,7 @@ TrocarError
 │   └── StateError         a participant cannot save or restore its state
 ├── RecordingError         a recording cannot be written, read or re-simulated
 ├── MotionError            an arm cannot be or go where it was asked to
+├── DeviceError            hardware, or the program that drives it, cannot be used now
 └── ConnectError           no hub, or not the hub that was asked for
 """
 
@@ -19,6 +20,7 @@ from collections.abc import Iterable
 
 __all__ = [
     "ConnectError",
+    "DeviceError",
     "MessageError",
     "MissingExtraError",
     "MotionError",
@@ -83,6 +85,10 @@ class RecordingError(TrocarError):
 
 class MotionError(TrocarError):
     """An arm cannot be or go where it was asked to; the message says why and what was allowed."""
+
+
+class DeviceError(TrocarError):
+    """Hardware, or the program that drives it, cannot be used now; the message says what to do."""
 
 
 class ConnectError(TrocarError):
