@@ -1,0 +1,66 @@
+"""The velocity law: the twist of the hand, in its own frame, is that of the instrument's tip in its own.
+
+After Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", IEEE International Conference on Robotic Computing, 2019: with v_G the
+twist of the gripper in its own frame and J_G the Jacobian there, dq/dt = J_G^-1 v_G.
+
+Near a singularity the inverse is damped: dq = J' (J J' + l^2 I)^-1 v with l^2 = (1 - (sigma / epsilon)^2) l_max^2 where the
+smallest singular value sigma is below epsilon, and l = 0 elsewhere (Chiaverini, Siciliano and Egeland, "Review of the damped least-squares
+inverse kinematics with experiments on an industrial robot manipulator", IEEE Transactions on Control Systems Technology 2(2), 1994).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import rotation
+from robots.serial_chain import SerialChain
+from schemas.vectors import Vector
+
+__all__ = ["advance", "joint_velocities", "twist_in_tip"]
+
+_LENGTH = 0.1
+"""Weighs orientation against position: 1 rad counts as much as 0.1 m, as in `robots.inverse_kinematics`."""
+_EPSILON = _LARGEST_DAMPING = 0.004
+"""m, of the weighted Jacobian; ours: a tip that creeps at 6 mm/s in the worst direction takes pitch and yaw to their 90 degrees a second. In 9 % of
+configurations drawn from a PSM's ranges sigma is smaller, near the remote centre and at wrists bent by right angles; at home it is 0.061."""
+
+
+def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
+    """Return the twist (6,) of the tip in its own frame, m/s and rad/s.
+
+    Args:
+        hand: orientation of the hand in its base frame, quaternion (x, y, z, w).
+        twist: of the hand (6,) in its base frame: velocity of its origin, then angular velocity.
+        scale: metres of the tip per metre of the hand.
+    """
+    to_hand = rotation.matrix(hand).T
+    return np.concatenate([scale * (to_hand @ twist[:3]), to_hand @ twist[3:]])
+
+
+def joint_velocities(chain: SerialChain, q: Vector, twist: Vector, free: NDArray[np.bool_]) -> Vector:
+    """Return dq/dt, shape (n,), for the twist (6,) of the tip in its own frame; 0 for joints that are not `free`, shape (n,) of bools."""
+    weights = np.array([1.0, 1.0, 1.0, _LENGTH, _LENGTH, _LENGTH])
+    jacobian = (weights[:, None] * chain.jacobian(chain.frames(q), frame="tip"))[:, free]
+    u, sigma, vt = np.linalg.svd(jacobian, full_matrices=False)
+    damping = max(0.0, 1.0 - (float(sigma[-1]) / _EPSILON) ** 2) * _LARGEST_DAMPING**2
+    velocities = np.zeros(len(q))
+    velocities[free] = vt.T @ (sigma / (sigma**2 + damping) * (u.T @ (weights * twist)))
+    return velocities
+
+
+def advance(chain: SerialChain, q: Vector, twist: Vector, h: float) -> Vector:
+    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its own frame.
+
+    All joints slow down together so that none is faster than it may be. One that would leave its range stops at its end and the others do what they
+    can without it. What is cut is not made up for later.
+    """
+    free = np.ones(len(q), dtype=bool)
+    while free.any():
+        velocities = joint_velocities(chain, q, twist, free)
+        velocities /= max(1.0, float(np.abs(velocities / chain.velocity).max()))
+        blocked = free & (((q <= chain.lower) & (velocities < 0.0)) | ((q >= chain.upper) & (velocities > 0.0)))
+        if not blocked.any():
+            return np.minimum(np.maximum(q + h * velocities, chain.lower), chain.upper)
+        free &= ~blocked
+    return q
