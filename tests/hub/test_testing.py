@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.teleoperation.controller import Teleoperation, TeleoperationParams
+from controllers.teleoperation.controller import Teleoperation
+from controllers.teleoperation.params import TeleoperationParams
 from devices.scripted.device import ScriptedDevice, ScriptedParams
 from engines.bullet.engine import BulletEngine, BulletParams
 from engines.fmu.engine import FmuEngine, FmuParams
