@@ -102,7 +102,7 @@ def _difference(v: Vector3, w: Vector3) -> Vector3:
 def _at_most(v: Vector3, most: float) -> Vector3:
     """Return `v`, shortened to length `most` if it is longer."""
     length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    return v if length <= most else (v[0] * most / length, v[1] * most / length, v[2] * most / length)
+    return (v[0] * most / length, v[1] * most / length, v[2] * most / length) if length > most else v
 
 
 def _share(planes: list[Plane], index: int, most: float) -> float:
