@@ -14,18 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from robots import rotation
-from robots.inverse_kinematics import approach
+from robots.inverse_kinematics import pursue
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["PoseLaw", "pursue"]
-
-_CLOSE = 1e-12
-"""m; of position and, weighed by `_LENGTH`, orientation: a goal is met. Some ten times the rounding error of the forward kinematics."""
-_LENGTH = 0.1
-"""m per rad, as `robots.inverse_kinematics` weighs them."""
-_CORRECTIONS = 4
-"""At most, per step; each squares the error, so that two do at the usual speeds."""
+__all__ = ["PoseLaw"]
 
 
 class PoseLaw:
@@ -61,23 +54,4 @@ class PoseLaw:
             offset = rotation.product(rotation.conjugate(rotation.product(to_base, self._hand0[3:])), self._tip0[3:])
             goal = rotation.product(rotation.product(to_base, hand[3:]), offset)
             self.goal[3:] = goal / np.linalg.norm(goal)
-        return pursue(self._chain, command, self.goal, largest_move)
-
-
-def pursue(chain: SerialChain, command: Vector, goal: Vector, largest_move: Vector) -> Vector:
-    """Return joint positions, shape (n,), that put the tip at `goal`, or as near to it as ranges and `largest_move` from `command` allow.
-
-    A goal that is met moves nothing, not by rounding either.
-    """
-    q = command
-    for _ in range(_CORRECTIONS):
-        tip = chain.forward(q)
-        turn = rotation.log(rotation.product(goal[3:], rotation.conjugate(rotation.from_matrix(tip))))
-        if np.linalg.norm(goal[:3] - tip[:3, 3]) + _LENGTH * np.linalg.norm(turn) < _CLOSE:
-            break
-        move = approach(chain, q, goal[:3], goal[3:], largest_move) - command
-        share = float(np.abs(move / largest_move).max())
-        q = command + move / max(1.0, share)
-        if share >= 1.0:
-            break
-    return q
+        return pursue(self._chain, command, self.goal[:3], self.goal[3:], largest_move)

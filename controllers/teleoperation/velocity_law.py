@@ -11,7 +11,6 @@ inverse kinematics with experiments on an industrial robot manipulator", IEEE Tr
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots import rotation
 from robots.serial_chain import SerialChain
@@ -21,9 +20,10 @@ __all__ = ["advance", "joint_velocities", "twist_in_tip"]
 
 _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, as in `robots.inverse_kinematics`."""
+_WEIGHTS = np.array([1.0, 1.0, 1.0, _LENGTH, _LENGTH, _LENGTH])
 _EPSILON = _LARGEST_DAMPING = 0.004
 """m, of the weighted Jacobian; ours: a tip that creeps at 6 mm/s in the worst direction takes pitch and yaw to their 90 degrees a second. In 9 % of
-configurations drawn from a PSM's ranges sigma is smaller, near the remote centre and at wrists bent by right angles; at home it is 0.061."""
+configurations drawn from a PSM's ranges sigma is smaller, near the remote centre and at wrists bent by nearly right angles; at home it is 0.061."""
 
 
 def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
@@ -38,29 +38,27 @@ def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
     return np.concatenate([scale * (to_hand @ twist[:3]), to_hand @ twist[3:]])
 
 
-def joint_velocities(chain: SerialChain, q: Vector, twist: Vector, free: NDArray[np.bool_]) -> Vector:
-    """Return dq/dt, shape (n,), for the twist (6,) of the tip in its own frame; 0 for joints that are not `free`, shape (n,) of bools."""
-    weights = np.array([1.0, 1.0, 1.0, _LENGTH, _LENGTH, _LENGTH])
-    jacobian = (weights[:, None] * chain.jacobian(chain.frames(q), frame="tip"))[:, free]
-    u, sigma, vt = np.linalg.svd(jacobian, full_matrices=False)
+def joint_velocities(jacobian: Vector, twist: Vector) -> Vector:
+    """Return dq/dt, shape (n,), for the twist (6,) of the tip in its own frame, from the Jacobian (6, n) in that frame."""
+    u, sigma, vt = np.linalg.svd(_WEIGHTS[:, None] * jacobian, full_matrices=False)
     damping = max(0.0, 1.0 - (float(sigma[-1]) / _EPSILON) ** 2) * _LARGEST_DAMPING**2
-    velocities = np.zeros(len(q))
-    velocities[free] = vt.T @ (sigma / (sigma**2 + damping) * (u.T @ (weights * twist)))
-    return velocities
+    return vt.T @ (sigma / (sigma**2 + damping) * (u.T @ (_WEIGHTS * twist)))
 
 
 def advance(chain: SerialChain, q: Vector, twist: Vector, h: float) -> Vector:
     """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its own frame.
 
-    All joints slow down together so that none is faster than it may be. One that would leave its range stops at its end and the others do what they
-    can without it. What is cut is not made up for later.
+    Joints that would leave their range go to its end, and the others do what they can without them; all slow down together so that none is faster
+    than it may be. What is cut is not made up for later.
     """
+    jacobian = chain.jacobian(chain.frames(q), frame="tip")
+    least, most = (chain.lower - q) / h, (chain.upper - q) / h
+    velocities = joint_velocities(jacobian, twist)
     free = np.ones(len(q), dtype=bool)
-    while free.any():
-        velocities = joint_velocities(chain, q, twist, free)
-        velocities /= max(1.0, float(np.abs(velocities / chain.velocity).max()))
-        blocked = free & (((q <= chain.lower) & (velocities < 0.0)) | ((q >= chain.upper) & (velocities > 0.0)))
-        if not blocked.any():
-            return np.minimum(np.maximum(q + h * velocities, chain.lower), chain.upper)
-        free &= ~blocked
-    return q
+    while (outside := free & ((velocities < least) | (velocities > most))).any():
+        free &= ~outside
+        velocities[outside] = np.where(velocities < least, least, most)[outside]
+        if free.any():
+            velocities[free] = joint_velocities(jacobian[:, free], twist - jacobian[:, ~free] @ velocities[~free])
+    velocities /= max(1.0, float(np.abs(velocities / chain.velocity).max()))
+    return np.minimum(np.maximum(q + h * velocities, chain.lower), chain.upper)
