@@ -14,31 +14,45 @@ from schemas.quantity import Damping, Duration, Force, Speed, Stiffness
 __all__ = ["SafetyParams"]
 
 _WIDEST = Limits()
+_HOLD_NS, _DECAY_NS, _SILENCE_NS, _RAMP_NS = (round(s * 1e9) for s in (_WIDEST.hold, _WIDEST.decay, _WIDEST.silence, _WIDEST.ramp))
 
 
 class SafetyParams(Params):
-    """Limits of the force on one hand. The defaults are the widest; what the device bears less than its limit is taken from the device."""
+    """Limits of the force on one hand. The defaults are the widest; the first three are the device's own where it bears less."""
 
-    force: Annotated[Force, Field(gt=0.0, le=_WIDEST.force, description="norm of the force, at most also 60 % of the device's nominal force")] = _WIDEST.force
-    stiffness: Annotated[Stiffness, Field(gt=0.0, le=_WIDEST.stiffness, description="of all surfaces touched together")] = _WIDEST.stiffness
-    damping: Annotated[Damping, Field(ge=0.0, le=_WIDEST.damping, description="the same")] = _WIDEST.damping
-    slew: Annotated[Force, Field(gt=0.0, le=_WIDEST.slew, description="growth or turn of the force in one tick")] = _WIDEST.slew
-    speed: Annotated[Speed, Field(gt=0.0, le=_WIDEST.speed, description="a faster hand gets no force until it lets go of the dead-man")] = _WIDEST.speed
-    hold: Annotated[Duration, Field(gt=0, le=100_000_000, description="silence up to which the last contact model counts in full")] = 100_000_000
-    decay: Annotated[Duration, Field(gt=0, le=20_000_000, description="time constant of the force's decay after that")] = 20_000_000
-    silence: Annotated[Duration, Field(gt=0, le=150_000_000, description="silence after which there is no force")] = 150_000_000
-    ramp: Annotated[Duration, Field(ge=1_000_000_000, description="time in which the force comes in after it was off")] = 1_000_000_000
-    calm_force: Annotated[Force, Field(gt=0.0, le=_WIDEST.calm_force, description="the force comes in only after less than this was due")] = _WIDEST.calm_force
-    calm_ticks: Annotated[int, Field(ge=_WIDEST.calm_ticks, description="for this number of ticks of the device")] = _WIDEST.calm_ticks
-    passivity: Annotated[bool, Field(description="whether an observer watches the energy given to the hand, and brakes when it is too much")] = False
+    force: Annotated[Force, Field(gt=0.0, le=_WIDEST.force)] | None = Field(
+        default=None, description="norm of the force; default: 2 N or 60 % of the device's nominal force, whichever is less"
+    )
+    stiffness: Annotated[Stiffness, Field(gt=0.0, le=_WIDEST.stiffness)] | None = Field(
+        default=None, description="of all surfaces touched together; default: 400 N/m or the device's, whichever is less"
+    )
+    damping: Annotated[Damping, Field(ge=0.0, le=_WIDEST.damping)] | None = Field(
+        default=None, description="of all surfaces touched together; default: 4 N s/m or the device's, whichever is less"
+    )
+    slew: Force = Field(default=_WIDEST.slew, gt=0.0, le=_WIDEST.slew, description="growth or turn of the force in one tick")
+    speed: Speed = Field(default=_WIDEST.speed, gt=0.0, le=_WIDEST.speed, description="a faster hand gets no force until it lets go of the dead-man")
+    hold: Duration = Field(default=_HOLD_NS, gt=0, le=_HOLD_NS, description="silence up to which the last contact model counts in full")
+    decay: Duration = Field(default=_DECAY_NS, gt=0, le=_DECAY_NS, description="time constant of the force's decay after that")
+    silence: Duration = Field(default=_SILENCE_NS, gt=0, le=_SILENCE_NS, description="silence after which there is no force")
+    ramp: Duration = Field(default=_RAMP_NS, ge=_RAMP_NS, description="time in which the force comes in after it was off")
+    calm_force: Force = Field(default=_WIDEST.calm_force, gt=0.0, le=_WIDEST.calm_force, description="the force comes in only after less than this was due")
+    calm_ticks: int = Field(default=_WIDEST.calm_ticks, ge=_WIDEST.calm_ticks, description="for this number of ticks of the device")
+    passivity: bool = Field(default=False, description="whether an observer watches the energy given to the hand, and brakes when it is too much")
 
-    @property
-    def limits(self) -> Limits:
-        """The limits as the haptic loop takes them, before the device has said what it bears."""
+    def within(self, device: DeviceLimits) -> Limits:
+        """Return the limits as the haptic loop takes them. Raises ScenarioError if the scenario asks for more than the device bears."""
+        for name, asked, borne, unit in (
+            ("force", self.force, device.usable_force, "N"),
+            ("stiffness", self.stiffness, device.stiffness, "N/m"),
+            ("damping", self.damping, device.damping, "N s/m"),
+        ):
+            if asked is not None and asked > borne:
+                problem = f"safety.{name} is {asked:g} {unit}, but the device bears {borne:g} {unit}. A scenario may only lower a limit."
+                raise ScenarioError(problem, path=("safety", name))
         return Limits(
-            force=self.force,
-            stiffness=self.stiffness,
-            damping=self.damping,
+            force=_WIDEST.force if self.force is None else self.force,
+            stiffness=_WIDEST.stiffness if self.stiffness is None else self.stiffness,
+            damping=_WIDEST.damping if self.damping is None else self.damping,
             slew=self.slew,
             speed=self.speed,
             hold=self.hold * 1e-9,
@@ -47,14 +61,4 @@ class SafetyParams(Params):
             ramp=self.ramp * 1e-9,
             calm_force=self.calm_force,
             calm_ticks=self.calm_ticks,
-        )
-
-    def within(self, device: DeviceLimits) -> Limits:
-        """Return the limits for `device`. Raises ScenarioError if the scenario asks for more than the device bears."""
-        bearable = {"force": device.usable_force, "stiffness": device.stiffness, "damping": device.damping}
-        for name in sorted(self.model_fields_set & bearable.keys()):
-            if getattr(self, name) > bearable[name]:
-                unit = {"force": "N", "stiffness": "N/m", "damping": "N s/m"}[name]
-                asked, borne = f"{getattr(self, name):g} {unit}", f"{bearable[name]:g} {unit}"
-                raise ScenarioError(f"safety.{name} is {asked}, but the device bears {borne}. A scenario may only lower a limit.", path=("safety", name))
-        return self.limits.bounded(device)
+        ).bounded(device)

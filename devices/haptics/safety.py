@@ -81,7 +81,7 @@ class SafetyChain:
         else:
             self._calm = self._calm + 1 if size < limits.calm_force else 0
             self._engaged = self._calm >= limits.calm_ticks
-            self.condition = Condition.ON if self._engaged else Condition.WAITING
+            self.condition = Condition.ON if self._calm else Condition.WAITING
         self._age = age
 
     def _off(self, condition: Condition) -> Vector3:
