@@ -29,7 +29,7 @@ class Clock:
         self._window = window or (max(1, _WINDOW_NS // plan.step_ns) if alone else 1)
         self._realtime = realtime
         self.steps = steps
-        self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets})
+        self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets} | {device.period for device in plan.meetings()})
         self._wall_zero_ns = monotonic_ns()
 
     @property
@@ -45,7 +45,8 @@ class Clock:
     def horizon(self, most: int | None = None) -> int:
         """Return how many steps the next grant covers.
 
-        No participant that listens to a device may start a step inside a grant, or it would miss the newest samples.
+        No participant that listens to a device may start a step inside a grant, or it would miss the newest samples; and no device may be
+        due inside it that is to be written what the others have computed.
         """
         count = self._window if most is None else min(self._window, most)
         if self.steps is not None:

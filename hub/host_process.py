@@ -19,14 +19,17 @@ from time import sleep
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
+from hub.clock_watch import ClockWatch
 from hub.control import Empty, JoinReply, JoinRequest, ask
-from hub.devices import DeviceLoop
+from hub.device_host import DeviceHost
+from hub.device_loop import DeviceLoop
 from hub.host import Host
 from hub.interrupt import Interrupt
 from hub.lane import may_spin
 from hub.participant import Device, Stepped
 from hub.plan import Member
 from hub.registry import make
+from hub.uplink import DeviceUplink, Run
 from hub.wire import Drops, Wire, open_session
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
@@ -34,7 +37,7 @@ from schemas.keys import Keys
 from schemas.lockstep import Permission, Report, pack_report, unpack_permission
 from schemas.ros import StringMessage
 
-__all__ = ["main", "run_host"]
+__all__ = ["main", "run_device", "run_host"]
 
 log = logging.getLogger(__name__)
 
@@ -51,16 +54,26 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
-    keys = Keys(session_name)
+    keys, request = Keys(session_name), JoinRequest(host=host, pid=os.getpid())
     with open_session("peer", listen=["tcp/127.0.0.1:0"], connect=[endpoint]) as session:
-        request = JoinRequest(host=host, pid=os.getpid())
-        reply = ask(session, keys.control("join"), request, JoinReply, timeout_s=10.0)
+        reply = ask(session, keys.join(host), request, JoinReply, timeout_s=10.0)
         with _ending_with_hub(session, keys):
             joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory))
             try:
                 joined.serve()
             finally:
                 joined.close()
+
+
+def run_device(endpoint: str, session_name: str, name: str, *, directory: Path | None = None) -> None:
+    """Join session `session_name` over `endpoint` with the device `name`, and whatever run of it comes after, until Ctrl-C or SIGTERM.
+
+    Raises ConnectError if there is no such hub to begin with, MessageError if it has no place for the device, and ParticipantError if the device fails.
+    """
+    request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
+    host = DeviceHost(name, lambda: open_session("client", connect=[endpoint]), Keys(session_name), request, directory)
+    with Interrupt(), contextlib.suppress(KeyboardInterrupt):
+        host.serve()
 
 
 class _JoinedHost:
@@ -89,23 +102,27 @@ class _JoinedHost:
             for member in self._host.members
         }
         self._next_step = 0
-        self._loops = [
-            DeviceLoop(plan.members[name], plan, device, session, keys, self._drops, failed=self._device_failed)
-            for name, device in made.items()
-            if isinstance(device, Device)
-        ]
+        devices = {name: device for name, device in made.items() if isinstance(device, Device)}
+        self._loops = {name: DeviceLoop(name, device, plan.members[name].read_ns, failed=self._device_failed) for name, device in devices.items()}
+        self._stack = contextlib.ExitStack()
+        if devices:
+            clock, run = self._stack.enter_context(ClockWatch(session, keys)), Run(plan, keys, reply.run, reply.admission)
+            for name, loop in self._loops.items():
+                uplink = DeviceUplink(plan.members[name], run, session, loop, self._drops, clock.offset)
+                self._stack.callback(uplink.close)
+                loop.attach(uplink)
         self._tokens = [session.liveliness().declare_token(keys.alive(member.key_role, name)) for name, member in mine.items()]
 
     def serve(self) -> None:
         """Configure, report ready, prime the links, and step until the hub says that the run is over."""
         try:
             bonds = self._host.configure(self._directory)
-            for loop in self._loops:
+            for loop in self._loops.values():
                 loop.start(self._directory)
         except ParticipantError as error:
-            ask(self._session, self._keys.control("join"), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
+            ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
             raise
-        ask(self._session, self._keys.control("join"), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
         grant = self._first_grant()
         while True:
             try:
@@ -153,12 +170,13 @@ class _JoinedHost:
         self._acks[member.name].put(pack_report(report))
 
     def _device_failed(self, name: str, cause: str) -> None:
-        ask(self._session, self._keys.control("join"), self._request.model_copy(update={"failed": f"{name}: {cause}"}), Empty)
+        ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{name}: {cause}"}), Empty)
 
     def close(self) -> None:
         """Close devices, participants and publishers."""
-        for loop in self._loops:
+        for loop in self._loops.values():
             loop.close()
+        self._stack.close()
         self._host.close()
         for token in self._tokens:
             token.undeclare()

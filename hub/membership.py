@@ -52,6 +52,7 @@ class Membership:
         self._run = run
         self._failed = failed
         self._hosts: dict[str, JoinRequest] = {}
+        self._admissions = 0
         self._changed = threading.Condition()
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
@@ -65,6 +66,7 @@ class Membership:
             if known is not None and known.pid != request.pid:
                 raise MessageError(f"host '{request.host}' is here already, as process {known.pid}")
             self._hosts[request.host] = request
+            self._admissions += 1
             self._changed.notify_all()
         if request.failed:
             participant, _, cause = request.failed.partition(": ")
@@ -72,7 +74,7 @@ class Membership:
         if request.ready or request.failed:
             return Empty()
         params = {name: self._scenario.participants[name].params for name in names}
-        return JoinReply(run=self._run, plan=self._plan, params=params, directory=str(self._directory), watched=self._watched)
+        return JoinReply(run=self._run, admission=self._admissions, plan=self._plan, params=params, directory=str(self._directory), watched=self._watched)
 
     def lose(self, host: str) -> None:
         """Forget a host, so that it may join again."""

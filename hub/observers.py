@@ -118,6 +118,21 @@ class Observers:
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
+    def watches(self, device: str, port: str) -> bool:
+        """Say whether anybody wants to see what a device says on a port, whether or not it enters the simulation."""
+        return self._recorder is not None or (device, port) in self.measures.by_port
+
+    def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
+        """Take what a device said; what enters the simulation is recorded with its grant. Raises MessageError if it is none of the port."""
+        watched = self._watched[self._keys.output("device", device, port)]
+        measured = (device, port) in self.measures.by_port
+        if measured or not enters:
+            value = watched.codec.accept(payload)
+            if measured:
+                self.measures.take(device, port, value)
+        if self._recorder is not None and not enters:
+            self._recorder.write(watched.channel, time_ns, payload)
+
     def grant(self, grant: Permission, payload: bytes) -> None:
         """Take a grant and the device samples in it."""
         if self._recorder is None:

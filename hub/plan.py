@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
@@ -11,6 +11,7 @@ from hub.coupling import bond_plans, is_fresh
 from hub.participant import BondPlan, Device, Stepped
 from hub.wildcard import spelt_out
 from schemas.errors import ScenarioError, did_you_mean
+from schemas.link import LinkSpec
 from schemas.ports import BondSide, Port, bond_ports
 from schemas.quantity import same_unit
 from schemas.scenario import Bond, Connection, Endpoint, Scenario
@@ -19,6 +20,11 @@ from schemas.vectors import VectorCodec, has_vector
 __all__ = ["Inlet", "Link", "Member", "Plan", "PlannedBond", "make_plan"]
 
 Path = tuple[str | int, ...]
+
+_READ_NS = 1_000_000
+"""A haptic stylus moves and is felt at 1 kHz."""
+_LEAST_READ_NS = 100_000
+"""A loop in Python that is asked for more keeps a core busy for nothing."""
 
 
 class _Part(BaseModel):
@@ -34,7 +40,13 @@ class Member(_Part):
     host: str
     """`hub`, the name of a process, or `remote/<participant>`."""
     period: int
-    """In steps; for a device, the period of its read loop in steps."""
+    """In steps; a device that lives in wall time has 1."""
+    read_ns: int = 0
+    """Of a device that lives in wall time: the time between two reads."""
+    link: LinkSpec | None = None
+    """Of a device: what lies between it and the hub."""
+    rate_limit: float = 2000.0
+    """Of a device: messages per second that are taken from each of its ports."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}
@@ -45,9 +57,8 @@ class Member(_Part):
 
     @property
     def follows_clock(self) -> bool:
-        """Whether this is a device that plays in simulated time: all its outputs are stamped with it."""
-        outputs = [port for port in self.ports if port.causality == "output"]
-        return self.role == "device" and bool(outputs) and all(port.clock == "simulated" for port in outputs)
+        """Whether this is a device that plays in simulated time."""
+        return self.role == "device" and plays_in_simulated_time(self.ports)
 
     @property
     def key_role(self) -> str:
@@ -56,7 +67,7 @@ class Member(_Part):
 
 
 class Link(_Part):
-    """A connection between two stepped participants."""
+    """A connection from a stepped participant to another one, or to a device that follows the clock."""
 
     source: str
     source_port: str
@@ -79,7 +90,7 @@ class Inlet(_Part):
 
 
 class Outlet(_Part):
-    """A connection from a stepped participant to a device."""
+    """A connection from a stepped participant to a device that lives in wall time."""
 
     source: str
     source_port: str
@@ -111,6 +122,11 @@ class Plan(_Part):
         """Return how many steps lie between two values of an output port."""
         member = self.members[participant]
         return max(member.period, member.port(port).period_ns // self.step_ns)
+
+    def meetings(self) -> tuple[Member, ...]:
+        """Return the devices that must be met at each of their periods: that follow the clock, and are written to or sit behind a link."""
+        written = {link.target for link in self.links}
+        return tuple(m for m in self.members.values() if m.follows_clock and (m.name in written or m.link is not None))
 
     def hosts(self) -> tuple[str, ...]:
         """Return the names of all hosts, the hub's own first."""
@@ -148,13 +164,19 @@ def make_plan(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
 def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds: list[PlannedBond]) -> Member:
     name = participant.name
     spec, path = scenario.participants[name], ("participants", name)
-    period_ns = spec.period if spec.period is not None else scenario.step
-    if period_ns <= 0 or period_ns % scenario.step:
-        raise ScenarioError(f"period {period_ns / 1e6:g} ms is no multiple of the step {scenario.step / 1e6:g} ms", path=(*path, "period"))
     sides = [(b.bond, s) for b in bonds for e, s in ((b.bond.motion, b.motion), (b.bond.force, b.force)) if e.participant == name]
     ports = participant.ports + tuple(port for _, side in sides for port in bond_ports(side))
+    in_wall_time = role == "device" and not plays_in_simulated_time(ports)
+    period_ns = spec.period if spec.period is not None and not in_wall_time else scenario.step
+    read_ns = (spec.period if spec.period is not None else _READ_NS) if in_wall_time else 0
+    if period_ns <= 0 or period_ns % scenario.step:
+        raise ScenarioError(f"period {period_ns / 1e6:g} ms is no multiple of the step {scenario.step / 1e6:g} ms", path=(*path, "period"))
+    if in_wall_time and read_ns < _LEAST_READ_NS:
+        raise ScenarioError(f"period {read_ns / 1e6:g} ms: a device is read every {_LEAST_READ_NS / 1e6:g} ms at most", path=(*path, "period"))
+    if spec.link is not None and role != "device":
+        raise ScenarioError(f"a link lies between a device and the hub, but '{name}' is a {role}: leave it out", path=(*path, "link"))
     for port in ports:
-        if port.period_ns % period_ns:
+        if port.period_ns % period_ns and not in_wall_time:
             problem = f"output '{port.name}' has a period of {port.period_ns / 1e6:g} ms, no multiple of the participant's {period_ns / 1e6:g} ms"
             raise ScenarioError(problem, path=path)
     plans: dict[str, BondPlan] = {}
@@ -170,6 +192,9 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
         role=role,  # pyright: ignore[reportArgumentType]
         host=f"remote/{name}" if spec.host == "remote" else spec.host,
         period=period_ns // scenario.step,
+        read_ns=read_ns,
+        link=spec.link,
+        rate_limit=spec.rate_limit,
         ports=ports,
         bonds=tuple(side for _, side in sides),
         bond_plans=plans,
@@ -243,10 +268,12 @@ class _Wiring:
             raise ScenarioError(f"{values} cannot be extrapolated, as '{connection.source} -> {connection.target}' would", path=path)
         from_device, to_device = (self._members[end.participant].role == "device" for end in (one, other))
         if from_device and to_device:
-            raise ScenarioError("a device cannot feed a device: both live in wall time", path=path)
+            raise ScenarioError("a device cannot feed a device: only the simulation lies between them", path=path)
         if from_device:
             age = min((a for a in (source.max_age_ns, target.max_age_ns) if a), default=0)
             self.inlets.append(Inlet(device=one.participant, device_port=one.port, target=other.participant, target_port=other.port, max_age_ns=age))
+        elif self._members[other.participant].follows_clock:
+            self._link(one, other, fresh=False, linear=False)
         elif to_device:
             self.outlets.append(Outlet(source=one.participant, source_port=one.port, device=other.participant, device_port=other.port))
         else:
@@ -312,6 +339,12 @@ class _Wiring:
             order.append(free)
             del waiting[free]
         return tuple(order)
+
+
+def plays_in_simulated_time(ports: Sequence[Port]) -> bool:
+    """Say whether a device with these ports follows the clock: it has outputs, and all are stamped with simulated time."""
+    outputs = [port for port in ports if port.causality == "output"]
+    return bool(outputs) and all(port.clock == "simulated" for port in outputs)
 
 
 def _end(side: Endpoint, port: Port) -> Endpoint:

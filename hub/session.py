@@ -8,7 +8,7 @@ import math
 import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from time import monotonic, monotonic_ns, sleep
+from time import monotonic, sleep
 
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
@@ -17,11 +17,11 @@ from hub.account import Account
 from hub.clock import Clock
 from hub.control import ControlServer, RunState
 from hub.coupling import stable_step_problem
-from hub.devices import DeviceLoop, ScriptedDevices
 from hub.endpoint import free_endpoint, require_loopback
 from hub.fleet import Fleet, Watchdog
 from hub.host import Host
 from hub.inlets import Inlets
+from hub.intake import Intake
 from hub.interrupt import Interrupt
 from hub.lane import may_spin
 from hub.measures import Measures
@@ -85,8 +85,9 @@ class Session:
         self._keys = Keys(scenario.name)
         steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
         self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
-        self._inlets = Inlets(plan)
         self._drops = Drops()
+        self._inlets = Inlets(plan)
+        self._intake = Intake(plan, self._keys, self._run_id, self._drops, self._inlets)
         self._away = {name for name in plan.order if plan.members[name].host != "hub"}
         self._common_period = math.lcm(*(plan.members[name].period for name in plan.order))
         self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
@@ -147,21 +148,18 @@ class Session:
         self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
         self._status_publisher = session.declare_publisher(keys.status, encoding=cdr)
         self._energy_publishers = {b.bond.name: session.declare_publisher(keys.energy(b.bond.name), encoding=cdr) for b in self.plan.bonds}
+        self._lay_local(session)
         watch = Callback(self._observers.sample, indirect=False)
         self._entities: list[zenoh.Subscriber[None] | zenoh.Queryable[None] | ControlServer] = [
             session.declare_queryable(keys.status, Callback(self._answer_status)),
-            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._lost)),
-            ControlServer(session, keys, self.state, self._inlets, self._membership, self._drops),
+            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._came_or_went)),
+            ControlServer(session, keys, self.state, self._inlets, self._intake.relink, self._membership, self._drops),
             session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
             *(session.declare_subscriber(key, watch) for key in self._observers.away),
         ]
-        if self._grants is None:
-            sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets if not self.plan.members[inlet.device].follows_clock})
-            self._entities += [session.declare_subscriber(keys.output("device", *source), self._inlet_callback(*source)) for source in sources]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         self._fleet = Fleet()
         self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail)
-        self._lay_local(session)
 
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
@@ -169,13 +167,7 @@ class Session:
         wire = Wire(session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts())))
         self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
-        scripted = {n: device for n, device in devices.items() if self.plan.members[n].follows_clock}
-        self._scripted = ScriptedDevices(scripted)
-        self._loops = [
-            DeviceLoop(self.plan.members[n], self.plan, device, session, self._keys, self._drops, failed=self._fail)
-            for n, device in devices.items()
-            if n not in scripted
-        ]
+        self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
 
     def _start(self) -> None:
         """Start the hosts, wait until all participants are configured and every link has carried a value."""
@@ -184,9 +176,7 @@ class Session:
             if not host.startswith("remote/"):
                 self._fleet.start(host, self.endpoint, self.scenario.name)
         bonds = self._host.configure(self._directory)
-        self._scripted.open(self._directory)
-        for loop in self._loops:
-            loop.start(self._directory)
+        self._intake.open(self._directory)
         self._await_hosts(hosts)
         self._check_steps({**bonds, **self._membership.bonds()})
         self._await_links()
@@ -277,9 +267,8 @@ class Session:
                 return None
             return Permission(self._run_id, recorded.epoch, recorded.step, recorded.start_ns, recorded.horizon_ns, recorded.inlets)
         step, time_ns = self._clock.step, self._clock.time_ns
-        self._scripted.read(time_ns, step, self._inlets)
         horizon_ns = time_ns + self._clock.horizon(budget) * self.plan.step_ns
-        return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._inlets.sample(time_ns, monotonic_ns()))
+        return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._intake.enter(time_ns, step))
 
     def _step(self, grant: Permission) -> None:
         """Publish a grant, take part in it, and wait until everybody else has.
@@ -364,9 +353,7 @@ class Session:
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()
-        for loop in self._loops:
-            loop.close()
-        self._scripted.close()
+        self._intake.close()
         self._host.close()
         self._fleet.end()
         for entity in self._entities:
@@ -396,26 +383,22 @@ class Session:
                     raise ParticipantError(member.name, report.step, report.error)
         self._failures.check()
 
-    def _lost(self, sample: zenoh.Sample) -> None:
+    def _came_or_went(self, sample: zenoh.Sample) -> None:
         """Take note that a liveliness token came or went. A lost engine ends the run; a lost device makes its arm hold."""
         name = str(sample.key_expr).rsplit("/", 1)[1]
         member = self.plan.members.get(name)
-        if sample.kind != zenoh.SampleKind.DELETE or member is None or not member.host.startswith("remote/"):
+        if member is None or not member.host.startswith("remote/"):
+            return
+        if sample.kind != zenoh.SampleKind.DELETE:
+            if member.role == "device":
+                self._intake.relink.repeat(name)
             return
         self._membership.lose(member.host)
         if member.role == "device":
+            self._intake.forget(name)
             log.warning("device '%s' is gone; it may join again", name)
         elif self._account.phase in ("starting", "running", "paused"):
             self._fail(name, "its host is gone")
-
-    def _inlet_callback(self, device: str, port: str) -> Callback[zenoh.Sample]:
-        def take(sample: zenoh.Sample) -> None:
-            try:
-                self._inlets.offer(device, port, sample.payload.to_bytes(), monotonic_ns())
-            except MessageError as error:
-                self._drops.count(sample, error)
-
-        return Callback(take, indirect=False)
 
     def _refused_elsewhere(self, sample: zenoh.Sample) -> None:
         """Count what another host had to drop; it has logged why."""

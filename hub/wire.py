@@ -6,8 +6,9 @@ import json
 import logging
 import struct
 import threading
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from time import monotonic_ns
+from typing import Any, NamedTuple
 
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
@@ -23,18 +24,21 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import VectorCodec, has_vector
 
-__all__ = ["Drops", "PortCodec", "PortPublisher", "PortReceiver", "Tag", "Wire", "open_session"]
+__all__ = ["Drops", "PortCodec", "PortPublisher", "PortReceiver", "Stamp", "Tag", "Wire", "open_session"]
 
 log = logging.getLogger(__name__)
 
 LEASE_MS = 10_000
 """A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
 
-_TAG = struct.Struct("<QIqqHH")
+_TAG = struct.Struct("<QIqqHHq")
+_STAMP = struct.Struct("<QQq")
 
 
-def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> zenoh.Session:
+def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = (), security: Mapping[str, Any] | None = None) -> zenoh.Session:
     """Open a Zenoh session that scouts for nobody: it listens and connects where it is told to.
+
+    `security`: Zenoh's settings of TLS and of access, as `hub.credentials` and `hub.access` make them.
 
     Raises ConnectError if an endpoint cannot be opened or reached.
     """
@@ -48,6 +52,7 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
         "connect/exit_on_failure": True,
         "transport/link/tx/lease": LEASE_MS,
         "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
+        **(security or {}),
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
@@ -59,17 +64,21 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
 
 
 class Tag:
-    """The attachment of every value: run, epoch, step in which it was computed, time it is valid at, index and count of an event batch."""
+    """The attachment of every value.
 
-    __slots__ = ("count", "epoch", "index", "run", "step", "time_ns")
+    Run, epoch, step in which it was computed, time it is valid at, index and count of an event batch, and when it was published (by the
+    monotonic clock of its host).
+    """
 
-    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int) -> None:
-        self.run, self.epoch, self.step, self.time_ns, self.index, self.count = run, epoch, step, time_ns, index, count
+    __slots__ = ("count", "epoch", "index", "run", "sent_ns", "step", "time_ns")
+
+    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int, sent_ns: int) -> None:
+        self.run, self.epoch, self.step, self.time_ns, self.index, self.count, self.sent_ns = run, epoch, step, time_ns, index, count, sent_ns
 
     @staticmethod
     def pack(run: int, epoch: int, step: int, time_ns: int, index: int = 0, count: int = 1) -> bytes:
-        """Return the bytes of a tag."""
-        return _TAG.pack(run, epoch, step, time_ns, index, count)
+        """Return the bytes of a tag of a value that is published now."""
+        return _TAG.pack(run, epoch, step, time_ns, index, count, monotonic_ns())
 
     @classmethod
     def of(cls, sample: zenoh.Sample) -> Tag:
@@ -78,6 +87,29 @@ class Tag:
         if len(raw) != _TAG.size:
             raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {_TAG.size}")
         return cls(*_TAG.unpack(raw))
+
+
+class Stamp(NamedTuple):
+    """The attachment of every sample of a device."""
+
+    admission: int
+    """The hub counts the hosts that it lets join; a device that joined anew begins to count its samples anew."""
+    sequence: int
+    """Counts the samples of one port."""
+    sent_ns: int
+    """When the device had it, by the clock of the device: the monotonic clock of its host, or simulated time."""
+
+    def pack(self) -> bytes:
+        """Return the bytes of a stamp."""
+        return _STAMP.pack(*self)
+
+    @classmethod
+    def of(cls, sample: zenoh.Sample) -> Stamp:
+        """Return the stamp of `sample`; raises MessageError if it has none."""
+        raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(raw) != _STAMP.size:
+            raise MessageError(f"attachment of {len(raw)} bytes, a device's sample has {_STAMP.size}")
+        return cls(*_STAMP.unpack(raw))
 
 
 class Drops:

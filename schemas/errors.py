@@ -4,6 +4,7 @@ TrocarError
 ├── ScenarioError          the scenario cannot be run as written (exit code 2)
 │   └── MissingExtraError  a package that an optional part needs is not installed
 ├── MessageError           bytes or values that are not a valid message
+│   └── LateError          a message that comes after a newer one
 ├── SessionError           the running session ended before its time (exit code 1)
 │   ├── ParticipantError   a participant raised, died or stopped answering
 │   └── StateError         a participant cannot save or restore its state
@@ -21,6 +22,7 @@ from collections.abc import Iterable
 __all__ = [
     "ConnectError",
     "DeviceError",
+    "LateError",
     "MessageError",
     "MissingExtraError",
     "MotionError",
@@ -58,6 +60,10 @@ class MissingExtraError(ScenarioError):
 
 class MessageError(TrocarError):
     """Bytes or values that are not a valid message."""
+
+
+class LateError(MessageError):
+    """A message that comes after a newer one."""
 
 
 class SessionError(TrocarError):

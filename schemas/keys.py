@@ -25,6 +25,7 @@ class Keys:
 
     def __init__(self, session: str) -> None:
         """Take the session's name."""
+        self.session = session
         self.prefix = f"{ROOT}/{session}"
         self.grant = f"{self.prefix}/hub/grant"
         self.status = f"{self.prefix}/hub/status"
@@ -45,9 +46,21 @@ class Keys:
         """Key on which a host tells of messages that it had to drop, under the name of one of its participants."""
         return f"{self.prefix}/{role}/{participant}/refused"
 
+    def device_status(self, device: str) -> str:
+        """Key on which the host of a device tells of it; `*` for all."""
+        return f"{self.prefix}/device/{device}/status"
+
+    def link(self, device: str) -> str:
+        """Key on which the hub says what is to lie between it and a device."""
+        return f"{self.prefix}/hub/link/{device}"
+
     def control(self, verb: str) -> str:
         """Key of a control queryable."""
         return f"{self.prefix}/control/{verb}"
+
+    def join(self, host: str) -> str:
+        """Key on which the host `host` presents itself, of which nobody else may make use; `**` for all."""
+        return self.control(f"join/{host}")
 
     def alive(self, role: str, name: str) -> str:
         """Key of a liveliness token."""

@@ -15,8 +15,10 @@ __all__ = [
     "ContactModel",
     "ContactPlane",
     "CouplingEnergy",
+    "DeviceStatus",
     "Grant",
     "InletSample",
+    "Latency",
     "ParticipantStatus",
     "SessionStatus",
     "SoftBodyState",
@@ -142,6 +144,35 @@ class ParticipantStatus(Message):
     step: Int64
 
 
+class Latency(Message):
+    """How long the messages of one stream took on one part of their way, since the start of the session."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/Latency"
+    way: String
+    """`device to grant`: from when a device had a sample to the communication point at which it entered the simulation; `grant to state`: from a
+    grant to the acknowledgement of all its steps; `state to force`: from when a value was there to when it was written to a device."""
+    stream: String
+    """`device.port`, `source.port -> device.port`, or `all participants`."""
+    count: UInt64
+    p50_s: Float64
+    p99_s: Float64
+    largest_s: Float64
+
+
+class DeviceStatus(Message):
+    """What the host of a device tells of it, once a second."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/DeviceStatus"
+    device: String
+    offset_ns: Int64 = 0
+    """What is added to the monotonic clock of the device's host to have that of the hub."""
+    round_trip_ns: Int64 = -1
+    """Of the exchange that told the offset, which is right within half of it; -1: there was none yet, or the host is the hub's own."""
+    link: String = ""
+    """What lies between device and hub by the scenario, or by what was set since; empty: nothing."""
+    latencies: list[Latency] = Field(default_factory=list[Latency])
+
+
 class SessionStatus(Message):
     """What a session is doing now."""
 
@@ -157,3 +188,5 @@ class SessionStatus(Message):
     dropped_messages: UInt64
     detail: String = ""
     participants: list[ParticipantStatus] = Field(default_factory=list[ParticipantStatus])
+    devices: list[DeviceStatus] = Field(default_factory=list[DeviceStatus])
+    latencies: list[Latency] = Field(default_factory=list[Latency])

@@ -21,8 +21,10 @@ def engine(name: Participant, *, connect: Connect, session: SessionName, directo
 
 
 def device(name: Participant, *, connect: Connect, session: SessionName, directory: Directory = None) -> None:
-    """Host one device of a scenario here, and join a hub elsewhere."""
-    _host(name, connect, session, directory)
+    """Host one device of a scenario here: join a hub elsewhere, wait when it is gone, and join again."""
+    from hub.host_process import run_device
+
+    run_device(connect, session, name, directory=directory)
 
 
 def _host(name: str, endpoint: str, session: str, directory: Path | None) -> None:

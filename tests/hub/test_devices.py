@@ -94,6 +94,9 @@ def test_a_remote_device_may_go_and_come_back(prepare):
     console.start()
     summary = session.run(lambda progress: fresh_steps.append(progress.live["fresh_steps"][0]))
     console.join()
+    with pytest.raises(subprocess.TimeoutExpired):  # it waits for the next session of this name
+        hosts[1].wait(0.5)
+    hosts[1].terminate()
     codes = [host.wait(10) for host in hosts]
     assert outcome == []
     assert codes == [-9, 0]

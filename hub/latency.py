@@ -1,0 +1,70 @@
+"""How long things take: bounded histograms of times, and the three ways of a device's messages through a session."""
+
+from __future__ import annotations
+
+import threading
+
+from schemas.trocar_msgs import Latency
+
+__all__ = ["Histogram", "Latencies"]
+
+_BITS = 5
+"""Each doubling of time has 2^5 bins: a percentile is right within 1/64 of itself (half a bin)."""
+
+
+class Histogram:
+    """Counts of times in bins whose width grows with the time; memory is bounded by the number of bits of a time (64 x 32 bins at most)."""
+
+    def __init__(self) -> None:
+        self._bins: dict[int, int] = {}
+        self.count = 0
+        self.largest_ns = 0
+
+    def add(self, time_ns: int) -> None:
+        """Count one time; below zero (two clocks, one offset) counts as zero."""
+        time_ns = max(time_ns, 0)
+        shift = max(time_ns.bit_length() - _BITS - 1, 0)
+        index = (shift << _BITS) + (time_ns >> shift)
+        self._bins[index] = self._bins.get(index, 0) + 1
+        self.count += 1
+        self.largest_ns = max(self.largest_ns, time_ns)
+
+    def percentile(self, share: float) -> float:
+        """Return the time (ns) below which `share` of all times are: the middle of its bin. Raises ValueError of nothing."""
+        if not self.count:
+            raise ValueError("no percentile of nothing")
+        rank, passed = share * self.count, 0
+        for index in sorted(self._bins):
+            passed += self._bins[index]
+            if passed >= rank:
+                return min(_middle_ns(index), self.largest_ns)
+        return self.largest_ns
+
+
+def _middle_ns(index: int) -> float:
+    shift = max((index >> _BITS) - 1, 0)
+    return ((index - (shift << _BITS)) << shift) + ((1 << shift) - 1) / 2
+
+
+class Latencies:
+    """A histogram for each stream. For use from any thread."""
+
+    def __init__(self) -> None:
+        self._histograms: dict[tuple[str, str], Histogram] = {}
+        self._lock = threading.Lock()
+
+    def add(self, way: str, stream: str, time_ns: int) -> None:
+        """Count one time of a stream on its way: `device to grant`, `grant to state` or `state to force`."""
+        with self._lock:
+            if (way, stream) not in self._histograms:
+                self._histograms[way, stream] = Histogram()
+            self._histograms[way, stream].add(time_ns)
+
+    def messages(self) -> list[Latency]:
+        """Return the percentiles of every stream, by way and name."""
+        with self._lock:
+            found = sorted(self._histograms.items())
+            return [
+                Latency(way=way, stream=stream, count=h.count, p50_s=h.percentile(0.5) / 1e9, p99_s=h.percentile(0.99) / 1e9, largest_s=h.largest_ns / 1e9)
+                for (way, stream), h in found
+            ]
