@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.message import Bool, Message, String
-from schemas.ros import Header
+from schemas.ros import BoolMessage, Header, Pose, Twist, Wrench
 
-__all__ = ["OperatingState", "StringStamped"]
+__all__ = ["CartesianState", "OperatingState", "StringStamped"]
 
 
 class OperatingState(Message):
@@ -26,3 +26,16 @@ class StringStamped(Message):
     ros_type: ClassVar[str] = "crtk_msgs/msg/StringStamped"
     header: Header = Header()
     string: String = ""
+
+
+class CartesianState(Message):
+    """Pose, twist and wrench of a tip in one frame, each stated or not."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianState"
+    header: Header = Header()
+    pose: Pose = Pose()
+    pose_is_valid: BoolMessage = BoolMessage()
+    twist: Twist = Twist()
+    twist_is_valid: BoolMessage = BoolMessage()
+    wrench: Wrench = Wrench()
+    wrench_is_valid: BoolMessage = BoolMessage()

@@ -140,8 +140,10 @@ def test_every_model_has_its_own_ros_type() -> None:
 
 
 def test_crtk_types_are_those_that_crtk_publishes() -> None:
-    """collaborative-robotics/crtk_msgs, msg/OperatingState.msg and msg/StringStamped.msg."""
+    """collaborative-robotics/crtk_msgs, msg/CartesianState.msg, msg/OperatingState.msg and msg/StringStamped.msg."""
+    parts = [("geometry_msgs/Pose", "pose"), ("geometry_msgs/Twist", "twist"), ("geometry_msgs/Wrench", "wrench")]
     published = {
+        "crtk_msgs/msg/CartesianState": "std_msgs/Header header\n" + "".join(f"{type_} {name}\nstd_msgs/Bool {name}_is_valid\n" for type_, name in parts),
         "crtk_msgs/msg/OperatingState": "std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n",
         "crtk_msgs/msg/StringStamped": "std_msgs/Header header\nstring string\n",
     }
