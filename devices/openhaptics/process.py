@@ -85,13 +85,17 @@ class ServoProcess:
             assert self._process.stdin
             self._process.stdin.close()
 
+    def kill(self) -> None:
+        """End it, whatever it does. The force ends with it only as far as the driver sees to that."""
+        self._process.kill()
+
     def close(self) -> None:
         """End it and wait until it is gone."""
         self.end()
         try:
             self._process.wait(_PATIENCE_S)
         except subprocess.TimeoutExpired:
-            self._process.kill()
+            self.kill()
             self._process.wait()
         self._listener.join()
 
