@@ -41,8 +41,9 @@ class HeadState:
     """When this was so, s of the runtime's clock: states of one time are one sample."""
     position: Vector3
     orientation: Quaternion
-    linear: Vector3
-    angular: Vector3
+    linear: Vector3 | None
+    """None where the runtime does not know it, which leaves the twist out."""
+    angular: Vector3 | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +132,8 @@ class Headset(Device):
         self._newest, self._newest_ns = state.time, t
         try:
             pose = pose_sample(self._pose, t, vector(*state.position), quaternion(*state.orientation))
+            if state.linear is None or state.angular is None:
+                return [*self._diagnosis.tell(Level.WARN, "the runtime gives no velocity; look at its own software", runtime.hardware), pose]
             twist = twist_sample(self._twist, t, vector(*state.linear), vector(*state.angular))
         except ValueError as error:  # what is not finite, too
             return self._diagnosis.tell(Level.ERROR, f"the runtime gives no pose: {error}; look at its own software", runtime.hardware)
