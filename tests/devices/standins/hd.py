@@ -21,10 +21,8 @@ ENCODER_RESET, AUTO, INKWELL = 1, 2, 4
 VARIABLE = "TROCAR_STANDIN_HD"
 
 _WHOLE = "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder error error_frames owner force_output updates"
-_TRIPLES, _REST = (
-    ("target", "amplitude"),
-    "frequency turn_amplitude temperature mass stiffness damping max_force max_continuous_force max_stiffness max_damping",
-)
+_TRIPLES = ("target", "amplitude")
+_REST = "frequency turn_amplitude temperature mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
 
 
 class Device(ctypes.Structure):
