@@ -102,7 +102,9 @@ class ContactModelBuilder:
             for plane, normal in zip(self._planes, self._normals, strict=True)
         ]
         felt = (estimate for estimate in (self._tissue, self._rigid) if estimate.known)
-        planes += [self._plane(hand, to_base.T @ surface.normal, surface.depth / scale, gain * surface.stiffness) for surface in felt]
+        planes += [
+            self._plane(hand, to_base.T @ surface.normal, surface.depth / scale, gain * surface.stiffness, friction=surface.friction) for surface in felt
+        ]
         return planes
 
     def _plane(self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float = 0.0, friction: float = 0.0) -> ContactPlane:
