@@ -19,7 +19,7 @@ _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the RCM makes of it."""
 _LEAST_DAMPING = 1e-12
 """Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still moves the tip by a micrometre."""
-_MET = 1e-12
+_MET = 1e-15
 """m; length of the weighted error at which a goal is met: some ten times the rounding error of the forward kinematics."""
 _CORRECTIONS = 4
 """At most, per call; each squares the error, so that two do at the usual speeds."""
@@ -28,7 +28,7 @@ _CORRECTIONS = 4
 def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector) -> Vector:
     """Return joint positions, shape (n,), that meet the goal, or come nearer to it than `q` inside the joint ranges and `largest_move`.
 
-    For each step of a control loop: a goal that moves at the usual speeds is met to 1e-12 m, one out of reach followed to where the weighted error is
+    For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach followed to where the weighted error is
     least; a goal that is met moves nothing, not by rounding either.
 
     Args:

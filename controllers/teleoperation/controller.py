@@ -45,7 +45,7 @@ class Teleoperation(Stepped):
         self._contact = ContactModelBuilder(params.force, params.planes)
         self._memory = np.zeros(n + 18)
         ends = [n, n + 7, n + 14, n + 15, n + 16, n + 17]
-        self._command, self._goal, self._tip, self._scale, self._refused, self._started, self._told = np.split(self._memory, ends)
+        self._command, self._goal, self._tip, self._scale, self._heard, self._started, self._told = np.split(self._memory, ends)
         self._jaw = np.zeros(len(params.tool.jaw_joints))
         self._state = (
             self._memory,
@@ -67,7 +67,8 @@ class Teleoperation(Stepped):
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Start with the arm held where the parameters say."""
         self._stand_at(np.array(self.params.start), np.array([self.params.jaw, 0.0]))
-        self._scale[0], self._told[0] = self.params.scale, -1.0
+        self._scale[0] = self._heard[0] = self.params.scale
+        self._told[0] = -1.0
         self._outputs |= {"contact": ContactModel(header=Header()), "following": _HOLDS, "state": (), "warning": ()}
         return self._outputs
 
@@ -117,11 +118,11 @@ class Teleoperation(Stepped):
 
     def _heed_scale(self, scale: float) -> list[str]:
         """Take the scale; return what is wrong with it, once."""
+        news, self._heard[0] = scale != self._heard[0], scale
         if 0.0 < scale <= 1.0:
-            self._scale[0], self._refused[0] = scale, 0.0
+            self._scale[0] = scale
             return []
-        known, self._refused[0] = self._refused[0] == scale != 0.0, scale
-        return [] if known else [f"scale {scale:g} is refused, allowed are over 0 to 1; it stays {self._scale[0]:g}"]
+        return [f"scale {scale:g} is refused, allowed are over 0 to 1; it stays {self._scale[0]:g}"] if news else []
 
     def _lead(self, inputs: Inputs, to_base: Vector, seconds: float) -> None:
         """Move the command after the hand."""

@@ -17,6 +17,9 @@ from schemas.quantity import Angle, Duration
 
 __all__ = ["Buttons", "TeleoperationParams"]
 
+_FOLDED = (0.0,) * 6
+"""The fingers of a hand, if the arm holds one, which no teleoperation moves."""
+
 
 def _orientation(data: dict[str, Any]) -> str:
     return "follow" if data.get("law") == "velocity" else "hold"
@@ -79,7 +82,7 @@ class TeleoperationParams(Params):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        check_start(self.chain, self.start, self.tool, self.jaw)
+        check_start(self.chain, self.start, self.tool, self.jaw, _FOLDED)
         if self.law == "velocity" and self.orientation == "hold":
             raise ValueError("'law: velocity' turns the tip with the hand; leave out 'orientation: hold', or take 'law: pose'")
         if self.align == "gate" and self.orientation == "hold":

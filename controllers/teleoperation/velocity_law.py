@@ -34,7 +34,7 @@ def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
         twist: of the hand (6,) in its base frame: velocity of its origin, then angular velocity.
         scale: metres of the tip per metre of the hand.
     """
-    to_hand = rotation.matrix(hand).T
+    to_hand = rotation.matrix(hand / np.linalg.norm(hand)).T
     return np.concatenate([scale * (to_hand @ twist[:3]), to_hand @ twist[3:]])
 
 

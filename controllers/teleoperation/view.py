@@ -44,4 +44,5 @@ class View:
         """
         if self._hand_in_camera is None:
             return self._registration
-        return rotation.product(rotation.conjugate(base_in_view[3:]), self._hand_in_camera)
+        orientation = rotation.product(rotation.conjugate(base_in_view[3:]), self._hand_in_camera)
+        return orientation / np.linalg.norm(orientation)

@@ -75,7 +75,7 @@ def test_pursuing_meets_a_moving_goal_at_every_step():
         position = tip[:3, 3] + 2e-5 * i * np.array([0.6, -0.64, 0.48])
         orientation = rotation.product(rotation.exp(1e-3 * i * np.array([0.0, 0.6, 0.8])), rotation.from_matrix(tip))
         q = pursue(CHAIN, q, position, orientation, CHAIN.velocity * 1e-3)
-        assert np.linalg.norm(weighted_error(q, position, orientation)) < 1e-12
+        assert np.linalg.norm(weighted_error(q, position, orientation)) < 1e-14
 
 
 def test_pursuing_is_never_faster_than_told():

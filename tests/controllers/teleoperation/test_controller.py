@@ -1,56 +1,17 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.engagement import Phase
-from controllers.teleoperation.params import TeleoperationParams
-from hub.inputs import Inputs
-from hub.participant import Setup
 from robots import rotation
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
 from schemas.errors import StateError
-from schemas.ros import Joy
 from schemas.vectors import VectorCodec, has_vector
+from tests.controllers.teleoperation.rig import H, Session
 
-H = 1_000_000
 CHAIN = psm.chain(instrument("palpation-probe"))
-
-
-class Session:
-    """A controller with a hand, a clutch and a clock."""
-
-    def __init__(self, **params):
-        self.teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate(params))
-        self.outputs = self.teleoperation.configure(Setup(period_ns=H, directory=Path()))
-        self.hand = np.array([0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0])
-        self.measured = np.array([*psm.HOME, *np.zeros(12)])
-        self.scale = np.array([self.teleoperation.params.scale])
-        values = {port.name: np.array(port.start or ()) for port in self.teleoperation.ports if port.causality == "input"}
-        self.inputs = Inputs(values | {"master": self.hand, "measured_js": self.measured, "scale": self.scale})
-        self.t = 0
-
-    def step(self, *clutch, stale=False, count=1):
-        self.inputs._stale = {"master"} if stale else set()
-        for _ in range(count):
-            self.inputs._events = {"buttons": tuple(Joy(buttons=buttons) for buttons in clutch)}
-            clutch = ()
-            self.outputs = self.teleoperation.step(self.t, H, self.inputs)
-            self.t += H
-        return self.tip
-
-    @property
-    def tip(self):
-        """Position of the tip at the command."""
-        return CHAIN.forward(self.outputs["servo_jp"])[:3, 3].copy()
-
-    @property
-    def turn(self):
-        return CHAIN.forward(self.outputs["servo_jp"])[:3, :3]
 
 
 def test_every_output_fits_its_port_from_the_start():
