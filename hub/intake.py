@@ -54,7 +54,7 @@ class Intake:
         wall = [member for member in members.values() if member.role == "device" and not member.follows_clock]
         spoken = [(m.name, p.name) for m in wall for p in m.ports if p.causality == "output" and self._is_heard(m.name, p.name)]
         self._subscribers = [session.declare_subscriber(self._keys.output("device", *source), self._listener(*source)) for source in spoken]
-        self._subscribers.append(session.declare_subscriber(self._keys.device_status("*"), Callback(self._told, indirect=True)))
+        self._subscribers.append(session.declare_subscriber(self._keys.device_status("*"), Callback(self._told, indirect=False)))
 
     def open(self, directory: Path) -> None:
         """Open the devices of this process, and begin to read those that live in wall time."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 
 from schemas.trocar_msgs import Latency
 
-__all__ = ["Histogram", "Latencies"]
+__all__ = ["Histogram", "Latencies", "by_way"]
 
 _BITS = 5
 """Each doubling of time has 2^5 bins: a percentile is right within 1/64 of itself (half a bin)."""
@@ -68,3 +69,11 @@ class Latencies:
                 Latency(way=way, stream=stream, count=h.count, p50_s=h.percentile(0.5) / 1e9, p99_s=h.percentile(0.99) / 1e9, largest_s=h.largest_ns / 1e9)
                 for (way, stream), h in found
             ]
+
+
+def by_way(latencies: Iterable[Latency]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return latencies as a summary has them: way, stream, and its numbers."""
+    rows: dict[str, dict[str, dict[str, float]]] = {}
+    for one in latencies:
+        rows.setdefault(one.way, {})[one.stream] = {"count": one.count, "p50_s": one.p50_s, "p99_s": one.p99_s, "largest_s": one.largest_s}
+    return rows

@@ -122,7 +122,7 @@ class Link:
         while self._orders:
             order = self._orders.popleft()
             reseeded, self.spec = order.spec.seed != self.spec.seed, order.spec
-            self._outages = [*self.spec.outages, *([Outage(at=now_ns, duration=order.outage_ns)] if order.outage_ns else ())]
+            self._outages = [*self.spec.outages, *([Outage.model_construct(at=now_ns, duration=order.outage_ns)] if order.outage_ns else ())]
             for (causality, name), line in self._lines.items() if reseeded else ():
                 line.chance = self._chance(causality, name)
 

@@ -60,9 +60,9 @@ class Relink:
         name = request.device
         if name not in self._specs:
             raise MessageError(f"there is no device '{name}'.{did_you_mean(name, self._specs)}")
-        said: dict[str, Any] = request.model_dump(exclude={"device", "outage"}, exclude_none=True)
+        said: dict[str, Any] = request.model_dump(mode="json", exclude={"device", "outage"}, exclude_none=True)
         replaced = {"preset": None, "delay": 0} if said.keys() & {"preset", "delay"} else {}
-        self._specs[name] = LinkSpec.model_validate(self._specs[name].model_dump() | replaced | said)
+        self._specs[name] = LinkSpec.model_validate(self._specs[name].model_dump(mode="json") | replaced | said)
         self._order(name, request.outage)
         return LinkReply(device=name, link=self._specs[name])
 

@@ -8,7 +8,7 @@ import math
 import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from time import monotonic, sleep
+from time import monotonic, monotonic_ns, sleep
 
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
@@ -19,6 +19,7 @@ from hub.control import ControlServer, RunState
 from hub.coupling import stable_step_problem
 from hub.endpoint import free_endpoint, require_loopback
 from hub.fleet import Fleet, Watchdog
+from hub.gate import Gate
 from hub.host import Host
 from hub.inlets import Inlets
 from hub.intake import Intake
@@ -61,6 +62,7 @@ class Session:
         directory: Path,
         *,
         endpoint: str | None = None,
+        gate: Gate | None = None,
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
         grants: Iterator[Grant] | None = None,
@@ -68,13 +70,14 @@ class Session:
     ) -> None:
         """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this process.
 
-        `directory`: where relative paths of the scenario start. `grants`: re-simulate these instead of listening to devices.
+        `directory`: where relative paths of the scenario start. `gate`: lets other machines in. `grants`: re-simulate these instead of listening to devices.
         `on_report` sees what every participant reports of every grant.
         """
         self.scenario = scenario
         self.plan = plan
         self.endpoint = require_loopback(endpoint) if endpoint else free_endpoint()
         self.state = RunState()
+        self._gate = gate
         self._participants = participants
         self._directory = directory
         self._record = record
@@ -108,9 +111,11 @@ class Session:
         try:
             with self._interrupt, open_session("router", listen=[self.endpoint]) as session:
                 self._observers = Observers(self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder)
-                self._account = Account(self.scenario, self.plan, self._run_id, self._clock, self._drops, self._observers)
+                self._account = Account(self.scenario, self.plan, self._run_id, self._clock, self._drops, self._observers, self._intake)
                 self._open(session)
                 try:
+                    if self._gate is not None:
+                        self._gate.open(self.endpoint)
                     self._start_and_step(progress)
                     self._account.phase = "done"
                 except SessionError as error:
@@ -275,6 +280,7 @@ class Session:
 
         The reports of the grant before are booked while the others are at work on this one.
         """
+        granted_ns = monotonic_ns()
         if self._away:
             self._grant_publisher.put(pack_permission(grant))
         self._settle()
@@ -291,6 +297,7 @@ class Session:
                 waiting.remove(accepted[0].name)
                 self._reports.append(accepted)
         self._watchdog.wait_for(())
+        self._account.acknowledged(granted_ns)
         count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         self._clock.advance(count)
         self.state.spend(count)
@@ -353,6 +360,8 @@ class Session:
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()
+        if self._gate is not None:
+            self._gate.close()
         self._intake.close()
         self._host.close()
         self._fleet.end()
