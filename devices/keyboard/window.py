@@ -13,7 +13,7 @@ from schemas.errors import DeviceError
 
 __all__ = ["Window"]
 
-_WIDTH, _LINE, _MARGIN = 760, 24, 16
+_WIDTH, _LINE, _MARGIN, _COLUMN = 440, 24, 16, 80
 _INK, _PAPER, _MARK, _FAINT = (230, 230, 230), (30, 34, 40), (90, 200, 120), (120, 124, 130)
 _UNSEEN = {"offscreen", "dummy"}
 """Drivers of SDL that show nothing to anybody."""
@@ -30,7 +30,7 @@ class Window:
             pygame.display.init()
             self._check_seen()
             pygame.font.init()
-            self._surface = pygame.display.set_mode((_WIDTH, 2 * _MARGIN + _LINE * (len(KEYS) + 4)))
+            self._surface = pygame.display.set_mode((_WIDTH, 2 * _MARGIN + _LINE * (len(KEYS) + 3 + len(LAYOUT))))
             pygame.display.set_caption(f"Trocar: {title}")
             self._font = pygame.font.Font(None, _LINE)
             self._gamepad = Gamepad()
@@ -74,12 +74,17 @@ class Window:
 
     def _draw(self) -> None:
         self._surface.fill(_PAPER)
-        told = "heard" if self.focused else "not heard: click into this window"
-        lines = [(f"Keys are {told}", _INK if self.focused else _MARK), ("", _INK)]
-        lines += [(f"{key:<8}{meaning}", _MARK if key in self._pressed else _INK) for key, (meaning, _) in KEYS.items()]
-        for row, (text, colour) in enumerate([*lines, ("", _INK), (LAYOUT, _FAINT)]):
-            self._surface.blit(self._font.render(text, True, colour), (_MARGIN, _MARGIN + row * _LINE))
+        self._write(0, 0, "Keys are heard" if self.focused else "Keys are not heard: click into this window", _INK if self.focused else _MARK)
+        for row, (key, (meaning, _)) in enumerate(KEYS.items(), start=2):
+            colour = _MARK if key in self._pressed else _INK
+            self._write(row, 0, key, colour)
+            self._write(row, _COLUMN, meaning, colour)
+        for row, line in enumerate(LAYOUT, start=len(KEYS) + 3):
+            self._write(row, 0, line, _FAINT)
         pygame.display.flip()
+
+    def _write(self, row: int, column: int, text: str, colour: tuple[int, int, int]) -> None:
+        self._surface.blit(self._font.render(text, True, colour), (_MARGIN + column, _MARGIN + row * _LINE))
 
     def close(self) -> None:
         """Close it."""
