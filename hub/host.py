@@ -167,7 +167,8 @@ class Host:
         for inlet in self.plan.inlets:
             if inlet.target in self._by_name:
                 slot, port = self._by_name[inlet.target], self.plan.members[inlet.target].port(inlet.target_port)
-                self._inlets.setdefault((inlet.device, inlet.device_port), []).append((slot, port.name, PortCodec(port)))
+                codec = PortCodec(port.filled_from(self.plan.members[inlet.device].port(inlet.device_port)))
+                self._inlets.setdefault((inlet.device, inlet.device_port), []).append((slot, port.name, codec))
                 if port.variability == "signal":
                     slot.stale.add(port.name)
         fed = {(link.target, link.target_port) for link in self.plan.links} | {(i.target, i.target_port) for i in self.plan.inlets}
