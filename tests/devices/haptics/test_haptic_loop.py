@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from devices.haptics.contact import ZERO, Plane
 from devices.haptics.limits import TOUCH, Limits
 from devices.haptics.loop import HapticLoop
-from devices.haptics.safety import Condition
+from devices.haptics.safety import Condition, SafetyChain
 from devices.vendor_axes import Vector3
 
 LIMITS = Limits().bounded(TOUCH)
@@ -189,3 +189,31 @@ def test_the_same_ticks_give_the_same_bits() -> None:
     one, other = HapticLoop(LIMITS, passivity=True), HapticLoop(LIMITS, passivity=True)
     planes = [Plane(0.6, 0.0, 0.8, 0.01, 0.02, 300.0, 1.0, 0.4), WALL]
     assert _run(one, 1500, (0.001, 0, -0.002), start=0.0, planes=planes) == _run(other, 1500, (0.001, 0, -0.002), start=0.0, planes=planes)
+
+
+def _engaged() -> SafetyChain:
+    """A chain whose ramp is over, with no force."""
+    chain = SafetyChain(LIMITS)
+    for _ in range(1100):
+        chain.tick(ZERO, STILL, age=0.0, permitted=True, dt=TICK)
+    return chain
+
+
+def _next(chain: SafetyChain, *wanted: float) -> Vector3:
+    return chain.tick((wanted[0], wanted[1], wanted[2]), STILL, age=0.0, permitted=True, dt=TICK)
+
+
+def test_a_force_grows_slowly_and_falls_at_once() -> None:
+    chain = _engaged()
+    grown = [_next(chain, 0, 0, 1.5)[2] for _ in range(16)]
+    assert grown == pytest.approx([min(1.5, 0.1 * (i + 1)) for i in range(16)])
+    assert _next(chain, 0, 0, 0.3) == pytest.approx((0, 0, 0.3))
+
+
+def test_a_force_turns_slowly() -> None:
+    chain = _engaged()
+    for _ in range(16):
+        _next(chain, 0, 0, 1.5)
+    assert _next(chain, 0.05, 0, 1.5) == pytest.approx((0.05, 0, 1.5))
+    assert _next(chain, 1.5, 0, 0) == pytest.approx((0.1, 0, 0), abs=0.05)  # the old direction at once, the new one from there
+    assert _next(chain, -1.5, 0, 0) == pytest.approx((-0.1, 0, 0), abs=0.05)
