@@ -87,7 +87,7 @@ class Teleoperation(Stepped):
             self._lead(inputs, to_base, seconds)
         self._lead_jaw(gripper, seconds)
         self._tell(warnings + self._engagement.warnings)
-        period = self.params.contact_period or h
+        period = max(self.params.contact_period, h)
         if not (t + h) % period:
             self._outputs["contact"] = self._feel(inputs, to_base, Time.from_ns(t + h), period * 1e-9)
         return self._outputs
@@ -161,7 +161,7 @@ class Teleoperation(Stepped):
         """Return what the hand is to feel, `elapsed` seconds after the last time."""
         hand, tip = inputs["master"], self._tip
         if self._law is None:  # as the hand's own frame is the tip's own
-            to_base = rotation.product(tip[3:], rotation.conjugate(hand[3:]))
+            to_base = rotation.product(tip[3:], rotation.conjugate(hand[3:] / np.linalg.norm(hand[3:])))
         planes = self._contact.planes(
             hand[:3],
             tip[:3],

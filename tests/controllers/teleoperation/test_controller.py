@@ -3,11 +3,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.engagement import Phase
+from controllers.teleoperation.params import TeleoperationParams
+from hub.testing import check_engine
 from robots import rotation
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
 from schemas.errors import StateError
+from schemas.ros import Joy
 from schemas.vectors import VectorCodec, has_vector
 from tests.controllers.teleoperation.rig import H, Session
 
@@ -149,22 +153,84 @@ def wander(session, steps, seed):
     random = np.random.default_rng(seed)
     for _ in range(steps):
         session.hand[:3] += random.normal(0.0, 1e-4, 3)
-        clutch = [[[1]], [[0]], [], [], []][random.integers(5)]
+        session.turn_hand(random.normal(0.0, 1e-3, 3))
+        session.twist[:] = random.normal(0.0, 1e-2, 6)
+        session.values["tip_wrench"][:3] = random.normal(0.0, 0.5, 3)
+        clutch = [[[1, 0]], [[0, 1]], [], [], []][random.integers(5)]
         session.step(*clutch, stale=random.random() < 0.1)
     return session
 
 
-@pytest.mark.parametrize("orientation", ["hold", "follow"])
-def test_restore_returns_to_the_same_bits(orientation):
-    session = wander(Session(orientation=orientation), 50, seed=1)
-    saved, hand = session.teleoperation.save(), session.hand.copy()
+PARAMS = {
+    "hold": {"orientation": "hold"},
+    "follow": {"orientation": "follow", "instrument": "400006"},
+    "velocity": {"law": "velocity", "instrument": "400006"},
+    "gate": {"align": "gate", "orientation": "follow", "engage": "held"},
+    "camera": {"view": "camera", "instrument": "MUSHA_HAND", "contact_period": "2 ms"},
+    "table": {"planes": [{"normal": [0, 0, 1], "distance": "-113.6 mm", "stiffness": "200 N/m"}]},
+}
+
+
+@pytest.mark.parametrize("params", PARAMS.values(), ids=PARAMS.keys())
+def test_restore_returns_to_the_same_bits(params):
+    session = wander(Session(**params), 50, seed=1)
+    saved, values = session.teleoperation.save(), {name: value.copy() for name, value in session.values.items()}
     expected = wander(session, 50, seed=2).teleoperation.state_hash()
-    for again in (session, Session(orientation=orientation)):
+    for again in (session, Session(**params)):
         again.teleoperation.restore(saved)
-        again.hand[:] = hand
+        for name, value in values.items():
+            again.values[name][:] = value
         assert wander(again, 50, seed=2).teleoperation.state_hash() == expected
+
+
+@pytest.mark.parametrize("params", PARAMS.values(), ids=PARAMS.keys())
+def test_it_keeps_the_contract_of_a_controller(params):
+    made = TeleoperationParams.model_validate(params)
+    inputs = {
+        "master": [0.1, 0.2, 0.3, 0.0, 0.6, 0.0, 0.8],
+        "master_twist": [0.01, 0.0, -0.01, 0.0, 0.1, 0.0],
+        "tip_wrench": [0.0, 0.1, 0.4, 0.0, 0.0, 0.0],
+        "buttons": (Joy(buttons=[int(made.engage == "held"), 1]),),
+    }
+    check_engine(lambda: Teleoperation("teleop", made), period_ns=2 * H, inputs=inputs)
 
 
 def test_a_state_of_another_size_is_refused():
     with pytest.raises(StateError, match="8 bytes"):
         Session().teleoperation.restore(bytes(8))
+
+
+def test_the_hand_feels_a_plane_of_the_scenario_where_the_tip_meets_it():
+    """The tip starts 0.1 mm above the plane: at scale 0.2 that is 0.5 mm of the hand, along the master's z that points as the arm's does."""
+    session = Session(**PARAMS["table"], scale=0.2, force={"scale": 2.0})
+    session.step()
+    (plane,) = session.outputs["contact"].planes
+    assert (plane.normal.x, plane.normal.y, plane.normal.z) == (0.0, 0.0, 1.0)
+    assert plane.distance == pytest.approx(session.hand[2] - 0.0005, abs=1e-9)
+    assert plane.stiffness == pytest.approx(2.0 * 0.2 * 200.0)
+    before = plane.distance
+    session.hand[:3] += [0.004, 0.0, -0.002]
+    session.step(count=10)
+    assert session.outputs["contact"].planes[0].distance == pytest.approx(before, abs=1e-9)
+    session.step([1])
+    assert session.outputs["contact"].planes == []
+
+
+def test_by_the_velocity_law_the_hand_feels_what_is_ahead_of_the_tip_ahead_of_itself():
+    """The tip points down onto the plane, the hand wherever it likes: the plane is met along the hand's own z."""
+    session = Session(**PARAMS["table"], law="velocity", scale=0.2)
+    session.hand[3:] = rotation.exp(np.array([0.4, 1.0, -0.2]))
+    session.step()
+    (plane,) = session.outputs["contact"].planes
+    ahead = rotation.matrix(session.hand[3:])[:, 2]
+    assert np.allclose([plane.normal.x, plane.normal.y, plane.normal.z], -ahead, atol=1e-12)
+
+
+def test_contact_is_told_at_its_own_period():
+    session = Session(**PARAMS["table"], contact_period="4 ms")
+    stamps = []
+    for _ in range(9):
+        session.step()
+        stamps.append(session.outputs["contact"].header.stamp.ns // H)
+    assert stamps == [0, 0, 0, 4, 4, 4, 4, 8, 8]
+    assert next(port for port in session.teleoperation.ports if port.name == "contact").period_ns == 4 * H
