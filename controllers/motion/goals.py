@@ -10,10 +10,10 @@ import numpy as np
 from robots import rotation
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
-from schemas.ros import JointState, PoseStamped, WrenchStamped
+from schemas.ros import JointState, Pose, Twist, Vector3, Wrench
 from schemas.vectors import Vector
 
-__all__ = ["check_frame", "efforts", "joint_values", "tip_frame", "wrench"]
+__all__ = ["check_frame", "efforts", "frame", "joint_values", "twist", "wrench"]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
@@ -53,25 +53,33 @@ def check_frame(frame_id: str, *allowed: str) -> str:
     return frame_id or allowed[0]
 
 
-def tip_frame(message: PoseStamped) -> Vector:
-    """Return the pose as (4, 4) matrix in the frame of its message."""
-    p, q = message.pose.position, message.pose.orientation
+def frame(pose: Pose) -> Vector:
+    """Return the pose as (4, 4) matrix."""
+    p, q = pose.position, pose.orientation
     position, quaternion = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
     _check_finite(position, "position")
     _check_finite(quaternion, "orientation")
     norm = hypot(*quaternion.tolist())
     if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
         raise MotionError(f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}")
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = rotation.matrix(quaternion / norm), position
-    return frame
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation.matrix(quaternion / norm), position
+    return matrix
 
 
-def wrench(message: WrenchStamped) -> Vector:
+def twist(message: Twist) -> Vector:
+    """Return velocity and angular velocity, shape (6,)."""
+    return _two_vectors(message.linear, message.angular, "twist")
+
+
+def wrench(message: Wrench) -> Vector:
     """Return force and torque, shape (6,)."""
-    f, m = message.wrench.force, message.wrench.torque
-    values = np.array([f.x, f.y, f.z, m.x, m.y, m.z])
-    _check_finite(values, "wrench")
+    return _two_vectors(message.force, message.torque, "wrench")
+
+
+def _two_vectors(a: Vector3, b: Vector3, part: str) -> Vector:
+    values = np.array([a.x, a.y, a.z, b.x, b.y, b.z])
+    _check_finite(values, part)
     return values
 
 
