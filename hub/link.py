@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict
 from schemas.link import LinkSpec, Outage
 from schemas.ports import Port
 
-__all__ = ["Line", "Link", "LinkOrder"]
+__all__ = ["Line", "Link", "LinkOrder", "in_words"]
 
 
 class LinkOrder(BaseModel):
@@ -96,18 +96,6 @@ class Link:
         """Say whether it is clear and nothing is on its way: what is sent now need not be sent over it."""
         return self.clear and all(line.empty for line in self._lines.values())
 
-    @property
-    def description(self) -> str:
-        """What lies between device and hub now, in words; empty: nothing."""
-        spec = self.spec
-        parts = (
-            f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",
-            f"up to {spec.jitter / 1e6:g} ms more" if spec.jitter else "",
-            f"{100 * spec.loss:g} % lost" if spec.loss else "",
-            f"{len(self._outages)} outages" if self._outages else "",
-        )
-        return ", ".join(part for part in parts if part)
-
     def line(self, port: Port) -> Line:
         """Return the line of one of the device's ports: outputs go to the hub, inputs come from there."""
         reliable = port.variability == "event"
@@ -136,3 +124,15 @@ class Link:
 
     def _chance(self, causality: str, port: str) -> random.Random:
         return random.Random(f"{self.spec.seed} {causality} {port}")
+
+
+def in_words(spec: LinkSpec, outage_ns: int = 0) -> str:
+    """Return what lies between a device and the hub; empty: nothing."""
+    parts = (
+        f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",
+        f"up to {spec.jitter / 1e6:g} ms more" if spec.jitter else "",
+        f"{100 * spec.loss:g} % lost" if spec.loss else "",
+        "outages as the scenario says" if spec.outages else "",
+        f"nothing at all for {outage_ns / 1e9:g} s" if outage_ns else "",
+    )
+    return ", ".join(part for part in parts if part)

@@ -8,7 +8,7 @@ from typing import Any
 import zenoh
 from pydantic import BaseModel, ConfigDict, Field
 
-from hub.link import Link, LinkOrder
+from hub.link import Link, LinkOrder, in_words
 from hub.plan import Plan
 from schemas.codec import encode
 from schemas.errors import MessageError, did_you_mean
@@ -41,6 +41,8 @@ class LinkReply(BaseModel):
 
     device: str
     link: LinkSpec
+    description: str
+    """The same in words; empty: nothing."""
 
 
 class Relink:
@@ -64,7 +66,7 @@ class Relink:
         replaced = {"preset": None, "delay": 0} if said.keys() & {"preset", "delay"} else {}
         self._specs[name] = LinkSpec.model_validate(self._specs[name].model_dump(mode="json") | replaced | said)
         self._order(name, request.outage)
-        return LinkReply(device=name, link=self._specs[name])
+        return LinkReply(device=name, link=self._specs[name], description=in_words(self._specs[name], outage_ns=request.outage))
 
     def repeat(self, device: str) -> None:
         """Tell the host of a device that has joined anew how its link was changed before."""

@@ -13,7 +13,7 @@ from hub.cells import INITIAL
 from hub.clock_offset import ClockOffset
 from hub.device_loop import DeviceLoop
 from hub.latency import Latencies
-from hub.link import Line, Link, LinkOrder
+from hub.link import Line, Link, LinkOrder, in_words
 from hub.participant import Sample, Value
 from hub.plan import Member, Outlet, Plan
 from hub.wire import Drops, PortCodec, Stamp, Tag
@@ -87,7 +87,7 @@ class DeviceUplink:
         best = None if self._offset is None else self._offset.best(now_ns)
         offset_ns, round_trip_ns = (0, -1) if best is None else (best.offset_ns, best.round_trip_ns)
         latencies = self._latencies.messages()
-        return DeviceStatus(device=self._member.name, offset_ns=offset_ns, round_trip_ns=round_trip_ns, link=self._link.description, latencies=latencies)
+        return DeviceStatus(device=self._member.name, offset_ns=offset_ns, round_trip_ns=round_trip_ns, link=in_words(self._link.spec), latencies=latencies)
 
     def _relink(self, sample: zenoh.Sample) -> None:
         try:

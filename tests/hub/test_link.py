@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from hub.link import Link, LinkOrder
+from hub.link import Link, LinkOrder, in_words
 from schemas.link import PRESETS, LinkSpec
 from tests.hub.parts import into, out
 
@@ -84,7 +84,11 @@ def test_a_link_can_be_changed_while_messages_are_on_their_way():
     assert not link.clear
     assert not link.idle
     assert list(line.arrived(200 * MS)) == [(12 * MS, "after the outage"), (101 * MS, "slow")]
-    assert link.description == "1 outages"
+
+
+def test_a_link_in_words():
+    assert in_words(LinkSpec()) == ""
+    assert in_words(LinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9) == "70 ms each way, up to 2 ms more, 1 % lost, nothing at all for 3 s"
 
 
 def test_overlapping_outages_are_one():
