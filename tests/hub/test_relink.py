@@ -137,7 +137,7 @@ def test_on_the_command_line(prepare, monkeypatch, capfd):
     during(session, act)
     as_json, outage, wrong, listed, shown = seen
     assert json.loads(as_json[1])["link"]["preset"] == "300000000 ns"
-    assert "from now on: 300 ms each way, up to 1 ms more, nothing at all for 3 s" in outage[2]
+    assert "from now on: 300 ms each way, up to 1 ms more, nothing at all for 3 s" in " ".join(outage[2].split())
     assert wrong[0] == 2
     assert "150 ms is no preset" in wrong[2]
     (row,) = json.loads(listed[1])
