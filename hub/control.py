@@ -80,10 +80,12 @@ class ClockReply(_Json):
 class JoinReply(_Json):
     """All that a host needs to make its participants."""
 
+    session: str
     run: int
     admission: int
     """Counts the hosts that were let in: a device's samples carry it, so that those of a host before it are known."""
     plan: Plan
+    """For another machine, the part of it that concerns the host."""
     params: dict[str, dict[str, Any]]
     directory: str
     watched: list[tuple[str, str]]
@@ -238,4 +240,4 @@ def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[
                 raise MessageError(Refusal.model_validate_json(text).refused) from None
             except ValidationError as error:
                 raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
-    raise ConnectError(f"nobody answers on {key}: is the hub running, and is the session's name right?")
+    raise ConnectError(f"nobody answers on {key}: is the hub running, and does its session have what this names?")

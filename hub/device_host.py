@@ -38,7 +38,10 @@ class DeviceHost:
     """Keeps one device open, and takes part with it in whatever run of its session there is."""
 
     def __init__(self, name: str, connect: Callable[[], zenoh.Session], keys: Keys, request: JoinRequest, directory: Path | None) -> None:
-        """Take the device's name, what opens a Zenoh session with the hub, and where relative paths start (None: where the hub has them)."""
+        """Take the device's name, what opens a Zenoh session with the hub, and where relative paths start (None: where the hub has them).
+
+        `keys`: of the session to join, or of `*` for whatever the hub has.
+        """
         self._name, self._connect, self._keys, self._request, self._directory = name, connect, keys, request, directory
         self._loop: DeviceLoop | None = None
         self._held: tuple[Any, ...] = ()
@@ -73,7 +76,7 @@ class DeviceHost:
 
     def _take_part(self, session: zenoh.Session, reply: JoinReply) -> None:
         """Go along with a run until it is over."""
-        keys, member = self._keys, reply.plan.members[self._name]
+        keys, member = Keys(reply.session), reply.plan.members[self._name]
         self._over.clear()
         run = Run(reply.plan, keys, reply.run, reply.admission)
         with ExitStack() as stack:

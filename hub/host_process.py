@@ -28,9 +28,10 @@ from hub.interrupt import Interrupt
 from hub.lane import may_spin
 from hub.participant import Device, Stepped
 from hub.plan import Member
+from hub.reach import reach
 from hub.registry import make
 from hub.uplink import DeviceUplink, Run
-from hub.wire import Drops, Wire, open_session
+from hub.wire import Drops, Wire
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.keys import Keys
@@ -46,17 +47,18 @@ _PATIENCE_S = 2.0
 """How long a participant may go on computing after the hub is gone, before the process is ended under it."""
 
 
-def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | None = None) -> None:
-    """Join session `session_name` over `endpoint` and run host `host` until the hub ends.
+def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | None = None, certificates: Path | None = None) -> None:
+    """Join session `session_name` (`*`: whatever there is) over `endpoint` and run host `host` until the hub ends.
 
     A participant with `host: remote` is a host of its own, called `remote/<participant>`. Relative paths of the scenario
-    start at `directory`, by default where the hub has them.
+    start at `directory`, by default where the hub has them. `certificates`: as `hub.reach.reach` has it.
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
-    keys, request = Keys(session_name), JoinRequest(host=host, pid=os.getpid())
-    with open_session("peer", listen=["tcp/127.0.0.1:0"], connect=[endpoint]) as session:
-        reply = ask(session, keys.join(host), request, JoinReply, timeout_s=10.0)
+    request = JoinRequest(host=host, pid=os.getpid())
+    with reach(endpoint, host.removeprefix("remote/"), certificates, mode="peer") as session:
+        reply = ask(session, Keys(session_name).join(host), request, JoinReply, timeout_s=10.0)
+        keys = Keys(reply.session)
         with _ending_with_hub(session, keys):
             joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory))
             try:
@@ -65,13 +67,14 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
                 joined.close()
 
 
-def run_device(endpoint: str, session_name: str, name: str, *, directory: Path | None = None) -> None:
-    """Join session `session_name` over `endpoint` with the device `name`, and whatever run of it comes after, until Ctrl-C or SIGTERM.
+def run_device(endpoint: str, session_name: str, name: str, *, directory: Path | None = None, certificates: Path | None = None) -> None:
+    """Join session `session_name` (`*`: whatever there is) over `endpoint` with the device `name`, and whatever comes after it, until Ctrl-C or SIGTERM.
 
-    Raises ConnectError if there is no such hub to begin with, MessageError if it has no place for the device, and ParticipantError if the device fails.
+    `directory` and `certificates` are as for `run_host`. Raises ConnectError if there is no such hub to begin with, MessageError if it has no place for
+    the device, and ParticipantError if the device fails.
     """
     request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
-    host = DeviceHost(name, lambda: open_session("client", connect=[endpoint]), Keys(session_name), request, directory)
+    host = DeviceHost(name, lambda: reach(endpoint, name, certificates), Keys(session_name), request, directory)
     with Interrupt(), contextlib.suppress(KeyboardInterrupt):
         host.serve()
 

@@ -74,7 +74,16 @@ class Membership:
         if request.ready or request.failed:
             return Empty()
         params = {name: self._scenario.participants[name].params for name in names}
-        return JoinReply(run=self._run, admission=self._admissions, plan=self._plan, params=params, directory=str(self._directory), watched=self._watched)
+        far = request.host.startswith("remote/")
+        return JoinReply(
+            session=self._scenario.name,
+            run=self._run,
+            admission=self._admissions,
+            plan=self._plan.seen_from(request.host) if far else self._plan,
+            params=params,
+            directory=str(self._directory),
+            watched=[output for output in self._watched if output[0] in names],
+        )
 
     def lose(self, host: str) -> None:
         """Forget a host, so that it may join again."""

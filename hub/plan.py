@@ -128,6 +128,25 @@ class Plan(_Part):
         written = {link.target for link in self.links}
         return tuple(m for m in self.members.values() if m.follows_clock and (m.name in written or m.link is not None))
 
+    def seen_from(self, host: str) -> Plan:
+        """Return what another machine needs to know that runs host `host`: its participants, and of the others the ports they share a connection with."""
+        own = {name for name, member in self.members.items() if member.host == host}
+        links = tuple(k for k in self.links if {k.source, k.target} & own)
+        inlets = tuple(k for k in self.inlets if {k.device, k.target} & own)
+        outlets = tuple(k for k in self.outlets if {k.source, k.device} & own)
+        ends = {(k.source, k.source_port) for k in (*links, *outlets)} | {(k.target, k.target_port) for k in (*links, *inlets)}
+        ends |= {(k.device, k.device_port) for k in (*inlets, *outlets)}
+        shared: dict[str, Member] = {}
+        for name, member in self.members.items():
+            ports = tuple(port for port in member.ports if (name, port.name) in ends)
+            if name in own:
+                shared[name] = member
+            elif ports:
+                shared[name] = member.model_copy(update={"ports": ports, "bonds": (), "bond_plans": {}})
+        bonds = tuple(b for b in self.bonds if {b.bond.motion.participant, b.bond.force.participant} & own)
+        order = tuple(name for name in self.order if name in shared)
+        return Plan(step_ns=self.step_ns, order=order, members=shared, links=links, inlets=inlets, outlets=outlets, bonds=bonds)
+
     def hosts(self) -> tuple[str, ...]:
         """Return the names of all hosts, the hub's own first."""
         names = {member.host for member in self.members.values()} - {"hub"}

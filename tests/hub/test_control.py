@@ -130,7 +130,7 @@ def test_strangers_may_not_join(steer):
     with steer() as (console, _):
         for host, message in (("nowhere", "has no host 'nowhere'; it has other"), ("hub", "no host 'hub'"), ("other", "is here already, as process")):
             with pytest.raises(MessageError, match=message):
-                console.ask("join", JoinRequest(host=host, pid=1), JoinReply)
+                console.ask(f"join/{host}", JoinRequest(host=host, pid=1), JoinReply)
 
 
 def test_status_says_who_lives_where(steer):

@@ -1,0 +1,55 @@
+"""The process of a gate: `python -P -m hub.gate_process`; what it is to do it reads from its input, and it ends when that ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from typing import Any, TextIO
+
+import zenoh
+
+from hub.gate import OPEN
+from hub.gate_log import LISTENED_TO, GateLog
+from hub.wire import open_session
+from schemas.errors import ConnectError
+
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Keep a gate open until the end of the input; exit code 1 if it cannot be opened."""
+    orders: dict[str, Any] = json.loads(sys.stdin.readline())
+    answers, zenohs_log = _parted_outputs()
+    os.environ["RUST_LOG"] = LISTENED_TO
+    zenoh.init_log_from_env_or("error")
+    security = orders["security"]
+    try:
+        session = open_session("router", listen=orders["listen"], connect=orders["connect"], security=security)
+    except ConnectError as error:
+        answers.write(f"{error}\n")
+        sys.exit(1)
+    answers.write(f"{OPEN}\n")
+    known = [name for subject in security["access_control"]["subjects"] for name in subject.get("cert_common_names", ())]
+    threading.Thread(target=_tell, args=(zenohs_log, GateLog(known), answers), name="log", daemon=True).start()
+    with session:
+        sys.stdin.read()
+
+
+def _parted_outputs() -> tuple[TextIO, TextIO]:
+    """Return the output of this process to write to, and to read what Zenoh believes to write to it: its log always goes there."""
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
+    reading, writing = os.pipe()
+    os.dup2(writing, sys.stdout.fileno())
+    return answers, os.fdopen(reading, encoding="utf-8", errors="replace")
+
+
+def _tell(zenohs_log: TextIO, gate_log: GateLog, answers: TextIO) -> None:
+    for line in zenohs_log:
+        for level, message in gate_log.read(line):
+            answers.write(f"{level} {message}\n")
+
+
+if __name__ == "__main__":
+    main()
