@@ -40,6 +40,10 @@ def measured(seconds: float, planes: int, folder: Path) -> None:
             device.target[1] = 0.01
         start = monotonic()
         sleep(seconds)
+        for device in world.devices:
+            device.amplitude[:] = 0.0, 0.0, 0.0
+            device.target[1] = -0.005
+        sleep(1.0)  # at rest, with force on the hand
     finally:
         host.kill()
         killed = monotonic()
@@ -63,7 +67,7 @@ def force(run: np.ndarray, after: np.ndarray, killed: float) -> str:
     size = np.linalg.norm(np.vstack([run, after])[:, hd.Row.FORCE], axis=1)
     pushing = after[np.linalg.norm(after[:, hd.Row.FORCE], axis=1) > 0.0]
     until = (pushing[-1, hd.Row.TIME] - killed) * 1e3 if len(pushing) else 0.0
-    return f"force up to {size.max():.2f} N, largest step up {np.diff(size).max():.3f} N, zero {until:.0f} ms after the host was killed"
+    return f"force up to {size.max():.2f} N, largest step up {np.diff(size).max():.3f} N, of {size[len(run) - 1]:.2f} N zero {until:.0f} ms after the host was killed"
 
 
 def main() -> None:

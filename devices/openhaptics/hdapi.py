@@ -47,8 +47,8 @@ PLACEHOLDER_MM = (0.0, -110.0, -35.0)
 """Position, with joint angles of exactly 0, that a Touch gives to a process that does not own it (hopezzzz/3dtouch, README)."""
 
 
-class Get(IntEnum):
-    """Parameters of hdGet...v and hdSet...v (HD/hdDefines.h)."""
+class Get:
+    """Parameters of hdGet...v and hdSet...v (HD/hdDefines.h). Plain numbers: members of an enumeration cost a servo callback a microsecond each."""
 
     BUTTONS = 0x2000
     SAFETY_SWITCH = 0x2001
@@ -116,6 +116,11 @@ class Code(IntEnum):
     def is_fault(code: int) -> bool:
         """Whether the device has failed, and its use must end."""
         return code & 0xF00 == 0x300
+
+    @staticmethod
+    def is_busy(code: int) -> bool:
+        """Whether another program has the device."""
+        return code in (Code.TIMER_ERROR, Code.DEVICE_ALREADY_INITIATED)
 
     @staticmethod
     def text(code: int) -> str:

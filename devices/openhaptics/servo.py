@@ -54,8 +54,9 @@ class Servo:
         self._hd, self._styluses = hd, styluses
         self._by_handle = {stylus.handle: [stylus] for stylus in styluses}
         self._ending, self._ended = False, threading.Event()
-        self._callback = SERVO_CALLBACK(self._tick)
+        self._callback = SERVO_CALLBACK(self._call)
         self._schedule = 0
+        self._known = False
         self.failure = ""
         """What the callback raised."""
 
@@ -66,9 +67,11 @@ class Servo:
         self._hd.hdStartScheduler()
 
     def stop(self) -> None:
-        """Give the hands a last frame without force, and the devices back."""
+        """Give the hands a last frame without force, and the devices back; nothing if it was not started."""
         hd = self._hd
         self._ending = True
+        if not self._schedule:
+            return
         self._ended.wait(_LAST_FRAME_S)
         hd.hdStopScheduler()
         hd.hdUnschedule(self._schedule)
@@ -77,8 +80,8 @@ class Servo:
             hd.hdDisable(FORCE_OUTPUT)
             hd.hdDisableDevice(stylus.handle)  # crashes with FireWire devices (sawSensablePhantom): so it is the last that this process does
 
-    def _tick(self, _: object) -> int:
-        now = perf_counter()
+    def tick(self, now: float) -> int:
+        """Do the frames of all devices at `now` (s); return what HDAPI wants to know: whether to go on."""
         try:
             if self._ending:
                 return self._end(now)
@@ -96,6 +99,12 @@ class Servo:
                 stylus.phase = Phase.FAULT
             return self._end(now)
         return CALLBACK_CONTINUE
+
+    def _call(self, _: object) -> int:
+        if not self._known:
+            ctypes.pythonapi.PyGILState_Ensure()  # never released: else Python makes and unmakes its state of this thread at every tick
+            self._known = True
+        return self.tick(perf_counter())
 
     def _end(self, now: float) -> int:
         for stylus in self._styluses:
@@ -124,7 +133,7 @@ def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview) -> Iterato
         yield spec.name, stylus
 
 
-def _number(hd: Hdapi, what: Get) -> float:
+def _number(hd: Hdapi, what: int) -> float:
     value = c_double()
     hd.hdGetDoublev(what, value)
     return value.value

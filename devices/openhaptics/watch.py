@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from devices.openhaptics.exchange import State
+from devices.openhaptics.hdapi import Code
 from devices.openhaptics.probe import Probe
 from devices.openhaptics.process import ServoProcess
 from devices.openhaptics.stylus import Phase, Spec
@@ -127,7 +128,8 @@ class Watch:
 
     def _hear(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
         if "absent" in message:
-            self._lose(message["stylus"], Phase.ABSENT, message["absent"], "", now)
+            code = message["absent"]
+            self._lose(message["stylus"], Phase.BUSY if Code.is_busy(code) else Phase.ABSENT, code, "", now)
             if self.lost.keys() >= set(process.names):
                 self._end(process, now)
         elif "stylus" in message:
