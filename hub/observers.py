@@ -89,7 +89,7 @@ class Observers:
     def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
         """Take an output value of a participant in this process, or one that came here by a lane."""
         if (member.name, port.name) in self.measures.by_port and step > INITIAL:
-            self.measures.take(member.name, port.name, value)
+            self.measures.take(member.name, port.name, value, time_ns)
         if self._recorder is not None:
             watched = self._watched[self._keys.output(member.key_role, member.name, port.name)]
             for item in value if watched.codec.is_event else (value,):
@@ -114,7 +114,7 @@ class Observers:
             return
         watched.newest = (tag.step, tag.index)
         if tag.step > INITIAL and not watched.codec.is_event:
-            self.measures.take(watched.member.name, watched.port.name, value)
+            self.measures.take(watched.member.name, watched.port.name, value, tag.time_ns)
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
@@ -129,7 +129,7 @@ class Observers:
         if measured or not enters:
             value = watched.codec.accept(payload)
             if measured:
-                self.measures.take(device, port, value)
+                self.measures.take(device, port, value, time_ns)
         if self._recorder is not None and not enters:
             self._recorder.write(watched.channel, time_ns, payload)
 

@@ -128,10 +128,12 @@ class Bond(_Part):
 class Measure(_Part):
     """A number for the summary, from the values of one output port: `participant.port` or `participant.port.field`."""
 
-    kind: Literal["peak-norm", "peak", "mean", "final", "drop", "time-above"] = Field(
-        description="drop: the largest fall after the peak; time-above: the longest time (s) at `level` or above; of several numbers the norm is taken"
+    kind: Literal["peak-norm", "peak", "least", "mean", "final", "drop", "swing", "time-above"] = Field(
+        description="drop: the largest fall after the peak; swing: from the least to the largest, of several numbers that of the one that varies most;"
+        " time-above: the longest time (s) at `level` or above; for all else of several numbers the norm is taken"
     )
     of: Endpoint
+    after: Duration = Field(default=0, ge=0, description="simulated time before which values do not count")
     level: float | None = Field(default=None, description="for time-above, in the unit of the port")
     unit: str = ""
     live: bool = Field(default=False, description="show the present value in the progress line")
