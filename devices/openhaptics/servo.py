@@ -84,7 +84,9 @@ class Servo:
         """Do the frames of all devices at `now` (s); return what HDAPI wants to know: whether to go on."""
         try:
             if self._ending:
-                return self._end(now)
+                self._release(now)
+                self._ended.set()
+                return CALLBACK_DONE
             for stylus in self._styluses:
                 stylus.frame(now)
             for code, handle in errors(self._hd):
@@ -97,7 +99,8 @@ class Servo:
             self.failure = f"{type(error).__name__}: {error}"
             for stylus in self._styluses:
                 stylus.phase = Phase.FAULT
-            return self._end(now)
+            self._release(now)  # those that have had their frame of this tick get theirs at the next one
+            self._ending = True
         return CALLBACK_CONTINUE
 
     def _call(self, _: object) -> int:
@@ -106,13 +109,11 @@ class Servo:
             self._known = True
         return self.tick(perf_counter())
 
-    def _end(self, now: float) -> int:
+    def _release(self, now: float) -> None:
         for stylus in self._styluses:
             with contextlib.suppress(Exception):  # one that fails here must not keep the others from their last frame
                 stylus.release()
                 stylus.tell(now)
-        self._ended.set()
-        return CALLBACK_DONE
 
 
 def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview) -> Iterator[tuple[str, Stylus]]:

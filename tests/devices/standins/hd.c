@@ -40,7 +40,8 @@ typedef struct {
     int64_t error_frames;
     int64_t owner; /* process that has the device */
     int64_t force_output;
-    int64_t updates; /* calls of hdUpdateCalibration that were granted */
+    int64_t updates, last_style; /* calls of hdUpdateCalibration that were granted */
+    double motors[3];            /* force that the hand gets, N */
     double target[3], amplitude[3], frequency, turn_amplitude, temperature;
     double mass, stiffness, damping; /* of the hand */
     double max_force, max_continuous_force, max_stiffness, max_damping; /* N, N, N/mm, N s/mm */
@@ -178,6 +179,7 @@ void hdEndFrame(HHD handle) {
         memset(h->set, 0, sizeof h->set);
     }
     memcpy(h->out, h->set, sizeof h->out);
+    for (int i = 0; i < 3; i++) d->motors[i] = d->force_output ? h->out[i] : 0;
     if (!d->plugged) push(0x0302, handle);
     else if (!owns(d) && !d->silent) push(0x0304, handle);
     if (d->error_frames > 0) d->error_frames--, push((HDerror)d->error, handle);
@@ -280,7 +282,7 @@ void hdUpdateCalibration(HDenum style) {
     if (!opened(current)) return;
     Device *d = &world->device[current];
     if (!(style & (HDenum)d->styles) || d->calibration != NEEDS_UPDATE) push(0x0102, current);
-    else d->calibration = OK, d->updates++;
+    else d->calibration = OK, d->updates++, d->last_style = style;
 }
 
 void hdSetSchedulerRate(HDulong hertz) {

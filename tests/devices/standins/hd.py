@@ -20,8 +20,9 @@ NEEDS_UPDATE, NEEDS_MANUAL_INPUT = 0x5001, 0x5002
 ENCODER_RESET, AUTO, INKWELL = 1, 2, 4
 VARIABLE = "TROCAR_STANDIN_HD"
 
-_WHOLE = "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder error error_frames owner force_output updates"
-_TRIPLES = ("target", "amplitude")
+_ORDERS = "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder error error_frames"
+_WHOLE = f"{_ORDERS} owner force_output updates last_style"
+_TRIPLES = ("motors", "target", "amplitude")
 _REST = "frequency turn_amplitude temperature mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
 
 
@@ -58,11 +59,16 @@ class HdWorld:
             stream.truncate(size)
         with file.open("r+b") as stream:
             self._memory = mmap.mmap(stream.fileno(), size)
-        hd.standin_make(ctypes.addressof(c_char.from_buffer(self._memory)))
+        self.address = ctypes.addressof(c_char.from_buffer(self._memory))
+        hd.standin_make(self.address)
         self._logged = c_int64.from_buffer(self._memory)
         self.devices: Any = (Device * 2).from_buffer(self._memory, 8)
         self._rows = np.frombuffer(self._memory, np.float64, offset=8 + ctypes.sizeof(self.devices)).reshape(-1, 12)
         assert self.devices[1].name == b"left", "hd.c and hd.py differ"
+
+    def motors(self, device: int) -> tuple[float, float, float]:
+        """Return the force (N) on a hand, as of its last frame, in HDAPI's axes."""
+        return tuple(self.devices[device].motors)
 
     def rows(self, device: int = 0, since: float = 0.0) -> NDArray[np.float64]:
         """Return the log of one device from `since` (s of CLOCK_MONOTONIC) on, shape (n, 12); columns as in Row."""
