@@ -57,7 +57,7 @@ class VectorCodec:
         self.port = port
         self.model = message_type(port.type)
         self.fields: dict[str, slice] = {}
-        """Position of each block in the vector, by its full path and by its last word."""
+        """Position of each block in the vector, and of each number with a name, by its full path and by the block's last word: `position`, `position.z`."""
         self._blocks = list(self._layout())
         self.size: int = self._blocks[-1][2].stop
         self.neutral = np.zeros(self.size)
@@ -75,7 +75,9 @@ class VectorCodec:
             rows = tuple((path, names, len(names) or port.size) for path, names in _LAYOUTS[port.type])
         for path, names, count in rows:
             block = slice(at, at + count)
-            self.fields[path] = self.fields[path.rpartition(".")[2]] = block
+            for field in (path, path.rpartition(".")[2]):
+                self.fields[field] = block
+                self.fields |= {f"{field}.{name}": slice(i, i + 1) for i, name in enumerate(names, at)}
             yield path, names, block
             at += count
 
