@@ -17,6 +17,8 @@ __all__ = ["pursue"]
 
 _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the RCM makes of it."""
+_LITTLE = 1e-4
+"""The same for an arm of fewer than six joints, which cannot have both: position first. What orientation then costs of it is some nanometres."""
 _LEAST_DAMPING = 1e-12
 """Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still moves the tip by a micrometre."""
 _MET = 1e-15
@@ -29,7 +31,7 @@ def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector,
     """Return joint positions, shape (n,), that meet the goal, or come nearer to it than `q` inside the joint ranges and `largest_move`.
 
     For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach followed to where the weighted error is
-    least; a goal that is met moves nothing, not by rounding either.
+    least; a goal that is met moves nothing, not by rounding either. An arm of fewer than six joints meets the position and turns as well as it can.
 
     Args:
         chain: the kinematics.
@@ -38,13 +40,13 @@ def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector,
         orientation: goal of the tip in the base frame, quaternion (x, y, z, w).
         largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays straight.
     """
-    found = q
+    found, length = q, _LENGTH if len(q) >= 6 else _LITTLE
     for _ in range(_CORRECTIONS):
         frames = chain.frames(found)
-        error = _error(frames[-1], position, orientation)
+        error = _error(frames[-1], position, orientation, length)
         if error.dot(error) < _MET**2:
             break
-        move = found + _correction(chain, found, frames, error) - q
+        move = found + _correction(chain, found, frames, error, length) - q
         share = float(np.abs(move / largest_move).max())
         found = q + move / max(1.0, share)
         if share >= 1.0:
@@ -52,18 +54,18 @@ def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector,
     return found
 
 
-def _error(tip: Vector, position: Vector, orientation: Vector) -> Vector:
+def _error(tip: Vector, position: Vector, orientation: Vector, length: float) -> Vector:
     """Return what is left to the goal from the pose `tip`, shape (4, 4): way, then turn as a rotation vector in metres, shape (6,)."""
     error = np.empty(6)
     error[:3] = position - tip[:3, 3]
-    error[3:] = _LENGTH * rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
+    error[3:] = length * rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
     return error
 
 
-def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector) -> Vector:
+def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector, length: float) -> Vector:
     """Return a move, shape (n,), that stays inside the joint ranges: joints that would leave theirs go to its end, and the others make the best of it."""
     jacobian = chain.jacobian(frames)
-    jacobian[3:] *= _LENGTH
+    jacobian[3:] *= length
     normal = jacobian.T @ jacobian
     normal.reshape(-1)[:: len(q) + 1] += 0.5 * error.dot(error) + _LEAST_DAMPING
     gradient = jacobian.T @ error

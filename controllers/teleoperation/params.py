@@ -85,6 +85,10 @@ class TeleoperationParams(Params):
         check_start(self.chain, self.start, self.tool, self.jaw, _FOLDED)
         if self.law == "velocity" and self.orientation == "hold":
             raise ValueError("'law: velocity' turns the tip with the hand; leave out 'orientation: hold', or take 'law: pose'")
+        if self.law == "velocity" and len(self.chain.joints) < 6:
+            raise ValueError(
+                f"'law: velocity' inverts the Jacobian, but with '{self.instrument}' the arm has {len(self.chain.joints)} joints; take 'law: pose'"
+            )
         if self.align == "gate" and self.orientation == "hold":
             raise ValueError("'align: gate' compares orientations, which 'orientation: hold' leaves apart; set 'orientation: follow'")
         return self

@@ -187,6 +187,7 @@ def test_whoever_waits_is_told_every_two_seconds_what_to_do():
     [
         ({"align": "gate"}, "orientation: follow"),
         ({"law": "velocity", "orientation": "hold"}, "law: pose"),
+        ({"law": "velocity", "instrument": "MUSHA_HAND"}, "4 joints"),
         ({"instrument": "400007x"}, "no instrument"),
         ({"start": [9, 0, 0, 0, 0, 0]}, "yaw"),
         ({"jaw": "20 deg"}, "no jaw"),

@@ -61,18 +61,18 @@ def test_near_a_singularity_the_damped_joints_stay_slow_and_err_by_little(q, lin
 @pytest.mark.parametrize("axis", range(6))
 def test_what_a_limit_cuts_is_not_made_up_for(axis):
     """Into a limit and back: the arm leaves it in the first step in which the hand turns round."""
-    session = Session(law="velocity", instrument="400006", scale=1.0)
+    session = Session(law="velocity", instrument="400006", scale=1.0, start=[1.3, 0.8, 0.22, 4.0, 1.0, 1.0])
     session.twist[axis] = 0.3 if axis < 3 else 2.0
     session.hand[3:] = rotation.from_matrix(CHAIN.forward(np.array(session.params.start)))
-    for _ in range(2500):
+    blocked = 0
+    while blocked < 100:
         before = session.command
         session.step()
         session.hand[3:] = session.outputs["goal_cp"][3:]
         assert (session.command >= CHAIN.lower).all()
         assert (session.command <= CHAIN.upper).all()
         assert (np.abs(session.command - before) <= CHAIN.velocity * STEP * (1 + 1e-9)).all()
-    at_limit = (session.command <= CHAIN.lower) | (session.command >= CHAIN.upper)
-    assert at_limit.any()
+        blocked += bool(((session.command <= CHAIN.lower) | (session.command >= CHAIN.upper)).any())
     session.twist[:] *= -0.01
     before, start = session.command, CHAIN.forward(session.command)
     session.step()
