@@ -75,15 +75,14 @@ class CartesianCommands:
         frame = self._from(message.header.frame_id)
         if pushed and (posed or moved):
             raise MotionError("a wrench beside a pose or a twist, allowed is one or the other: the drives apply efforts or hold positions")
-        if posed or moved:
-            velocity = self._joint_velocity(turned(frame[:3, :3], goals.twist(message.twist))) if moved else None
-            if posed:
-                self._drives.follow(self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity)
-            elif velocity is not None:
-                self._drives.drift(velocity)
+        velocity = self._joint_velocity(turned(frame[:3, :3], goals.twist(message.twist))) if moved else None
+        if posed:
+            self._drives.follow(self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity)
+        elif velocity is not None:
+            self._drives.drift(velocity)
         else:
-            wrench = turned(self._base.pose[:3, :3] @ frame[:3, :3], goals.wrench(message.wrench)) if pushed else np.zeros(6)
-            self._drives.press(wrench, WrenchFrame.REFERENCE)
+            wrench = goals.wrench(message.wrench) if pushed else np.zeros(6)
+            self._drives.press(turned(self._base.pose[:3, :3] @ frame[:3, :3], wrench), WrenchFrame.REFERENCE)
 
     def _body_servo_cf(self, message: WrenchStamped) -> None:
         goals.check_frame(message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip")

@@ -13,7 +13,7 @@ from robots.dvrk import arms
 from schemas.crtk import StringStamped
 from schemas.errors import StateError
 from schemas.ros import BoolMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
-from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, jf, jp, ratio
+from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, cs, jf, jp, ratio
 
 CHAIN = arms.chain("PSM1")
 GOAL = HOME + np.array([0.1, -0.1, 0.02, 0.2, 0.1, -0.1])
@@ -25,6 +25,8 @@ MOTIONS = {
     "servo_jr": jp(*[0.001] * 6),
     "servo_jf": jf(*[0.0] * 6),
     "servo_cp": cp([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], "PSM1_base"),
+    "servo_cr": cp([0.001, 0.0, 0.0, 0, 0, 0, 1]),
+    "servo_cs": cs([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], frame="PSM1_base"),
     "body__servo_cf": cf(*[0.0] * 6),
     "spatial__servo_cf": cf(*[0.0] * 6),
     "move_jp": jp(*GOAL),
@@ -283,6 +285,22 @@ EVERY = [
             (raw_pose((0.3, 0.0, 0.3), TOP_DOWN), "allowed are"),
         ]
     ),
+    ("servo_cr", raw_pose((0.0, 0.0, NAN), (0.0, 0.0, 0.0, 1.0)), "every number must be finite"),
+    ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
+    ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "PSM2_base"), "frame 'PSM2_base', allowed are PSM1_base"),
+    ("servo_cr", raw_pose((0.0, 0.0, -0.5), (0.0, 0.0, 0.0, 1.0)), "pose cannot be reached: joint insertion at"),
+    *(
+        ("servo_cs", bad, reason)
+        for bad, reason in [
+            (cs([NAN, 0.0, -0.1, *TOP_DOWN]), "position [nan, 0.0, -0.1]: every number must be finite"),
+            (cs([0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 0.5]), "norm 0.5, allowed is 1 within 0.001"),
+            (cs([0.0, 0.0, -0.5, *TOP_DOWN]), "pose cannot be reached: joint insertion at"),
+            (cs(twist=[0.0, NAN, 0.0, 0.0, 0.0, 0.0]), "every number must be finite"),
+            (cs(wrench=[0.0] * 6, frame="world"), "frame 'world', allowed are PSM1_base"),
+            (cs([0.0, 0.0, -0.1, *TOP_DOWN], wrench=[0.0] * 6), "a wrench beside a pose or a twist, allowed is one or the other"),
+            (cs(twist=[0.0] * 6, wrench=[0.0] * 6), "a wrench beside a pose or a twist, allowed is one or the other"),
+        ]
+    ),
     *(
         (command, bad, reason)
         for command, size in (("servo_jf", 6), ("jaw__servo_jf", 1))
@@ -303,7 +321,11 @@ EVERY = [
             (jp(2.0), "joint jaw at 2 rad, allowed are -0.698132 .. 1.39626"),
         ]
     ),
-    *(("trajectory_j__set_ratio", Float64Message.model_construct(data=bad), "allowed are over 0 to 1") for bad in (NAN, -1.0, 1.1, np.inf)),
+    *(
+        (f"trajectory_j__set_ratio{which}", Float64Message.model_construct(data=bad), "allowed are over 0 to 1")
+        for bad in (NAN, -1.0, 1.1, np.inf)
+        for which in ("", "_v", "_a")
+    ),
 ]
 
 
@@ -341,10 +363,20 @@ def test_a_refused_stream_is_told_the_same_once_in_two_seconds():
     assert told[1].endswith("(2000 times)")
 
 
-def test_a_ratio_is_told_and_slows_moves():
-    rig = Rig().step().step(10, trajectory_j__set_ratio=ratio(0.5))
-    assert rig.outputs["PSM1/trajectory_j/ratio"] == [0.5]
-    quick, slow = Rig().step().step(300, move_jp=jp(*GOAL)), rig.step(300, move_jp=jp(*GOAL))
+@pytest.mark.parametrize(
+    ("orders", "told"),
+    [
+        ({"set_ratio": 0.5}, [0.5, 0.5, 0.5]),
+        ({"set_ratio_v": 0.25}, [0.0, 0.25, 1.0]),
+        ({"set_ratio_a": 0.25}, [0.0, 1.0, 0.25]),
+        ({"set_ratio_v": 0.3, "set_ratio_a": 0.3}, [0.3, 0.3, 0.3]),
+    ],
+)
+def test_ratios_are_told_and_slow_moves(orders, told):
+    rig = Rig().step().step(10, **{f"trajectory_j__{name}": ratio(value) for name, value in orders.items()})
+    assert [float(rig.outputs[f"PSM1/trajectory_j/{name}"][0]) for name in ("ratio", "ratio_v", "ratio_a")] == told
+    goal = GOAL + np.array([0.9, 0, 0, 0, 0, 0])
+    quick, slow = Rig().step().step(600, move_jp=jp(*goal)), rig.step(600, move_jp=jp(*goal))
     assert slow.setpoint[0] < quick.setpoint[0]
 
 
