@@ -98,8 +98,10 @@ class Link:
 
     def line(self, port: Port) -> Line:
         """Return the line of one of the device's ports: outputs go to the hub, inputs come from there."""
-        reliable = port.variability == "event"
-        return self._lines.setdefault((port.causality, port.name), Line(self, reliable, self._chance(port.causality, port.name)))
+        line = self._lines.get((port.causality, port.name))
+        if line is None:
+            line = self._lines[port.causality, port.name] = Line(self, port.variability == "event", self._chance(port.causality, port.name))
+        return line
 
     def order(self, order: LinkOrder) -> None:
         """Ask for another link from the next time on that somebody looks; from any thread."""
