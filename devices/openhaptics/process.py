@@ -100,8 +100,10 @@ class ServoProcess:
         self._listener.join()
 
     def _send(self, message: dict[str, Any]) -> None:
+        assert self._process.stdin
+        if self._process.stdin.closed:  # it was told to end
+            return
         with contextlib.suppress(OSError):  # it is gone: `is_alive` says so
-            assert self._process.stdin
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()
 

@@ -14,7 +14,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from ctypes import c_double
 from pathlib import Path
 from time import perf_counter
@@ -44,6 +44,8 @@ _FIFO_PRIORITY = 20
 """Above all that is not real-time, below the kernel's interrupt threads (50)."""
 _HIGH_PRIORITY_CLASS = 0x80
 _LAST_FRAME_S = 0.1
+
+Say = Callable[[Mapping[str, Any]], None]
 
 
 class Servo:
@@ -116,7 +118,7 @@ class Servo:
                 stylus.tell(now)
 
 
-def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview) -> Iterator[tuple[str, Stylus]]:
+def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say) -> Iterator[tuple[str, Stylus]]:
     """Open the devices; tell of each what it is and bears, or why it cannot be had."""
     for index, values in enumerate(config["styluses"]):
         spec = Spec(**values)
@@ -124,13 +126,13 @@ def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview) -> Iterato
         handle = hd.hdInitDevice(None if spec.device is None else spec.device.encode())
         code = next((code for code, _ in errors(hd)), 0)
         if handle == INVALID_HANDLE:
-            _say({"stylus": spec.name, "absent": code})
+            say({"stylus": spec.name, "absent": code})
             continue
         stylus = Stylus(hd, handle, spec, models, states)
         model, serial = ((hd.hdGetString(what) or b"").decode(errors="replace") for what in (Get.MODEL, Get.SERIAL_NUMBER))
         limits = {"force": _number(hd, Get.MAX_FORCE), "stiffness": 1e3 * _number(hd, Get.MAX_STIFFNESS), "damping": 1e3 * _number(hd, Get.MAX_DAMPING)}
         errors(hd)
-        _say({"stylus": spec.name, "hardware": f"{model} {serial}".strip(), "limits": limits})
+        say({"stylus": spec.name, "hardware": f"{model} {serial}".strip(), "limits": limits})
         yield spec.name, stylus
 
 
@@ -151,9 +153,15 @@ def _raise_priority() -> str:
     return "normal"
 
 
-def _say(message: Mapping[str, Any]) -> None:
-    sys.stdout.write(json.dumps(message) + "\n")
-    sys.stdout.flush()
+def _voice() -> Say:
+    """Return what writes a message to the device; the standard output is a library's to write to, and goes where errors go."""
+    stream = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+
+    def say(message: Mapping[str, Any]) -> None:
+        stream.write(json.dumps(message) + "\n")
+
+    return say
 
 
 def _terminate(_signal: int, _frame: object) -> NoReturn:
@@ -164,19 +172,20 @@ def main() -> NoReturn:
     """Serve until the input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the device's process, which then closes the input
     signal.signal(signal.SIGTERM, _terminate)
+    say = _voice()
     config = json.loads(sys.stdin.readline())
     memory = memoryview(attach(config["memory"], STYLUS_BYTES * len(config["styluses"])))
     try:
         hd = load(Path(config["library"]))
     except DeviceError as error:
-        _say({"failed": str(error)})
+        say({"failed": str(error)})
         sys.exit(1)
-    _say({"loaded": True})
-    styluses = dict(_opened(hd, config, memory))
+    say({"loaded": True})
+    styluses = dict(_opened(hd, config, memory, say))
     servo = Servo(hd, list(styluses.values()))
     try:
         if styluses:
-            _say({"priority": _raise_priority()})
+            say({"priority": _raise_priority()})
             gc.collect()
             gc.freeze()
             gc.disable()
@@ -187,7 +196,7 @@ def main() -> NoReturn:
     finally:
         servo.stop()
         if servo.failure:
-            _say({"failed": servo.failure})
+            say({"failed": servo.failure})
         os._exit(0)
 
 

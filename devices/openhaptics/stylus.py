@@ -154,11 +154,11 @@ class Stylus:
             hd.hdGetDoublev(Get.MOTOR_TEMPERATURE, self._temperatures)
             self._temperature = max(self._temperatures)
         calibration = hd.hdCheckCalibration()
-        if calibration == Calibration.NEEDS_UPDATE:
-            self._style = self._style or self._best_style()
-            if self._style != Style.ENCODER_RESET or self._buttons.value:  # there a person says that the stylus is in its place
-                hd.hdUpdateCalibration(self._style)
-                calibration = hd.hdCheckCalibration()
+        self._style = self._style or self._best_style()
+        in_place = self._style != Style.ENCODER_RESET or self._buttons.value  # where a person has to put it, the person says so
+        if calibration == Calibration.NEEDS_UPDATE and in_place:
+            hd.hdUpdateCalibration(self._style)
+            calibration = hd.hdCheckCalibration()
         if (calibration == Calibration.OK) is not self._calibrated:
             self._calibrated = not self._calibrated
             (hd.hdEnable if self._calibrated else hd.hdDisable)(FORCE_OUTPUT)

@@ -181,7 +181,7 @@ def test_inkwell(rig: Callable[..., Rig]) -> None:
     device.calibration, device.buttons = NEEDS_MANUAL_INPUT, 1
     one.allow()
     state = one.run(200, touching=True)
-    assert (Phase(state.phase), state.force, device.force_output) == (Phase.UNCALIBRATED, (0.0, 0.0, 0.0), 0)
+    assert (Phase(state.phase), state.code, state.force, device.force_output) == (Phase.UNCALIBRATED, INKWELL, (0.0, 0.0, 0.0), 0)
     device.inkwell = 1
     assert Phase(one.run(5).phase) is Phase.READY
     assert (device.updates, device.force_output) == (1, 1)
