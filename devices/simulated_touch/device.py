@@ -10,12 +10,12 @@ from devices.haptics.contact import Plane, planes_of
 from devices.haptics.diagnoses import FORCE_DIAGNOSES
 from devices.haptics.limits import TOUCH
 from devices.haptics.loop import HapticLoop
-from devices.haptics.ports import force_sample, stylus_ports
+from devices.haptics.ports import StylusPorts, force_sample, stylus_ports
 from devices.haptics.safety import Condition
 from devices.samples import button_sample, pose_sample, twist_sample
 from devices.simulated_touch.hand import Hand
 from devices.simulated_touch.params import SimulatedStylusParams, SimulatedTouchParams
-from devices.simulated_touch.path import HandPath
+from devices.simulated_touch.path import recorded, scripted
 from hub.participant import Device, Params, Sample, Value
 from schemas.errors import MessageError
 from schemas.ports import Port
@@ -36,16 +36,17 @@ class SimulatedTouch(Device):
     def __init__(self, name: str, params: SimulatedTouchParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._styluses = self._new()
+        self._ports = {stylus: stylus_ports(name, stylus, clock="simulated", max_age_ns=params.max_age) for stylus in params.styluses}
+        self._styluses: dict[str, _Stylus] = {}
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Of each stylus: `pose`, `twist`, `buttons`, `force` and `diagnostics` out, `contact` in."""
-        return tuple(port for stylus in self._styluses.values() for port in stylus.ports)
+        return tuple(port for stylus, ports in self._ports.items() for port in (*ports, _diagnosis(self.name, stylus).port))
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
-        """Put the hands where their paths begin."""
-        self._styluses = self._new()
+        """Put the hands where their paths begin. Raises RecordingError if a path is a recording without one."""
+        self._styluses = {stylus: _Stylus(self.name, stylus, self.params.styluses[stylus], ports) for stylus, ports in self._ports.items()}
 
     def read(self, t: int) -> list[Sample]:
         """Let the hands move up to `t` (ns), and return what is new."""
@@ -54,26 +55,28 @@ class SimulatedTouch(Device):
     def write(self, port: str, value: Value) -> None:
         """Take a contact model. It is felt from the next `read` on. Raises MessageError for another port or type."""
         name, _, what = port.partition("/")
-        if what != "contact" or name not in self._styluses or not isinstance(value, ContactModel):
-            known = ", ".join(f"'{stylus}/contact'" for stylus in self._styluses)
+        if what != "contact" or name not in self._ports or not isinstance(value, ContactModel):
+            known = ", ".join(f"'{stylus}/contact'" for stylus in self._ports)
             raise MessageError(f"'{self.name}' takes a ContactModel on {known}; this is a {type(value).__name__} on '{port}'")
-        self._styluses[name].take(value)
+        if name in self._styluses:
+            self._styluses[name].take(value)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Let go of the styluses."""
+        self._styluses = {}
 
-    def _new(self) -> dict[str, _Stylus]:
-        return {stylus: _Stylus(self.name, stylus, params, self.params.max_age) for stylus, params in self.params.styluses.items()}
+
+def _diagnosis(participant: str, stylus: str) -> Diagnosis:
+    return Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics", clock="simulated")
 
 
 class _Stylus:
     """One stylus: at every tick the force follows from where the hand is, and then both go on together."""
 
-    def __init__(self, participant: str, stylus: str, params: SimulatedStylusParams, max_age_ns: int) -> None:
-        self._ports = stylus_ports(participant, stylus, clock="simulated", max_age_ns=max_age_ns)
-        self._diagnosis = Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics", clock="simulated")
-        self.ports = (*self._ports, self._diagnosis.port)
-        self._path = HandPath(params.path)
+    def __init__(self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts) -> None:
+        self._ports = ports
+        self._diagnosis = _diagnosis(participant, stylus)
+        self._path = recorded(params.path, stylus, params.dead_man) if isinstance(params.path, Path) else scripted(params.path)
         self._loop = HapticLoop(params.safety.within(TOUCH), passivity=params.safety.passivity)
         self._dead_man = params.dead_man
         hand = params.hand

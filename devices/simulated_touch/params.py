@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Self
+from pathlib import Path
+from typing import Annotated, Any
 
-from pydantic import Field, StringConstraints, field_validator, model_validator
+from pydantic import Field, StringConstraints, ValidationInfo, field_validator
 
 from devices.haptics.limits import TOUCH
 from devices.haptics.params import SafetyParams
 from hub.participant import Params
 from robots.dvrk.parameters import UnitQuaternion
-from schemas.errors import ScenarioError
+from schemas.bag import bag_file
+from schemas.errors import RecordingError, ScenarioError
 from schemas.quantity import Damping, Duration, Length, Mass, Stiffness
 
 __all__ = ["LEVEL", "HandParams", "SimulatedStylusParams", "SimulatedTouchParams", "Waypoint"]
@@ -50,17 +52,30 @@ class HandParams(Params):
 class SimulatedStylusParams(Params):
     """One stylus, the hand that holds it, and the limits of the force on that hand."""
 
-    path: Annotated[tuple[Waypoint, ...], Field(min_length=1, description="where the hand wants to be, with minimal jerk from one waypoint to the next")]
+    path: Annotated[tuple[Waypoint, ...], Field(min_length=1)] | Path = Field(
+        description="where the hand wants to be: waypoints, with least jerk from one to the next; or a recording of poses and buttons, an .mcap file or a"
+        " rosbag2 directory relative to the scenario, in which a hand without buttons holds the dead-man"
+    )
     dead_man: Annotated[int, Field(ge=0, le=1, description="the button that is to be held for force")] = 0
     hand: HandParams = HandParams()
     safety: SafetyParams = SafetyParams()
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        for before, after in pairwise(self.path):
+    @field_validator("path")
+    @classmethod
+    def _sound(cls, path: tuple[Waypoint, ...] | Path, info: ValidationInfo) -> tuple[Waypoint, ...] | Path:
+        """Hold the times in order, and find the recording."""
+        if isinstance(path, Path):
+            context: dict[str, Any] = info.context or {}
+            file = (Path(context.get("directory", Path.cwd())) / path).resolve()
+            try:
+                bag_file(file)
+            except RecordingError as error:
+                raise ValueError(str(error)) from error
+            return file
+        for before, after in pairwise(path):
             if after.at <= before.at:
                 raise ValueError(f"the path's times go forward, but {after.at / 1e9:g} s comes after {before.at / 1e9:g} s")
-        return self
+        return path
 
     @field_validator("safety")
     @classmethod

@@ -26,8 +26,10 @@ PRESS: list[dict[str, Any]] = [
 ]
 
 
-def _device(path: list[dict[str, Any]] = PRESS, **params: Any) -> SimulatedTouch:
-    return SimulatedTouch("touch", SimulatedTouchParams.model_validate({"styluses": {"right": {"path": path, **params}}}))
+def _device(path: list[dict[str, Any]] | str = PRESS, **params: Any) -> SimulatedTouch:
+    device = SimulatedTouch("touch", SimulatedTouchParams.model_validate({"styluses": {"right": {"path": path, **params}}}))
+    device.open(Path())
+    return device
 
 
 def _table(time_ns: int, stiffness: float = 200.0) -> ContactModel:
@@ -59,7 +61,6 @@ def _forces(samples: list[Sample]) -> np.ndarray:
 
 def test_the_hand_rests_where_grip_and_table_balance() -> None:
     device = _device()
-    device.open(Path())
     samples = _play(device, 4.0)
     assert _heights(samples)[-1] == pytest.approx(-0.005, abs=1e-6)  # a grip of 200 N/m wants to be 10 mm below a table of 200 N/m
     assert _forces(samples)[-1] == pytest.approx([0, 0, 1.0], abs=1e-4)
@@ -67,7 +68,6 @@ def test_the_hand_rests_where_grip_and_table_balance() -> None:
 
 def test_the_force_is_the_one_of_the_safety_chain() -> None:
     device = _device([*PRESS[:2], {"at": "1.8 s", "position": [0, 0, -0.05]}], safety={"force": "0.7 N"})
-    device.open(Path())
     norms = np.linalg.norm(_forces(_play(device, 3.0, period=MS)), axis=1)
     assert norms.max() == pytest.approx(0.7)
     assert np.diff(norms).max() <= 0.1 + 1e-12
@@ -75,7 +75,6 @@ def test_the_force_is_the_one_of_the_safety_chain() -> None:
 
 def test_without_the_button_there_is_no_force() -> None:
     device = _device([{**waypoint, "buttons": [1]} for waypoint in PRESS])
-    device.open(Path())
     samples = _play(device, 3.0)
     assert not _forces(samples).any()
     assert _heights(samples)[-1] == pytest.approx(-0.01, abs=1e-6)
@@ -83,7 +82,6 @@ def test_without_the_button_there_is_no_force() -> None:
 
 def test_silence_ends_the_force() -> None:
     device = _device()
-    device.open(Path())
     samples = _play(device, 4.0, silent_from=3.0)
     forces = _forces(samples)[:, 2]
     assert forces[749] == pytest.approx(1.0, abs=1e-2)
@@ -94,7 +92,6 @@ def test_silence_ends_the_force() -> None:
 
 def test_it_moves_as_people_reach() -> None:
     device = _device(hand={"stiffness": "20 kN/m", "damping": "100 N*s/m"})
-    device.open(Path())
     samples = [sample for t in range(0, 2200 * MS, MS) for sample in device.read(t)]
     z, vz = _heights(samples), np.array([message.twist.linear.z for message in _of(samples, "twist")])
     assert z[1500] == pytest.approx(0.005, abs=2e-4)  # half way in half the time
@@ -105,7 +102,6 @@ def test_it_moves_as_people_reach() -> None:
 def test_orientation_follows_the_path_and_the_twist_is_its_rate() -> None:
     path = [{"at": 0}, {"at": "1 s", "orientation": [0, 0, 0, 1]}]
     device = _device(path)
-    device.open(Path())
     samples = [sample for t in range(0, 1001 * MS, MS) for sample in device.read(t)]
     poses, twists = _of(samples, "pose"), _of(samples, "twist")
     first, last = (np.array([getattr(poses[i].pose.orientation, axis) for axis in "xyzw"]) for i in (0, -1))
@@ -118,7 +114,6 @@ def test_orientation_follows_the_path_and_the_twist_is_its_rate() -> None:
 def test_buttons_tell_of_every_change_once() -> None:
     path = [{"at": 0}, {"at": "10.5 ms", "buttons": [0, 1]}, {"at": "12 ms", "buttons": []}, {"at": "50 ms", "buttons": [1]}]
     device = _device(path)
-    device.open(Path())
     joys: list[Joy] = _of([sample for t in (0, 40 * MS, 80 * MS) for sample in device.read(t)], "buttons")
     assert [(joy.header.stamp.ns // MS, joy.buttons.tolist()) for joy in joys] == [(0, [0, 0]), (11, [1, 1]), (12, [0, 0]), (50, [0, 1])]
 
