@@ -25,9 +25,9 @@ class LibOvrParams(HeadsetParams):
     origin: Annotated[Literal["eye", "floor"], Field(description="where height 0 is: at the eyes, or on the floor")] = "eye"
     recenter: Annotated[bool, Field(description="once, when the head is first tracked, make its place and heading the origin")] = False
     angular_velocity: Annotated[
-        Literal["head", "base"],
-        Field(description="the axes along which the runtime gives the angular velocity; its documentation does not say, see docs/decisions/0023"),
-    ] = "head"
+        Literal["base", "head"],
+        Field(description="the axes along which the runtime gives the angular velocity; its header does not say, see docs/decisions/0023"),
+    ] = "base"
 
 
 class LibOvr(Headset):
