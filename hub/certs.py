@@ -6,6 +6,7 @@ Keys are of the elliptic curve P-256, which every TLS library has. Needs the ext
 from __future__ import annotations
 
 import os
+import secrets
 import socket
 from collections.abc import Sequence
 from contextlib import suppress
@@ -43,7 +44,7 @@ def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
         )
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
     key = ec.generate_private_key(ec.SECP256R1())
-    name = _named(f"Trocar authority of {socket.gethostname()}")
+    name = _named(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])  # longer ones are refused (RFC 5280, ub-common-name)
     signs = dict.fromkeys(("key_cert_sign", "crl_sign"), True)
     other = ("digital_signature", "content_commitment", "key_encipherment", "data_encipherment", "key_agreement", "encipher_only", "decipher_only")
     builder = _builder(name, name, key, datetime.now(UTC) + timedelta(days=_AUTHORITY_DAYS))

@@ -36,6 +36,7 @@ class Gate:
         self.endpoints = list(endpoints)
         self._security = dict(security)
         self._closing = threading.Event()
+        self._starting = threading.Lock()
         self._reader: threading.Thread | None = None
 
     def open(self, hub: str) -> None:
@@ -61,31 +62,49 @@ class Gate:
     def _read(self) -> None:
         """Log what the process tells; start it again if it ends by itself: its clients come back by themselves."""
         while True:
-            for line in _ends(self._process)[1]:
+            answers = _ends(self._process)[1]
+            for line in answers:
                 level, _, message = line.rstrip().partition(" ")
                 log.log(int(level), "gate: %s", message)
             if self._closing.is_set():
                 return
-            log.error("the gate ended with exit code %s; opening it again", self._process.wait())
-            self._closing.wait(_AGAIN_S)
-            with suppress(ConnectError):
+            log.error("the gate ended with exit code %s; opening it again", _end(self._process))
+            answers.close()
+            while not self._start_again():
+                if self._closing.wait(_AGAIN_S):
+                    return
+
+    def _start_again(self) -> bool:
+        with self._starting:
+            if self._closing.is_set():
+                return False
+            try:
                 self._process = self._start()
+            except ConnectError as error:
+                log.error("%s", error)
+                return False
+            return True
 
     def close(self) -> None:
         """End the process, if it was started: with its input, or by force."""
         if self._reader is None:
             return
-        self._closing.set()
-        orders, answers = _ends(self._process)
-        with suppress(BrokenPipeError):
-            orders.close()
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        with self._starting:
+            self._closing.set()
+        _end(self._process)
         self._reader.join()
-        answers.close()
+        _ends(self._process)[1].close()
+
+
+def _end(process: subprocess.Popen[str]) -> int:
+    """End a process, with its input or by force; return its exit code."""
+    with suppress(BrokenPipeError):
+        _ends(process)[0].close()
+    try:
+        return process.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
 
 
 def _ends(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:

@@ -19,7 +19,7 @@ Told = tuple[int, str]
 """Level of `logging`, and message."""
 
 _MOST_TOLD = 20
-"""So many refusals are told of one name: a flood must not become one of the hub's log."""
+"""So many refusals are told of one connection: a flood must not become one of the hub's log."""
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _CAME = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. Common Name: (?P<name>.*)\.$")
@@ -33,10 +33,12 @@ _NAME = re.compile(r"CertCommonName\((.*?)\)")
 
 _REASONS = {
     "UnknownIssuer": "its certificate is of another authority",
+    "BadSignature": "its certificate is of another authority",
     "certificate expired": "its certificate has expired",
     "peer sent no certificates": "it shows no certificate",
     "InvalidContentType": "it does not speak TLS",
     "alert: UnknownCA": "it does not know the authority of the hub's certificate",
+    "alert: DecryptError": "it does not know the authority of the hub's certificate",
     "alert: BadCertificate": "it does not accept the hub's certificate",
     "alert: CertificateUnknown": "it does not accept the hub's certificate",
     "extended key usage": "its certificate is not that of a participant",
@@ -85,6 +87,7 @@ class GateLog:
 
     def _greet(self, name: str, address: str) -> Told:
         self._addresses[name] = address
+        self._told.pop(name, None)
         if name in self._known:
             return logging.INFO, f"'{name}' connects from {address}"
         return logging.WARNING, f"'{name}' connects from {address}, but no remote participant of this session has that name: it gets nothing"
