@@ -6,7 +6,7 @@ Plain floats and one clock, so that it fits into a servo callback: no numpy, no 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import hypot, inf
 
 from devices.haptics.contact import Plane, checked
 from devices.haptics.limits import Limits
@@ -31,6 +31,7 @@ class HapticLoop:
         self._chain = SafetyChain(limits)
         self._passivity = Passivity(limits.damping) if passivity else None
         self._planes: tuple[Plane, ...] = ()
+        self._appeared = False
         self._stamp_ns = 0
         self._arrived = -inf
         self._now = -inf
@@ -56,6 +57,7 @@ class HapticLoop:
         valid = checked(planes)
         if valid is None or not abs(arrived) < inf:
             return False
+        self._appeared = bool(valid) and (self._appeared or not self._planes)
         self._planes, self._stamp_ns, self._arrived = valid, stamp_ns, arrived
         return True
 
@@ -70,6 +72,10 @@ class HapticLoop:
         if -_READ_BEFORE < age < 0.0:
             age = 0.0
         wanted = self._renderer.force(self._planes, age, position, velocity)
+        if self._appeared:
+            self._appeared = False
+            if hypot(*wanted) >= self._limits.calm_force:  # an instrument that presses already has been taken up
+                self._chain.soften()
         if self._passivity is not None:
             wanted = self._passivity.correct(wanted, position, velocity, dt)
         given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt)
@@ -85,4 +91,4 @@ class HapticLoop:
         self._renderer.reset()
         if self._passivity is not None:
             self._passivity.reset()
-        self._planes, self._stamp_ns, self._arrived, self._now = (), 0, -inf, -inf
+        self._planes, self._appeared, self._stamp_ns, self._arrived, self._now = (), False, 0, -inf, -inf

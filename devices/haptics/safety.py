@@ -45,6 +45,10 @@ class SafetyChain:
         """Take the force away; it comes in again as at the start. For a device that was lost, and for the last frame before it stops."""
         self._off(Condition.OFF)
 
+    def soften(self) -> None:
+        """Let the force come in by the ramp once more, from nothing: for a contact that is there all at once."""
+        self._gain = 0.0
+
     def tick(self, wanted: Vector3, velocity: Vector3, *, age: float, permitted: bool, dt: float) -> Vector3:
         """Return the force (N) that the hand is given until the next tick.
 

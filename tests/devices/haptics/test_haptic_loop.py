@@ -160,6 +160,16 @@ def test_a_hand_too_fast_gets_no_force_until_it_lets_go() -> None:
     assert loop.condition is Condition.ON
 
 
+def test_taking_up_an_instrument_that_presses_already_gives_no_kick() -> None:
+    loop = HapticLoop(LIMITS)
+    _run(loop, 1500, (0, 0, -0.05), start=0.0, planes=[])  # the dead-man is held, and the arm does not follow yet
+    forces = _run(loop, 1000, (0, 0, -0.05), start=1.5, planes=[WALL])
+    assert forces[0] == pytest.approx((0, 0, 1.98 * TICK))
+    assert forces[499][2] == pytest.approx(0.5 * 1.98, rel=0.01)
+    _run(loop, 20, (0, 0, 0.001), start=2.5, planes=[])
+    assert _run(loop, 20, (0, 0, -0.0004), start=2.52, planes=[WALL])[-1][2] == pytest.approx(0.16)  # a light touch is there at once
+
+
 def test_another_session_starts_at_time_zero() -> None:
     loop = HapticLoop(LIMITS)
     assert loop.receive([WALL], 10**12, 1.0)
