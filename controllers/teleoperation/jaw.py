@@ -42,8 +42,9 @@ class JawGhost:
         self._caught_up[0] = 0.0
 
     def press(self, *, pressed: bool) -> None:
-        """Note that the button went down or up."""
-        self._pressed[0] = pressed
+        """Note whether the button is down. Until it was pressed once nobody has meant the jaw."""
+        if pressed or self._pressed[0] != _UNTOUCHED:
+            self._pressed[0] = pressed
 
     def release(self) -> None:
         """Stay, and go slowly at first when the hand is back."""
@@ -52,7 +53,7 @@ class JawGhost:
     def follow(self, gripper: float, h: float) -> None:
         """Go after the hand for `h` seconds: after the gripper, 0 closed .. 1 open, or the button if that is negative.
 
-        Closed is the lower end of the jaw's range, where the fingers press on what is between them. Until the button is touched the jaw stays.
+        Closed is the lower end of the jaw's range, where the fingers press on what is between them. Until the button is pressed the jaw stays.
         """
         if gripper >= 0.0:
             goal = self._lower + min(gripper, 1.0) * (self._upper - self._lower)

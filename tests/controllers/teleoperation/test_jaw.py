@@ -49,6 +49,7 @@ def test_it_never_leaves_the_range_of_the_jaw():
 
 def test_the_button_closes_while_it_is_pressed_and_says_nothing_before():
     made = ghost(20.0)
+    made.press(pressed=False)  # with every event of another button
     assert angles(made, -1.0, 50) == pytest.approx(20.0)
     made.press(pressed=True)
     assert angles(made, -1.0, 3000)[-1] == pytest.approx(degrees(JAW.lower))
