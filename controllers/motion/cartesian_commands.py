@@ -17,7 +17,7 @@ from robots.dvrk.cannula import Cannula
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
-from schemas.crtk import CartesianState
+from schemas.crtk import CartesianImpedance, CartesianState
 from schemas.errors import MotionError
 from schemas.ros import BoolMessage, PoseStamped, WrenchStamped
 from schemas.vectors import Vector
@@ -42,6 +42,7 @@ class CartesianCommands:
             "servo_cp": self._servo_cp,
             "servo_cr": self._servo_cr,
             "servo_cs": self._servo_cs,
+            "servo_ci": self._servo_ci,
             "body/servo_cf": self._body_servo_cf,
             "spatial/servo_cf": self._spatial_servo_cf,
             "move_cp": self._move_cp,
@@ -83,6 +84,10 @@ class CartesianCommands:
         else:
             wrench = goals.wrench(message.wrench) if pushed else np.zeros(6)
             self._drives.press(turned(self._base.pose[:3, :3] @ frame[:3, :3], wrench), WrenchFrame.REFERENCE)
+
+    def _servo_ci(self, message: CartesianImpedance) -> None:
+        goals.check_frame(message.header.frame_id, self._base.reference)
+        self._drives.resist(message)
 
     def _body_servo_cf(self, message: WrenchStamped) -> None:
         goals.check_frame(message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip")

@@ -9,10 +9,12 @@ import numpy as np
 
 from controllers.motion.axes import Axes, Mode
 from controllers.motion.frames import turned
+from controllers.motion.impedance import Impedance
 from controllers.motion.messages import Messages
 from controllers.motion.params import EcmParams, PsmParams
 from controllers.motion.telemetry import body_to_spatial
 from robots.serial_chain import SerialChain
+from schemas.crtk import CartesianImpedance
 from schemas.vectors import Vector
 
 __all__ = ["Drives", "WrenchFrame"]
@@ -22,13 +24,14 @@ class WrenchFrame(IntEnum):
     """How a commanded wrench is meant.
 
     At the tip along the tip's axes (or the reference's, see `Drives.absolute`), at the base frame's origin along the base frame's,
-    or at the tip along the reference's.
+    at the tip along the reference's, or as the impedance has it.
     """
 
     NONE = 0
     BODY = 1
     SPATIAL = 2
     REFERENCE = 3
+    IMPEDANCE = 4
 
 
 class Drives:
@@ -45,7 +48,8 @@ class Drives:
         self._control = np.zeros(9)
         self._wrench, self._frame, self.absolute, self.cartesian = np.split(self._control, [6, 7, 8])
         """`absolute`: 1 where body wrenches are along the axes of the reference; `cartesian`: 1 while the arm is under Cartesian control."""
-        self.state = (self._control, *(array for axes in self.groups for array in axes.state))
+        self._impedance = Impedance()
+        self.state = (self._control, self._impedance.state, *(array for axes in self.groups for array in axes.state))
 
     @property
     def is_moving(self) -> bool:
@@ -107,6 +111,13 @@ class Drives:
         self._wrench[:], self._frame[0] = wrench, frame
         self._balance()
 
+    def resist(self, message: CartesianImpedance) -> None:
+        """Let the arm be held by springs and dampers. Raises MotionError if the message makes no sense."""
+        self._impedance.set(message)
+        self._take_over(self.joints)
+        self._frame[0] = WrenchFrame.IMPEDANCE
+        self._balance()
+
     def step(self, h: float) -> None:
         """Advance by `h` seconds."""
         if self._frame[0]:
@@ -137,12 +148,20 @@ class Drives:
         """Apply the joint efforts J^T w, none over what its drive can do."""
         chain = self.joints.chain
         frames = chain.frames(self.joints.position)
-        wrench, frame = self._wrench, self._frame[0]
-        if frame == WrenchFrame.REFERENCE or (frame == WrenchFrame.BODY and self.absolute[0]):
-            wrench = turned(self._base()[:3, :3].T, wrench)
+        frame = self._frame[0]
+        if frame in (WrenchFrame.REFERENCE, WrenchFrame.IMPEDANCE) or (frame == WrenchFrame.BODY and self.absolute[0]):
             jacobian = chain.jacobian(frames)
+            wrench = self._in_base(frames[-1], jacobian)
         else:
-            jacobian = chain.jacobian(frames, frame="tip")
+            jacobian, wrench = chain.jacobian(frames, frame="tip"), self._wrench
             if frame == WrenchFrame.SPATIAL:
                 jacobian = body_to_spatial(frames[-1]) @ jacobian
         self.joints.apply(np.clip(jacobian.T @ wrench, -chain.effort, chain.effort))
+
+    def _in_base(self, tip: Vector, jacobian: Vector) -> Vector:
+        """Return the wrench at the tip, shape (6,), from the axes of the reference in those of the base frame."""
+        base, n = self._base(), len(self.joints.chain.joints)
+        wrench = self._wrench
+        if self._frame[0] == WrenchFrame.IMPEDANCE:
+            wrench = self._impedance.wrench(base @ tip, turned(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n]))
+        return turned(base[:3, :3].T, wrench)

@@ -10,10 +10,10 @@ import numpy as np
 from robots import rotation
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
-from schemas.ros import JointState, Pose, Twist, Vector3, Wrench
+from schemas.ros import JointState, Point, Pose, Quaternion, Twist, Vector3, Wrench
 from schemas.vectors import Vector
 
-__all__ = ["check_frame", "efforts", "frame", "joint_values", "twist", "wrench"]
+__all__ = ["check_frame", "efforts", "frame", "joint_values", "rotation_matrix", "twist", "vector", "wrench"]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
@@ -55,30 +55,34 @@ def check_frame(frame_id: str, *allowed: str) -> str:
 
 def frame(pose: Pose) -> Vector:
     """Return the pose as (4, 4) matrix."""
-    p, q = pose.position, pose.orientation
-    position, quaternion = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
-    _check_finite(position, "position")
+    matrix = np.eye(4)
+    matrix[:3, 3], matrix[:3, :3] = vector(pose.position, "position"), rotation_matrix(pose.orientation)
+    return matrix
+
+
+def rotation_matrix(q: Quaternion) -> Vector:
+    """Return the orientation as (3, 3) matrix."""
+    quaternion = np.array([q.x, q.y, q.z, q.w])
     _check_finite(quaternion, "orientation")
     norm = hypot(*quaternion.tolist())
     if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
         raise MotionError(f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}")
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation.matrix(quaternion / norm), position
-    return matrix
+    return rotation.matrix(quaternion / norm)
 
 
 def twist(message: Twist) -> Vector:
     """Return velocity and angular velocity, shape (6,)."""
-    return _two_vectors(message.linear, message.angular, "twist")
+    return np.concatenate([vector(message.linear, "twist"), vector(message.angular, "twist")])
 
 
 def wrench(message: Wrench) -> Vector:
     """Return force and torque, shape (6,)."""
-    return _two_vectors(message.force, message.torque, "wrench")
+    return np.concatenate([vector(message.force, "wrench"), vector(message.torque, "wrench")])
 
 
-def _two_vectors(a: Vector3, b: Vector3, part: str) -> Vector:
-    values = np.array([a.x, a.y, a.z, b.x, b.y, b.z])
+def vector(message: Point | Vector3, part: str) -> Vector:
+    """Return the vector, shape (3,); `part` names it where it is not finite."""
+    values = np.array([message.x, message.y, message.z])
     _check_finite(values, part)
     return values
 

@@ -15,7 +15,7 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 __all__ = ["Messages"]
 
 _STREAMS = (
-    *("servo_jp", "servo_jr", "servo_cp", "servo_cr", "servo_cs", "servo_jf", "body/servo_cf", "spatial/servo_cf"),
+    *("servo_jp", "servo_jr", "servo_cp", "servo_cr", "servo_cs", "servo_ci", "servo_jf", "body/servo_cf", "spatial/servo_cf"),
     *("jaw/servo_jp", "jaw/servo_jf", "hand/servo_jp", "hand/servo_jf"),
 )
 _REPEAT = 2.0

@@ -38,6 +38,7 @@ COMMANDS = {
     "servo_cp": (_POSE, "follow this pose of the tip"),
     "servo_cr": (_POSE, "follow a pose shifted and turned along the axes of the frame that it names, relative to the newest goal, or the setpoint"),
     "servo_cs": ("crtk_msgs/msg/CartesianState", "follow pose and twist of the tip, keep a twist while it is told, or apply a wrench: what is stated"),
+    "servo_ci": ("crtk_msgs/msg/CartesianImpedance", "hold the tip by springs and dampers, in the frame of measured_cp"),
     "servo_jf": (_JOINT_STATE, "apply these efforts, gravity compensated"),
     "body/servo_cf": (_WRENCH, "apply this wrench at the tip, in the tip's frame"),
     "spatial/servo_cf": (_WRENCH, "apply this wrench at the base frame's origin, in the arm's base frame"),
@@ -47,7 +48,7 @@ COMMANDS = {
 }
 """Command ports of every arm: type and meaning. Of commands that come in the same step they are heeded in this order."""
 
-CARTESIAN_COMMANDS = frozenset({"servo_cp", "servo_cr", "servo_cs", "body/servo_cf", "spatial/servo_cf", "move_cp"})
+CARTESIAN_COMMANDS = frozenset({"servo_cp", "servo_cr", "servo_cs", "servo_ci", "body/servo_cf", "spatial/servo_cf", "move_cp"})
 """Those that are heeded only past the cannula."""
 
 GRIPPER_COMMANDS = {

@@ -8,7 +8,7 @@ from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
 from hub.inputs import Inputs
 from hub.participant import Setup
-from schemas.crtk import CartesianState, StringStamped
+from schemas.crtk import CartesianImpedance, CartesianImpedanceHalfPlaneGains, CartesianState, StringStamped
 from schemas.ros import (
     BoolMessage,
     EmptyMessage,
@@ -130,6 +130,18 @@ def cs(pose=None, twist=None, wrench=None, frame=""):
     if wrench is not None:
         parts |= {"wrench": cf(*wrench).wrench, "wrench_is_valid": BoolMessage(data=True)}
     return CartesianState.model_construct(**(CartesianState().__dict__ | parts))
+
+
+def ci(pose, frame="", **gains):
+    """A Cartesian impedance about `pose`: gains by side and name, such as `position_positive={"p": (0, 0, -200)}`."""
+    goal = cp(pose).pose
+    sides = {
+        side: CartesianImpedanceHalfPlaneGains(**{name: Vector3(**dict(zip("xyz", map(float, v), strict=True))) for name, v in row.items()})
+        for side, row in gains.items()
+    }
+    at = Vector3.model_construct(x=goal.position.x, y=goal.position.y, z=goal.position.z)
+    parts = {"header": Header(frame_id=frame), "force_position": at, "force_orientation": goal.orientation, "torque_orientation": goal.orientation}
+    return CartesianImpedance.model_construct(**(CartesianImpedance().__dict__ | parts | sides))
 
 
 EMPTY = EmptyMessage()

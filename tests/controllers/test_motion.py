@@ -13,7 +13,7 @@ from robots.dvrk import arms
 from schemas.crtk import StringStamped
 from schemas.errors import StateError
 from schemas.ros import BoolMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
-from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, cs, jf, jp, ratio
+from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, ci, cp, cs, jf, jp, ratio
 
 CHAIN = arms.chain("PSM1")
 GOAL = HOME + np.array([0.1, -0.1, 0.02, 0.2, 0.1, -0.1])
@@ -27,6 +27,7 @@ MOTIONS = {
     "servo_cp": cp([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], "PSM1_base"),
     "servo_cr": cp([0.001, 0.0, 0.0, 0, 0, 0, 1]),
     "servo_cs": cs([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], frame="PSM1_base"),
+    "servo_ci": ci([0.0, 0.0, -0.12, 0, 0, 0, 1]),
     "body__servo_cf": cf(*[0.0] * 6),
     "spatial__servo_cf": cf(*[0.0] * 6),
     "move_jp": jp(*GOAL),
@@ -289,6 +290,9 @@ EVERY = [
     ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
     ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "PSM2_base"), "frame 'PSM2_base', allowed are PSM1_base"),
     ("servo_cr", raw_pose((0.0, 0.0, -0.5), (0.0, 0.0, 0.0, 1.0)), "pose cannot be reached: joint insertion at"),
+    ("servo_ci", ci([0.0, NAN, -0.12, 0, 0, 0, 1]), "every number must be finite"),
+    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 0]), "norm 0, allowed is 1 within 0.001"),
+    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], "world"), "frame 'world', allowed are PSM1_base"),
     *(
         ("servo_cs", bad, reason)
         for bad, reason in [

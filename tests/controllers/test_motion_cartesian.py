@@ -9,7 +9,7 @@ from controllers.motion.limits import STREAM_GAP
 from robots import rotation
 from robots.dvrk import arms
 from schemas.ros import BoolMessage
-from tests.controllers.motion_rig import CART, EMPTY, HOME, PSM1, Rig, cf, cp, cs, jp
+from tests.controllers.motion_rig import CART, EMPTY, HOME, PSM1, Rig, cf, ci, cp, cs, jp
 
 CHAIN = arms.chain("PSM1")
 Q = HOME + np.array([0.1, -0.1, 0.02, 0.2, 0.1, -0.1])
@@ -125,6 +125,57 @@ class TestServoCs:
         assert not rig.outputs["drive/PSM1/servo_jf"].any()
 
 
+class TestServoCi:
+    """The wrench is read off the joint efforts, about a tip that is displaced and moves."""
+
+    def wrench(self, displacement, velocity, **gains):
+        """Return what the gains make of a displacement and a velocity, shape (6,), along the axes of the goal, along which it is given too."""
+        rig = at(Q, CART)
+        base, chain = view(rig), CHAIN.frames(Q)
+        tip = base @ chain[-1]
+        axes = tip[:3, :3] @ rotation.matrix(rotation.exp(-np.array(displacement[3:])))
+        position = tip[:3, 3] - axes @ displacement[:3]
+        rig.follows = False
+        body = CHAIN.jacobian(chain)
+        turn = base[:3, :3].T @ axes
+        rig.sensed["sense/PSM1/measured_js"][6:12] = np.linalg.solve(body, [*(turn @ velocity[:3]), *(turn @ velocity[3:])])
+        rig.step(1, servo_ci=ci([*position, *rotation.from_matrix(axes)], **gains))
+        assert rig.mode == [2, 1]
+        assert not rig.said("error")
+        effort = np.linalg.solve(body.T, rig.outputs["drive/PSM1/servo_jf"])
+        return np.concatenate([turn.T @ effort[:3], turn.T @ effort[3:]])
+
+    def test_each_side_has_its_own_gains(self):
+        gains = {
+            "position_positive": {"p": (-10, -20, -30), "d": (-1, -2, -3), "bias": (0.1, 0.2, 0.3), "deadband": (0.002, 0, 0.02)},
+            "position_negative": {"p": (-40, -50, -60), "d": (-4, -5, -6), "bias": (-0.1, -0.2, -0.3), "deadband": (0, 0.001, -0.003)},
+        }
+        speed = (0.01, 0.01, 0.02, 0, 0, 0)
+        up = self.wrench((0.005, 0.004, 0.01, 0, 0, 0), speed, **gains)
+        down = self.wrench((-0.005, -0.004, -0.01, 0, 0, 0), speed, **gains)
+        assert np.allclose(up[:3], [-10 * 0.003 - 0.01 + 0.1, -20 * 0.004 - 0.02 + 0.2, 0.0 - 0.06 + 0.3], atol=1e-9)
+        assert np.allclose(down[:3], [40 * 0.005 - 0.04 - 0.1, 50 * 0.003 - 0.05 - 0.2, 60 * 0.007 - 0.12 - 0.3], atol=1e-9)
+        assert np.allclose([up[3:], down[3:]], 0.0, atol=1e-9)
+
+    def test_a_rotation_is_resisted_about_the_axes_of_its_goal(self):
+        gains = {"orientation_positive": {"p": (-0.2, -0.3, 0), "d": (-0.01, 0, 0)}, "orientation_negative": {"p": (0, -0.1, -0.4)}}
+        torque = self.wrench((0, 0, 0, 0.1, -0.05, -0.02), (0, 0, 0, 0.3, 0.2, 0.1), **gains)
+        assert np.allclose(torque, [0, 0, 0, -0.02 - 0.003, 0.005, 0.008], atol=1e-9)
+
+    def test_it_lasts_until_another_command(self):
+        rig = at(Q)
+        here, gains = rig.outputs["PSM1/measured_cp"], {side: {"p": (-200, -200, -200)} for side in ("position_positive", "position_negative")}
+        rig.step(1, servo_ci=ci(here, **gains))
+        rig.follows = False
+        rig.sensed["sense/PSM1/measured_js"][2] += 0.01
+        assert rig.step(100).outputs["drive/PSM1/servo_jf"][2] == pytest.approx(-2.0)
+        saved = rig.motion.save()
+        rig.step(1, hold=EMPTY)
+        assert rig.mode == [1, 1]
+        rig.motion.restore(saved)
+        assert rig.step(2).outputs["drive/PSM1/servo_jf"][2] == pytest.approx(-2.0)
+
+
 class TestAbsoluteOrientation:
     def test_a_body_wrench_is_along_the_axes_of_the_reference_and_changes_its_meaning_with_the_switch(self):
         rig, wrench = at(Q, CART), [0.5, 0.2, -0.4, 0, 0, 0.01]
@@ -204,6 +255,7 @@ TIP_COMMANDS = {
     "servo_cp": cp([*CHAIN.forward(HOME)[:3, 3], *rotation.from_matrix(CHAIN.forward(HOME))], "PSM1_base"),
     "servo_cr": cp([0, 0, 0, 0, 0, 0, 1]),
     "servo_cs": cs([*CHAIN.forward(HOME)[:3, 3], *rotation.from_matrix(CHAIN.forward(HOME))], frame="PSM1_base"),
+    "servo_ci": ci([0, 0, -0.1, 0, 0, 0, 1]),
     "body__servo_cf": cf(*[0.0] * 6),
     "spatial__servo_cf": cf(*[0.0] * 6),
     "move_cp": cp([*CHAIN.forward(HOME)[:3, 3], *rotation.from_matrix(CHAIN.forward(HOME))], "PSM1_base"),
