@@ -13,6 +13,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.access import access_settings
+from hub.credentials import Credentials
 from hub.endpoint import free_endpoint
 from hub.gate import Gate
 from hub.plan import Inlet, Link, Member, Outlet, Plan
@@ -248,8 +249,8 @@ def test_a_message_that_is_too_long_is_not_passed_on(hub):
 
 
 def test_a_certificate_of_another_authority_opens_nothing(hub, told):
-    own = hub.authority.issued("touch")
-    mixed = type(own)(own.file, *(getattr(hub.stranger.issued("touch"), part) for part in ("key", "certificate")), own.authority)
+    own, foreign = hub.authority.issued("touch"), hub.stranger.issued("touch")
+    mixed = Credentials(own.file, foreign.key, foreign.certificate, own.authority)
     with pytest.raises(ConnectError), hub.client(mixed):
         pass
     told("refused a connection: its certificate is of another authority")
