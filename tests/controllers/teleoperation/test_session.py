@@ -131,6 +131,20 @@ def watched():
     return participants["watcher"]
 
 
+@pytest.mark.parametrize("name", ["palpation-probe", "400006", "ROLLING_NEEDLE_DRIVER", "MUSHA_HAND"])
+def test_an_instrument_is_led_without_a_motion_controller_as_well(name):
+    hands = Hands("hands", Params())
+    teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate({"instrument": name}))
+    robot = MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": {"instrument": name}}, "looks": False, "publish_period": "2 ms"}))
+    ports = {port.name for port in teleoperation.ports}
+    connections = ["hands.right/pose -> teleop.master", "teleop.servo_jp -> robot.PSM1/servo_jp", "robot.PSM1/measured_js -> teleop.measured_js"]
+    connections += ["robot.PSM1/tip_wrench -> teleop.tip_wrench", "robot.PSM1/rigid_wrench -> teleop.rigid_wrench"]
+    if "jaw/servo_jp" in ports:
+        connections += ["teleop.jaw/servo_jp -> robot.PSM1/jaw/servo_jp", "robot.PSM1/jaw/measured_js -> teleop.jaw/measured_js"]
+    scenario = {"name": "direct", "step": "2 ms", "duration": "20 ms", "order": ["teleop", "robot"], "connections": connections}
+    assert run_in_process(scenario, {"hands": hands, "teleop": teleoperation, "robot": robot}).state == "done"
+
+
 def test_the_tip_goes_the_way_of_the_hand_in_the_picture(watched):
     """The camera's frame has x to the left, y up and z ahead; the servos follow to within a fifth of a millimetre."""
     away, left, up = WAY
