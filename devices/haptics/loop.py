@@ -72,10 +72,9 @@ class HapticLoop:
         if -_READ_BEFORE < age < 0.0:
             age = 0.0
         wanted = self._renderer.force(self._planes, age, position, velocity)
-        if self._appeared:
+        if self._appeared:  # perhaps under a hand that has taken up an instrument which presses already
             self._appeared = False
-            if hypot(*wanted) >= self._limits.calm_force:  # an instrument that presses already has been taken up
-                self._chain.soften()
+            self._chain.soften(hypot(*wanted))
         if self._passivity is not None:
             wanted = self._passivity.correct(wanted, position, velocity, dt)
         given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt)

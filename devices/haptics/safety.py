@@ -45,9 +45,11 @@ class SafetyChain:
         """Take the force away; it comes in again as at the start. For a device that was lost, and for the last frame before it stops."""
         self._off(Condition.OFF)
 
-    def soften(self) -> None:
-        """Let the force come in by the ramp once more, from nothing: for a contact that is there all at once."""
-        self._gain = 0.0
+    def soften(self, size: float) -> None:
+        """Take note of a contact that is there all at once and asks for the force `size` (N): what is not small comes in by the ramp."""
+        limits = self._limits
+        if size > limits.calm_force:
+            self._gain = min(self._gain, limits.calm_force / min(size, limits.force))
 
     def tick(self, wanted: Vector3, velocity: Vector3, *, age: float, permitted: bool, dt: float) -> Vector3:
         """Return the force (N) that the hand is given until the next tick.
