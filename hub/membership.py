@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hub.control import Empty, JoinReply, JoinRequest
 from hub.plan import Plan
+from hub.wire import LEASE_MS
 from schemas.errors import MessageError, ParticipantError
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
@@ -64,7 +65,8 @@ class Membership:
         with self._changed:
             known = self._hosts.get(request.host)
             if known is not None and known.pid != request.pid:
-                raise MessageError(f"host '{request.host}' is here already, as process {known.pid}")
+                lease_s = LEASE_MS / 1e3
+                raise MessageError(f"host '{request.host}' is here already, as process {known.pid}: end that one, or wait {lease_s:g} s if it is cut off")
             self._hosts[request.host] = request
             self._admissions += 1
             self._changed.notify_all()

@@ -405,7 +405,9 @@ class Session:
         self._membership.lose(member.host)
         if member.role == "device":
             self._intake.forget(name)
-            log.warning("device '%s' is gone; it may join again", name)
+            log.warning(
+                "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the network; a host that still runs joins again", name, name
+            )
         elif self._account.phase in ("starting", "running", "paused"):
             self._fail(name, "its host is gone")
 

@@ -20,6 +20,7 @@ from hub.wire import Drops, PortCodec, Stamp, Tag
 from schemas.codec import decode, encode
 from schemas.errors import MessageError
 from schemas.keys import Keys
+from schemas.ports import Port
 from schemas.ros import StringMessage
 from schemas.trocar_msgs import DeviceStatus
 
@@ -50,10 +51,9 @@ class DeviceUplink:
         self._told_ns = -_STATUS_NS
         self._sequence = {port.name: 0 for port in member.ports}
         outputs = [port for port in member.ports if port.causality == "output"]
-        key, cdr, first = run.keys.output, zenoh.Encoding.APPLICATION_CDR, zenoh.Priority.REAL_TIME
-        self._publishers = {p.name: session.declare_publisher(key("device", member.name, p.name), encoding=cdr, priority=first, express=True) for p in outputs}
+        self._publishers = {port.name: _publisher(session, run.keys.output("device", member.name, port.name), port) for port in outputs}
         self._lines = {port.name: self._link.line(port) for port in outputs}
-        self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=cdr)
+        self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         outlets = [outlet for outlet in run.plan.outlets if outlet.device == member.name]
         self._inflows = [_Inflow(outlet, run, self._link, loop, drops, self._latencies, offset) for outlet in outlets]
         self._subscribers = [session.declare_subscriber(inflow.key, Callback(inflow.take, indirect=True)) for inflow in self._inflows]
@@ -101,6 +101,15 @@ class DeviceUplink:
         self._status.put(encode(self._report(monotonic_ns())))
         for entity in (*self._subscribers, *self._publishers.values(), self._status):
             entity.undeclare()
+
+
+def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
+    """Return a publisher of an output: signals go first, and are dropped where the way is choked; events wait in a queue of their own."""
+    if port.variability == "event":
+        urgency, choked = zenoh.Priority.INTERACTIVE_HIGH, zenoh.CongestionControl.BLOCK
+    else:
+        urgency, choked = zenoh.Priority.REAL_TIME, zenoh.CongestionControl.DROP
+    return session.declare_publisher(key, encoding=zenoh.Encoding.APPLICATION_CDR, priority=urgency, congestion_control=choked, express=True)
 
 
 class _Inflow:
