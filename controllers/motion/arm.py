@@ -11,12 +11,13 @@ from controllers.motion.axes import Mode
 from controllers.motion.cartesian_commands import CartesianCommands
 from controllers.motion.commands import Commands
 from controllers.motion.drives import Drives
+from controllers.motion.equipment import Equipment
 from controllers.motion.frames import BaseFrame, base_in_world
 from controllers.motion.gravity import KnownWeight
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import CARTESIAN_COMMANDS, COMMANDS, EVENTS, GRIPPER_COMMANDS
+from controllers.motion.ports import CARTESIAN_COMMANDS, COMMANDS, EQUIPMENT_COMMANDS, EVENTS, GRIPPER_COMMANDS
 from controllers.motion.telemetry import Telemetry
 from hub.inputs import Inputs
 from robots.dvrk.setup_joints import CartArm
@@ -29,6 +30,7 @@ __all__ = ["Arm"]
 
 _ANY_TIME = (
     *("use_gravity_compensation", "body/set_cf_orientation_absolute", "set_base_frame"),
+    *(command for commands in EQUIPMENT_COMMANDS.values() for command in commands),
     *("trajectory_j/set_ratio", "trajectory_j/set_ratio_v", "trajectory_j/set_ratio_a"),
 )
 """Commands that are heeded whatever the operating state."""
@@ -42,8 +44,10 @@ class Arm:
     def __init__(self, name: CartArm, params: MotionParams, camera: Callable[[], Vector | None], period: float) -> None:
         """Take the arm's name, what the scenario says, what returns the ECM's tip in the world, shape (4, 4), and the step (s)."""
         arm = params.arms.driven[name]
-        self._name, self._period, self._equipment = name, period, arm.equipment
-        self._messages = Messages(name, (*EVENTS, self._equipment[0]))
+        self._name, self._period = name, period
+        held = arm.equipment
+        self._messages = Messages(name, (*EVENTS, held[0]))
+        self._equipment = Equipment(*held, self._messages)
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
         self._telemetry = Telemetry(name, arm.chain)
@@ -51,14 +55,15 @@ class Arm:
         self._commands = Commands(self._drives, period)
         self._cartesian = CartesianCommands(name, self._drives, self._base, self._commands.ratio, period)
         self._lifecycle = Lifecycle(self._drives, self._messages, np.array(arm.home), params.power_time * 1e-9, homed=params.initial_state == "homed")
-        heeding = {**self._commands.handlers, **self._cartesian.handlers}
+        heeding = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
         self._state_port = f"{name}/state_command"
-        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in COMMANDS if command != "state_command"]
+        commands = (*COMMANDS, *self._equipment.handlers)
+        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in commands if command != "state_command"]
         self._prefixes = [name]
         if (gripper := arm.gripper) is not None:
             self._prefixes.append(f"{name}/{gripper.name}")
-            commands = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
-            self._ports += [(command, f"{name}/{command}", heed) for command, heed in commands]
+            grasping = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
+            self._ports += [(command, f"{name}/{command}", heed) for command, heed in grasping]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
         self.state = (self._started, *self._commands.state, *self._base.state, *self._lifecycle.arrays, self._messages.state, *self._drives.state)
         self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)]
@@ -96,7 +101,7 @@ class Arm:
         if before is None:
             self._started[0] = 1.0
             self._messages.desired_state(self._lifecycle.desired_state)
-            self._messages.equipment(*self._equipment)
+            self._equipment.tell()
         self._lifecycle.watch(self._period)
         heeded = self._heed(inputs)
         self._lifecycle.step(self._period)

@@ -47,7 +47,7 @@ class PsmParams(MountedPsm):
         return psm.home(self.tool)
 
     @property
-    def equipment(self) -> tuple[str, str]:
+    def equipment(self) -> tuple[Literal["tool_type"], str]:
         """What the arm holds: the event that tells it, and its name there."""
         return "tool_type", tool_type(self.tool)
 
@@ -66,7 +66,7 @@ class EcmParams(MountedEcm):
         return ecm.HOME
 
     @property
-    def equipment(self) -> tuple[str, str]:
+    def equipment(self) -> tuple[Literal["endoscope_type"], str]:
         """What the arm holds: the event that tells it, and its name there."""
         return "endoscope_type", endoscope_type(self.endoscope)
 

@@ -11,7 +11,17 @@ from controllers.motion.params import EcmParams, PsmParams
 from robots.dvrk.setup_joints import CartArm
 from schemas.ports import Port
 
-__all__ = ["CARTESIAN_COMMANDS", "COMMANDS", "EVENTS", "GRIPPER_COMMANDS", "SETUP_JOINT_COMMANDS", "SETUP_JOINT_EVENTS", "arm_ports", "setup_joint_ports"]
+__all__ = [
+    "CARTESIAN_COMMANDS",
+    "COMMANDS",
+    "EQUIPMENT_COMMANDS",
+    "EVENTS",
+    "GRIPPER_COMMANDS",
+    "SETUP_JOINT_COMMANDS",
+    "SETUP_JOINT_EVENTS",
+    "arm_ports",
+    "setup_joint_ports",
+]
 
 _JOINT_STATE, _POSE, _TWIST, _WRENCH = (
     "sensor_msgs/msg/JointState",
@@ -70,6 +80,16 @@ EVENTS = {
 
 _EQUIPMENT = (_STRING, "what the arm holds, in the dVRK's words, at time 0")
 
+EQUIPMENT_COMMANDS = {
+    "tool_type": {
+        "set_tool_type": (_STRING, "refused unless it is what the arm holds"),
+        "emulate_adapter_present": (_BOOL, "refused unless true: the adapter is there"),
+        "emulate_tool_present": (_BOOL, "refused unless true: the instrument is there"),
+    },
+    "endoscope_type": {"set_endoscope_type": (_STRING, "refused unless it is what the arm holds")},
+}
+"""Command ports about what an arm holds, by the event that tells it: type and meaning."""
+
 SETUP_JOINT_COMMANDS = {
     "state_command": _STATE_COMMAND,
     "servo_jp": (_JOINT_STATE, "refused: the joints are braked"),
@@ -91,7 +111,8 @@ def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns
     names = tuple(joint.name for joint in joints)
     gripper = params.gripper
     grasping = {} if gripper is None else {f"{gripper.name}/{name}": row for name, row in GRIPPER_COMMANDS.items()}
-    yield from _events(arm, COMMANDS | grasping, EVENTS | {params.equipment[0]: _EQUIPMENT})
+    held = params.equipment[0]
+    yield from _events(arm, COMMANDS | EQUIPMENT_COMMANDS[held] | grasping, EVENTS | {held: _EQUIPMENT})
     yield from _states(arm, names, reference, period_ns)
     yield from _robot(arm, names)
     if gripper is not None:

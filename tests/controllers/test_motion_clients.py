@@ -9,7 +9,7 @@ from robots.dvrk.dynamics import STANDARD_GRAVITY
 from robots.dvrk.inertia import ENDOSCOPE_MASS
 from robots.dvrk.instruments import instrument, instruments
 from schemas.crtk import StringStamped
-from schemas.ros import BoolMessage, Header, Time
+from schemas.ros import BoolMessage, Header, StringMessage, Time
 from tests.controllers.motion_rig import CART, HOME, PSM1, Rig, cp, jp
 
 GOAL = HOME + np.array([0.1, -0.1, 0.02, 0.2, 0.1, -0.1])
@@ -141,7 +141,28 @@ def test_what_an_arm_holds_is_told_once_at_time_0():
     assert rig.said("endoscope_type", "ECM") == ["Classic_SD_UP"]
     rig.step(200, state_command=command("disable"))
     assert not rig.said("tool_type")
-    assert {port.name for port in rig.motion.ports if port.name.endswith("_type")} == {f"PSM{i}/tool_type" for i in (1, 2, 3)} | {"ECM/endoscope_type"}
+    assert {port.name for port in rig.motion.ports if port.name.endswith("_type") and port.causality == "output"} == {
+        f"PSM{i}/tool_type" for i in (1, 2, 3)
+    } | {"ECM/endoscope_type"}
+
+
+@pytest.mark.parametrize(
+    ("order", "reason"),
+    [
+        ({"set_tool_type": StringMessage(data="LARGE_NEEDLE_DRIVER:400006")}, None),
+        ({"set_tool_type": StringMessage(data="CADIERE_FORCEPS:400049[..]")}, "'CADIERE_FORCEPS:400049[..]', the arm holds LARGE_NEEDLE_DRIVER:400006[..]"),
+        ({"emulate_tool_present": BoolMessage(data=True)}, None),
+        ({"emulate_tool_present": BoolMessage(data=False)}, "nobody is there to take it off"),
+        ({"emulate_adapter_present": BoolMessage(data=False)}, "nobody is there to take it off"),
+    ],
+)
+def test_what_an_arm_holds_is_not_a_client_s_to_change(order, reason):
+    rig = Rig(initial_state="disabled").step().step(1, **order)
+    if reason is None:
+        assert not rig.said("error")
+        assert rig.said("tool_type") == (["LARGE_NEEDLE_DRIVER:400006[..]"] if "set_tool_type" in order else [])
+    else:
+        assert reason in rig.said("error")[0]
 
 
 def test_every_instrument_has_a_name_of_its_own_in_the_real_system_s_form():
@@ -188,7 +209,7 @@ local/setpoint_cp local/measured_cv body/measured_cf spatial/measured_cf body/ja
 trajectory_j/ratio trajectory_j/ratio_v trajectory_j/ratio_a jaw/measured_js jaw/setpoint_js tool_type"""
 WRITTEN = """state_command hold free servo_jp servo_jr servo_jf servo_cp servo_cr servo_cs servo_ci body/servo_cf spatial/servo_cf move_jp move_jr move_cp
 use_gravity_compensation body/set_cf_orientation_absolute set_base_frame trajectory_j/set_ratio trajectory_j/set_ratio_v trajectory_j/set_ratio_a
-jaw/servo_jp jaw/move_jp jaw/servo_jf"""
+jaw/servo_jp jaw/move_jp jaw/servo_jf set_tool_type emulate_tool_present emulate_adapter_present"""
 
 
 @pytest.mark.parametrize(("names", "causality"), [(READ, "output"), (WRITTEN, "input")])
