@@ -29,7 +29,7 @@ MODEL_SLOTS, STATE_SLOTS = 2, 64
 MOST_PLANES = 4
 MODEL_DOUBLES = 3 + MOST_PLANES * len(Plane._fields)
 """Of a contact model: arrival (s of time.perf_counter), stamp (ns), number of planes, and their numbers."""
-STATE_DOUBLES = 7 + 3 + 9 + 3 + 3 + 3
+STATE_DOUBLES = 6 + 3 + 9 + 3 + 3 + 3
 
 
 def model_doubles(planes: Sequence[Plane], stamp_ns: int, arrived: float) -> list[float]:
@@ -54,15 +54,13 @@ class State(NamedTuple):
     phase: int
     """A `devices.openhaptics.stylus.Phase`."""
     code: int
-    """Error code of HDAPI that goes with the phase, or 0."""
+    """Of HDAPI: the error that goes with the phase, the calibration style while that is what is missing, or 0."""
     buttons: int
     """Bit 0 is the first."""
     permitted: int
     """1 if the dead-man is held."""
     cause: int
     """Why the force is on or off: index into the members of devices.haptics.safety.Condition."""
-    temperature: float
-    """Of the warmest motor, as the driver predicts it: 0 cold, 1 too warm."""
     position: Vector3
     """Of the tip, m."""
     rotation: tuple[float, ...]
@@ -77,10 +75,9 @@ class State(NamedTuple):
     @classmethod
     def of(cls, record: tuple[float, ...]) -> State:
         """Return the state in a record of the ring: its fields one after the other."""
-        time, *whole, temperature = record[:7]
-        phase, code, buttons, permitted, cause = map(int, whole)
-        position, linear, angular, force = ((record[i], record[i + 1], record[i + 2]) for i in (7, 19, 22, 25))
-        return cls(time, phase, code, buttons, permitted, cause, temperature, position, record[10:19], linear, angular, force)
+        phase, code, buttons, permitted, cause = map(int, record[1:6])
+        position, linear, angular, force = ((record[i], record[i + 1], record[i + 2]) for i in (6, 18, 21, 24))
+        return cls(record[0], phase, code, buttons, permitted, cause, position, record[9:18], linear, angular, force)
 
 
 def ring_size(slots: int, doubles: int) -> int:

@@ -64,7 +64,6 @@ class Get:
     MAX_STIFFNESS = 0x2602
     """N/mm (the reference says 0 to 1; its guide and devices in use have N/mm)."""
     MAX_FORCE = 0x2603
-    MOTOR_TEMPERATURE = 0x2605
     MAX_DAMPING = 0x2609
     """N s/mm."""
     FORCE = 0x2700

@@ -23,7 +23,7 @@ _CLEAN_FRAMES = 3
 _WARNING = 1.0
 """Time without a warning of the device after which force may come back, s."""
 _LOOK_TICKS = 128
-"""Calibration and temperature are looked at once in this number of ticks."""
+"""A calibration that stands is looked at once in this number of ticks."""
 
 
 class Phase(IntEnum):
@@ -87,9 +87,8 @@ class Stylus:
         self._clean = self._pretending = self._ticks = 0
         self._permitted = False
         self._warned = -inf
-        self._temperature = 0.0
         self._transform, self._velocity, self._force = (c_double * 16)(), (c_double * 3)(), (c_double * 3)()
-        self._joints, self._temperatures = (c_double * 3)(), (c_double * 6)()
+        self._joints = (c_double * 3)()
         self._buttons, self._switch, self._styles = c_int(), c_ubyte(), c_int()
 
     def allow(self, limits: Limits, *, passivity: bool) -> None:
@@ -129,7 +128,7 @@ class Stylus:
         """Write the state of the frame at `now`."""
         tip, loop = self._tip, self._loop
         force, cause = (loop.force, _CAUSES[loop.condition]) if loop is not None else (ZERO, _OFF)
-        head = (now, self.phase, self._code, self._buttons.value, self._permitted, cause, self._temperature)
+        head = (now, self.phase, self._code, self._buttons.value, self._permitted, cause)
         self._states.write((*head, *tip.position, *tip.rotation, *tip.linear, *tip.angular, *force))
 
     def release(self) -> None:
@@ -148,11 +147,8 @@ class Stylus:
         return bool(self._switch.value) is held
 
     def _look(self) -> None:
-        """Look at the temperature, where the device has one, and at the calibration, which is updated where that can be done."""
+        """Look at the calibration, and update it where that can be done; force is on only while it stands."""
         hd = self._hd
-        if self._ticks % _LOOK_TICKS == 0:
-            hd.hdGetDoublev(Get.MOTOR_TEMPERATURE, self._temperatures)
-            self._temperature = max(self._temperatures)
         calibration = hd.hdCheckCalibration()
         self._style = self._style or self._best_style()
         in_place = self._style != Style.ENCODER_RESET or self._buttons.value  # where a person has to put it, the person says so
@@ -162,7 +158,7 @@ class Stylus:
         if (calibration == Calibration.OK) is not self._calibrated:
             self._calibrated = not self._calibrated
             (hd.hdEnable if self._calibrated else hd.hdDisable)(FORCE_OUTPUT)
-        errors(hd)  # what a device does not have, or does not want now
+        errors(hd)  # of an update that the device did not want now
 
     def _best_style(self) -> int:
         self._hd.hdGetIntegerv(Get.CALIBRATION_STYLE, self._styles)

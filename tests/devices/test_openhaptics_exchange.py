@@ -100,8 +100,8 @@ def test_contact_models_cross_unchanged(model: list[Plane], stamp: int, arrived:
 
 def test_states_cross_unchanged_and_styluses_do_not_mix() -> None:
     memory = memoryview(bytearray(2 * STYLUS_BYTES))
-    state = State(1.5, 3, 0x203, 2, 1, 4, 0.25, (1.0, 2.0, 3.0), tuple(range(9)), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (0.1, 0.2, -inf))
+    state = State(1.5, 3, 0x203, 2, 1, 4, (1.0, 2.0, 3.0), tuple(range(9)), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (0.1, 0.2, -inf))
     _, writer = servo_ends(memory, 1)
-    writer.write([*state[:7], *state.position, *state.rotation, *state.linear, *state.angular, *state.force])
+    writer.write([*state[:6], *state.position, *state.rotation, *state.linear, *state.angular, *state.force])
     assert [State.of(record) for record in device_ends(memory, 1)[1].read()] == [state]
     assert device_ends(memory, 0)[1].read() == []

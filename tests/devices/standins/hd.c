@@ -42,7 +42,7 @@ typedef struct {
     int64_t force_output;
     int64_t updates, last_style; /* calls of hdUpdateCalibration that were granted */
     double motors[3];            /* force that the hand gets, N */
-    double target[3], amplitude[3], frequency, turn_amplitude, temperature;
+    double target[3], amplitude[3], frequency, turn_amplitude;
     double mass, stiffness, damping; /* of the hand */
     double max_force, max_continuous_force, max_stiffness, max_damping; /* N, N, N/mm, N s/mm */
     double position[3], velocity[3];                                    /* m, m/s, axes of HDAPI */
@@ -225,7 +225,6 @@ void hdGetDoublev(HDenum what, double *out) {
     case 0x2602: *out = d->max_stiffness; break;
     case 0x2603: *out = d->max_force; break;
     case 0x2604: *out = d->max_continuous_force; break;
-    case 0x2605: out[0] = out[1] = out[2] = d->temperature; break;
     case 0x2609: *out = d->max_damping; break;
     case 0x2700: memcpy(out, handles[current].set, 24); break;
     default: push(0x0100, current);

@@ -23,7 +23,7 @@ VARIABLE = "TROCAR_STANDIN_HD"
 _ORDERS = "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder error error_frames"
 _WHOLE = f"{_ORDERS} owner force_output updates last_style"
 _TRIPLES = ("motors", "target", "amplitude")
-_REST = "frequency turn_amplitude temperature mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
+_REST = "frequency turn_amplitude mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
 
 
 class Device(ctypes.Structure):
