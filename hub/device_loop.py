@@ -12,7 +12,7 @@ from typing import Protocol
 from hub.devices import open_device
 from hub.participant import Device, Sample, Value
 from schemas.errors import MessageError
-from schemas.ros import Joy
+from schemas.ros import DiagnosticStatus, Joy
 
 __all__ = ["DeviceLoop", "Uplink"]
 
@@ -37,8 +37,8 @@ class DeviceLoop:
         self._name, self._device, self._period_ns, self._failed = name, device, period_ns, failed
         self._uplink: Uplink | None = None
         self._attaching = threading.Lock()
-        self._buttons: dict[str, Sample] = {}
-        """The newest of each port."""
+        self._standing: dict[str, Sample] = {}
+        """The newest buttons and diagnosis of each port: they hold until another one is told."""
         self._ending = False
         self._start_ns = monotonic_ns()
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
@@ -57,12 +57,12 @@ class DeviceLoop:
     def attach(self, uplink: Uplink | None) -> None:
         """Give what is read from now on to `uplink`; the one before gets nothing any more once this returns.
 
-        First of all it gets the buttons as they are: they may have changed while nobody listened.
+        First of all it gets buttons and diagnoses as they are: they may have changed while nobody listened.
         """
         with self._attaching:
             self._uplink = uplink
-            if uplink is not None and self._buttons:
-                uplink.exchange(self.now_ns, list(self._buttons.values()))
+            if uplink is not None and self._standing:
+                uplink.exchange(self.now_ns, list(self._standing.values()))
 
     def write(self, port: str, value: Value) -> None:
         """Write to the device; may be called from any thread. Raises MessageError if it refuses the value; anything else ends the loop."""
@@ -80,7 +80,7 @@ class DeviceLoop:
                 t = self.now_ns
                 samples = list(self._device.read(t))
                 with self._attaching:
-                    self._buttons.update((sample.port, sample) for sample in samples if isinstance(sample.message, Joy))
+                    self._standing.update((sample.port, sample) for sample in samples if isinstance(sample.message, Joy | DiagnosticStatus))
                     if self._uplink is not None:
                         self._uplink.exchange(t, samples)
                 due_ns = max(due_ns + self._period_ns, self._start_ns + t)  # what is late is not caught up
