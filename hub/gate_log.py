@@ -21,7 +21,8 @@ Told = tuple[int, str]
 _MOST_TOLD = 20
 """So many refusals are told of one connection: a flood must not become one of the hub's log."""
 
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m|[\x00-\x1f\x7f-\x9f]")
+"""And whatever else a terminal might obey, as keys come from strangers."""
 _CAME = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. Common Name: (?P<name>.*)\.$")
 _FAILED = re.compile(r" WARN .*zenoh_link_tls\S*: (?P<reason>.*?)(\. Hint: .*)?$")
 _LIST = re.compile(r"(?P<thread>ThreadId\(\d+\)).* ACL \(\w+\): caching permissions for `(?P<key>.*)`")

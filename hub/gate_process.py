@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import threading
+from time import monotonic
 from typing import Any, TextIO
 
 import zenoh
@@ -16,6 +18,8 @@ from hub.wire import open_session
 from schemas.errors import ConnectError
 
 __all__ = ["main"]
+
+_MOST_PER_SECOND = 50
 
 
 def main() -> None:
@@ -46,9 +50,16 @@ def _parted_outputs() -> tuple[TextIO, TextIO]:
 
 
 def _tell(zenohs_log: TextIO, gate_log: GateLog, answers: TextIO) -> None:
+    """Hand on what is to be told, but not more than so much in a second, whoever knocks at the gate and how often."""
+    second, told = 0, 0
     for line in zenohs_log:
         for level, message in gate_log.read(line):
-            answers.write(f"{level} {message}\n")
+            now = int(monotonic())
+            second, told = now, told + 1 if now == second else 1
+            if told < _MOST_PER_SECOND:
+                answers.write(f"{level} {message}\n")
+            elif told == _MOST_PER_SECOND:
+                answers.write(f"{logging.WARNING} more is refused in this second than is told\n")
 
 
 if __name__ == "__main__":

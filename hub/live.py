@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
+from pathlib import Path
 from typing import TypeVar
 
 import zenoh
 from pydantic import BaseModel
 
 from hub.control import ask
+from hub.credentials import CONSOLE
+from hub.endpoint import is_loopback
+from hub.reach import reach
 from hub.wire import open_session
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
@@ -20,15 +24,22 @@ __all__ = ["ask_about", "live_sessions"]
 
 R = TypeVar("R", bound=BaseModel)
 
+_OTHERS = ConnectError, MessageError, zenoh.ZError
+"""What comes of asking whoever is no hub."""
+
 ANSWER_S = 2.0
 """A hub answers within a step; a paused one at once."""
 
 
-def live_sessions(endpoints: Iterable[str]) -> list[SessionStatus]:
-    """Return the status of every session whose hub listens on one of `endpoints`; whoever else listens there is passed over."""
+def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) -> list[SessionStatus]:
+    """Return the status of every session whose hub listens on one of `endpoints`.
+
+    On another machine that needs the certificate `console`, which is looked for in `certificates`; raises ConnectError if there is no hub.
+    On this machine whoever else listens there is passed over.
+    """
     found: dict[str, SessionStatus] = {}
     for endpoint in endpoints:
-        with suppress(ConnectError, MessageError, zenoh.ZError), open_session("client", connect=[endpoint]) as session:
+        with suppress(*_OTHERS) if is_loopback(endpoint) else nullcontext(), reach(endpoint, CONSOLE, certificates) as session:
             found |= {status.session: status for status in _statuses(session)}
     return [found[name] for name in sorted(found)]
 

@@ -13,7 +13,7 @@ from hub.endpoint import address, is_loopback
 from hub.wire import open_session
 from schemas.errors import ConnectError
 
-__all__ = ["reach"]
+__all__ = ["obstacle", "reach"]
 
 _PATIENCE_S = 3.0
 
@@ -40,10 +40,10 @@ def reach(endpoint: str, name: str, certificates: Path | None = None, *, mode: s
     try:
         return open_session("client", connect=[endpoint], security=credentials.connecting())
     except ConnectError as error:
-        raise ConnectError(f"cannot reach the hub at {endpoint}: {_obstacle(host, port, credentials) or error}") from error
+        raise ConnectError(f"cannot reach the hub at {endpoint}: {obstacle(host, port, credentials) or error}") from error
 
 
-def _obstacle(host: str, port: int, credentials: Credentials) -> str:
+def obstacle(host: str, port: int, credentials: Credentials) -> str:
     """Go the same way once more with Python's own TLS, which says what Zenoh does not; return what is in the way, if anything."""
     context = ssl.create_default_context(cadata=credentials.authority)
     context.load_cert_chain(credentials.file)

@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from hub import doctor as doctor_module
 from hub.command_line.display import console, table
+from hub.command_line.hosting import Certificates
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
 from hub.launch import plan_of
 from hub.plan import Plan
@@ -53,13 +54,14 @@ def _print_plan(plan: Plan) -> None:
 def ls(
     *,
     connect: Annotated[list[str] | None, typer.Option(metavar="ENDPOINT", help="Where a hub listens; by default all of this machine's are asked.")] = None,
+    certs: Certificates = None,
     as_json: Json = False,
 ) -> None:
     """List the sessions that are running: participants, the clocks and links of devices, and how long things take."""
     from hub.endpoint import listening_endpoints
     from hub.live import live_sessions
 
-    sessions = live_sessions(connect or listening_endpoints())
+    sessions = live_sessions(connect or listening_endpoints(), certs)
     if as_json:
         typer.echo(json.dumps([_session_row(status) for status in sessions], indent=2))
         return

@@ -21,6 +21,9 @@ class Authority(NamedTuple):
     def issued(self, name: str, days: float = 1) -> Credentials:
         return load(name, certs.issue(self.directory, name, days))
 
+    def renewed(self, days: float) -> Credentials:
+        return load("hub", certs.renew(self.directory, (), days))
+
     @property
     def hub(self) -> Credentials:
         return load("hub", self.directory)
