@@ -40,8 +40,8 @@ class Engagement:
         self._arm, self._max_age = params.arm, params.max_age
         self._clutch, self._must_hold = params.buttons.clutch, params.engage == "held"
         self._gate = AlignmentGate() if params.align == "gate" else None
-        self._memory = np.zeros(4)
-        self._phase, self._pressed, self._interrupted, self._not_ready = np.split(self._memory, 4)
+        self._memory = np.zeros(5)
+        self._phase, self._pressed, self._interrupted, self._not_ready, self._lost = np.split(self._memory, 5)
         self.state = (self._memory,) if self._gate is None else (self._memory, self._gate.state)
         self.takes_over = False
         """Whether the arm begins to follow in this step, so that a reference must be taken."""
@@ -77,8 +77,9 @@ class Engagement:
         """Decide on this step, of `h` seconds; `heard`: the hand's pose is fresh. The other arguments are those of `AlignmentGate.check`."""
         self.warnings = []
         before = self.phase
-        if not heard and self._must_hold:
-            self._pressed[0] = 0.0  # whoever comes back presses again
+        if self._must_hold and not heard and not self._lost[0]:
+            self._pressed[0] = 0.0  # nobody knows what the hand does now, until it is told again
+        self._lost[0] = not heard
         self._phase[0] = self._decide(hand, tip, gripper, h, heard=heard)
         if self.phase is Phase.DISABLED and before is not Phase.DISABLED:
             reason = f"its master has been silent for more than {self._max_age / 1e6:g} ms" if self.arm_is_ready else "it is not ENABLED and homed"

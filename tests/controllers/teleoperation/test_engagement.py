@@ -69,6 +69,19 @@ def test_held_the_arm_follows_only_while_the_button_is():
     assert session.states == ["CLUTCHED", "ENABLED", "CLUTCHED"]
 
 
+def test_held_a_button_that_is_told_anew_before_the_pose_is_back_counts():
+    session = Session(engage="held")
+    session.step(HELD)
+    session.step(stale=True, count=3)
+    session.step(HELD, stale=True)
+    session.step(stale=True)
+    held = session.command
+    session.hand[:3] += 0.1
+    session.step()
+    assert (session.command == held).all()
+    assert moved(session)
+
+
 def test_held_a_master_that_comes_back_must_be_taken_hold_of_again():
     """Nobody knows what the hand did while it was not heard; a button that was down may have been let go."""
     session = Session(engage="held")
