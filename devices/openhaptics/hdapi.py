@@ -32,6 +32,7 @@ __all__ = [
     "Get",
     "Hdapi",
     "Style",
+    "check",
     "errors",
     "find",
     "load",
@@ -176,6 +177,15 @@ def find(library: Path | None) -> Path:
             return place.resolve()
     looked = ", ".join(f"'{place}'" for place in places)
     raise DeviceError(f"no library of OpenHaptics at {looked}. Install the Touch device driver and OpenHaptics of 3D Systems, or say 'library: PATH'")
+
+
+def check() -> tuple[bool, str, str]:
+    """Return whether this machine has the library, where, and what mends it where it has not: for `trocar doctor`. Loads nothing."""
+    remedy = "install the Touch device driver and OpenHaptics of 3D Systems"
+    try:
+        return True, f"{find(None)}: haptic styluses of 3D Systems", remedy
+    except DeviceError as error:
+        return False, str(error).partition(". ")[0], remedy
 
 
 def _places() -> Iterator[Path]:
