@@ -142,25 +142,24 @@ class Arm:
             awaited |= self._lifecycle.command(cast("StringStamped", message))
         for command, port, heed in self._ports:
             for message in inputs.events(port):
-                done = self._heed_one(command, heed, message)
-                awaited |= done and "move_" in command
+                self._heed_one(command, heed, message)
+                awaited |= "move_" in command
         return awaited
 
-    def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> bool:
+    def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> None:
         if reason := self._not_ready(command):
             self._messages.refuse(command, reason, ready=False)
-            return False
+            return
         try:
             heed(message)
         except MotionError as error:
             self._messages.refuse(command, str(error), ready=True)
             if "move_" in command and not self._drives.is_moving:
                 self._messages.goal_reached(reached=False)  # as the real controller does; a move under way goes on
-            return False
+            return
         self._messages.heeded(command)
         if command in CARTESIAN_COMMANDS:
             self._drives.cartesian[0] = 1.0
-        return True
 
     def _not_ready(self, command: str) -> str:
         """Return why the arm does not take `command` now; empty if it does."""

@@ -31,7 +31,7 @@ _JOINT_STATE, _POSE, _TWIST, _WRENCH = (
 )
 _EMPTY, _STRING, _BOOL, _FLOAT = "std_msgs/msg/Empty", "std_msgs/msg/String", "std_msgs/msg/Bool", "std_msgs/msg/Float64"
 _STATE_COMMAND = ("crtk_msgs/msg/StringStamped", "enable, disable, home, unhome, pause or resume")
-_OPERATING_STATE = ("crtk_msgs/msg/OperatingState", "whenever it changes, and with each command that is heeded")
+_OPERATING_STATE = ("crtk_msgs/msg/OperatingState", "whenever it changes, with each state command that is heeded, and with each move, heeded or not")
 
 COMMANDS = {
     "state_command": _STATE_COMMAND,

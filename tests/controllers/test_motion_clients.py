@@ -62,6 +62,17 @@ def test_a_move_that_takes_another_over_before_it_is_waited_for_leaves_nobody_wa
     assert client.wait(move_jp=jp(*HOME)) > 1
 
 
+@pytest.mark.parametrize("state", ["homed", "disabled"])
+@pytest.mark.parametrize("order", [{"move_jp": jp(*[9.0] * 6)}, {"move_cp": cp([0, 0, -0.9, 0.70710678, 0.70710678, 0, 0])}, {"jaw__move_jp": jp(9.0)}])
+def test_a_client_that_asks_whether_the_arm_is_busy_since_a_move_that_is_refused_learns_that_it_is_not(order, state):
+    rig = Rig(initial_state=state).step()
+    since = rig.t
+    rig.step(1, **order)
+    (told,) = rig.heard["PSM1/operating_state"]
+    assert told.header.stamp.ns > since
+    assert not told.is_busy
+
+
 @pytest.mark.parametrize("start", [HOME, GOAL])
 @pytest.mark.parametrize("power_time", ["0 s", "100 ms"])
 def test_homing_takes_time_even_where_the_arm_is_at_home(start, power_time):
