@@ -192,6 +192,7 @@ class Session:
 
     def _await_hosts(self, hosts: list[str]) -> None:
         limit_s = self.scenario.join_limit / 1e9
+        doors = ", ".join((self.endpoint, *(self._gate.endpoints if self._gate is not None else ())))
         deadline = monotonic() + limit_s
         told: list[str] = []
         while missing := self._membership.missing(hosts):
@@ -199,10 +200,10 @@ class Session:
             if self.state.ending:
                 raise SessionError(f"shut down while waiting for {', '.join(missing)} to join")
             if missing != told:
-                log.info("waiting for %s to join at %s", ", ".join(missing), self.endpoint)
+                log.info("waiting for %s to join at %s", ", ".join(missing), doors)
             told = missing
             if monotonic() > deadline:
-                raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {self.endpoint}")
+                raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {doors}")
 
     def _check_steps(self, bonds: Mapping[str, Sequence[BondSide]]) -> None:
         for index, planned in enumerate(self.plan.bonds):

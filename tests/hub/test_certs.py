@@ -9,7 +9,7 @@ from ipaddress import ip_address
 import pytest
 from typer.testing import CliRunner
 
-from hub import certs
+from hub import certs, credentials, doctor
 from hub.command_line.certs import app
 from hub.credentials import Credentials, default_directory, examine, load
 from schemas.errors import ConnectError, ScenarioError
@@ -132,3 +132,17 @@ def test_the_command_line_makes_and_shows_them(tmp_path):
         assert word in shown
     certs.issue(tmp_path / "certs", "touch", -0.01)
     assert "not valid" in run(app, ["show", *place]).output
+
+
+def test_doctor_tells_until_when_they_are_valid(monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor, "_checks", lambda: iter(()))
+    monkeypatch.setattr(credentials, "default_directory", lambda: tmp_path / "certs")
+    (nothing,) = (finding for finding in doctor.examine() if finding.area == "network")
+    assert (nothing.works, nothing.name) == (False, "certificates")
+    own = Authority.founded(tmp_path / "certs")
+    own.issued("touch", days=-0.01)
+    found = {finding.name: finding for finding in doctor.examine() if finding.area == "network"}
+    assert found["hub"].works
+    assert "valid until" in found["hub"].detail
+    assert not found["touch"].works
+    assert found["touch"].remedy == "trocar certs issue touch"
