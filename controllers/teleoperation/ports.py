@@ -10,6 +10,8 @@ __all__ = ["NO_GRIPPER", "teleoperation_ports"]
 NO_GRIPPER = -1.0
 """Of `gripper`, while nothing is connected: the button leads the jaw."""
 
+_CAMERA = "ECM"
+"""Name of the camera's frame, as the dVRK and the motion controller have it."""
 _POSE, _TWIST, _WRENCH = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/WrenchStamped"
 _JOINT_STATE, _NUMBER, _STRING = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64", "std_msgs/msg/String"
 
@@ -47,7 +49,8 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
     base, names = f"{p.arm}_base", tuple(joint.name for joint in p.chain.joints)
     at_rest = p.start + (0.0,) * (2 * len(names))
     fields = ("position", "velocity", "effort")
-    meaning = "where the command starts, at the first step and whenever the arm gets ready"
+    seen = p.view == "camera"
+    meaning = "where the command starts, at the first step and whenever the arm gets ready; of a motion controller better its setpoint_js"
     return (
         Port(name="measured_js", causality="input", type=_JOINT_STATE, names=names, fields=fields, start=at_rest, description=meaning),
         Port(
@@ -61,7 +64,8 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
             name="base_in_view",
             causality="input",
             type=_POSE,
-            start=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+            frame=_CAMERA if seen else "",
+            start=None if seen else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
             description="of the arm's base frame in the camera's, for `view: camera`: the motion controller's SUJ/<arm>/measured_cp",
         ),
         Port(name="tip_wrench", causality="input", type=_WRENCH, frame=base, start=(0.0,) * 6, description="of tissue on the instrument, at the tip"),

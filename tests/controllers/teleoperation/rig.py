@@ -24,6 +24,7 @@ class Session:
         self.outputs = self.teleoperation.configure(Setup(period_ns=H, directory=Path()))
         values = {port.name: np.array(port.start or ()) for port in self.teleoperation.ports if port.causality == "input"}
         self.values = values | {"master": np.array([0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0]), "master_twist": np.zeros(6)}
+        self.values["base_in_view"] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         self.inputs = Inputs(self.values)
         self.states, self.warnings, self.t = [], [], 0
 

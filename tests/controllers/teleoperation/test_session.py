@@ -12,6 +12,7 @@ from engines.mujoco.params import MujocoParams
 from hub.participant import Device, Params, Sample, Stepped
 from hub.testing import run_in_process
 from schemas.crtk import StringStamped
+from schemas.errors import ScenarioError
 from schemas.ports import Port
 from schemas.ros import Header, Joy, Point, Pose, PoseStamped, Time
 
@@ -143,6 +144,22 @@ def test_an_instrument_is_led_without_a_motion_controller_as_well(name):
         connections += ["teleop.jaw/servo_jp -> robot.PSM1/jaw/servo_jp", "robot.PSM1/jaw/measured_js -> teleop.jaw/measured_js"]
     scenario = {"name": "direct", "step": "2 ms", "duration": "20 ms", "order": ["teleop", "robot"], "connections": connections}
     assert run_in_process(scenario, {"hands": hands, "teleop": teleoperation, "robot": robot}).state == "done"
+
+
+def test_a_view_without_a_camera_is_refused():
+    """What is not told, or told in another frame than the camera's, would turn the hand's ways anywhere."""
+    hands = Hands("hands", Params())
+    teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate({"view": "camera"}))
+    motion = MotionController("motion", MotionParams.model_validate({"arms": {"PSM1": {}}}))
+    robot = MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": {}}, "looks": False}))
+    participants = {"hands": hands, "teleop": teleoperation, "motion": motion, "robot": robot}
+    connections = ["hands.right/pose -> teleop.master", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*"]
+    scenario = {"name": "blind", "step": "1 ms", "duration": "2 ms", "connections": connections}
+    with pytest.raises(ScenarioError, match=r"base_in_view.* is not connected"):
+        run_in_process(scenario, participants)
+    connections.append("motion.SUJ/PSM1/measured_cp -> teleop.base_in_view")
+    with pytest.raises(ScenarioError, match=r"'PSM1_base', 'teleop\.base_in_view' takes frame 'ECM'"):
+        run_in_process(scenario, participants)
 
 
 def test_the_tip_goes_the_way_of_the_hand_in_the_picture(watched):
