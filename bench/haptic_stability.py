@@ -4,7 +4,8 @@ A hand (a mass on spring and damper, as in docs/decisions/0022) is told a way, h
 1 kHz, and leads a tip through a link with delay in both directions, jitter and loss. The tip is a mass on a position servo against a
 contact law; the controller's contact model of it goes back to the stylus. Every delay is tried on: a virtual table; springs soft and
 stiff; tissue that gets stiffer with depth; tissue that damps; a hard thing; rubbing. For comparison, `--naive` sends the surface that
-the newest force and the stiffest plane allowed imply. `--margin` prints the gain up to which the loop is stable at any delay.
+the newest force and the stiffest plane allowed imply. `--random` takes as many contacts, hands and links by chance and prints those that
+swing by more than 0.5 mm. `--margin` prints the gain up to which the loop is stable at any delay.
 
 Figures: peak to peak of the hand in the last second and in the one before, and the hand's force at the end against that at the tip.
 """
@@ -15,8 +16,8 @@ import argparse
 import heapq
 import json
 import random
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,10 +30,8 @@ from devices.simulated_touch.hand import Hand
 from schemas.ros import Header, Vector3
 from schemas.trocar_msgs import ContactModel, ContactPlane
 
-TICK, PERIOD, DURATION = 1e-3, 4e-3, 9.0
-"""s: of the device, of the controller, of a run."""
-MASS, GRIP, DAMPING = 0.15, 200.0, 4.0
-"""kg, N/m, N s/m: of the hand."""
+TICK, PERIOD = 1e-3, 4e-3
+"""s: of the device and of the controller."""
 SERVO_STIFFNESS, TIP_MASS = 5e3, 0.5
 """N/m and kg: a tip on a critically damped servo of 16 Hz."""
 TABLE = PlaneParams(normal=(0, 0, 1), distance=0.0, stiffness=200.0)
@@ -113,49 +112,89 @@ class Naive:
         return [ContactPlane(normal=Vector3(x=x, y=y, z=z), distance=float(force @ hand) / size + size / self.stiffness, stiffness=self.stiffness)]
 
 
-def way(t: float, depth: float, slide: float) -> tuple[float, float, float]:
-    """Return where the hand wants to be: 20 mm above, from 1.2 s on down at 50 mm/s, from 3 s on aside."""
-    return 0.0, slide * min(max((t - 3.0) / 1.5, 0.0), 1.0), max(0.02 - max(0.0, t - 1.2) * 0.05, -depth)
+@dataclass(frozen=True)
+class Trial:
+    """What is touched, by which hand, through which link, how."""
+
+    surface: dict[str, float] | None = None
+    """Arguments of `Surface`; None: the virtual table."""
+    scale: float = 0.2
+    delay: float = 0.0
+    jitter: float = 0.01
+    loss: float = 0.02
+    depth: float = 0.015
+    """Of the hand's goal below the surface, m."""
+    slide: float = 0.0
+    """Way along the surface, m."""
+    hand: tuple[float, float, float] = (0.15, 200.0, 4.0)
+    """kg, N/m, N s/m."""
+    duration: float = 9.0
+
+    def goal(self, t: float) -> tuple[float, float, float]:
+        """Return where the hand wants to be: 20 mm above, from 1.2 s on down at 50 mm/s, from 3 s on aside."""
+        return 0.0, self.slide * min(max((t - 3.0) / 1.5, 0.0), 1.0), max(0.02 - max(0.0, t - 1.2) * 0.05, -self.depth)
+
+    def builder(self) -> ContactModelBuilder:
+        return ContactModelBuilder(ForceParams(), [TABLE] if self.surface is None else [])
 
 
-def run(surface: Surface | None, builder: ContactModelBuilder | Naive, *, scale: float, delay: float, depth: float, slide: float) -> np.ndarray:
+def run(trial: Trial, builder: ContactModelBuilder | Naive) -> np.ndarray:
     """Return rows of hand x, y, z (m), the force on it (N), and the force on the tip (N), one for each tick."""
     chance = random.Random(1)
-    up, down = (Link(delay, 0.01 if delay else 0.0, 0.02 if delay else 0.0, chance) for _ in range(2))
-    hand, loop = Hand(MASS, GRIP, DAMPING, TICK, way(0.0, depth, slide)), HapticLoop(Limits())
-    tip, newest, heard, touched, none = Tip(scale * np.array(hand.position), surface), 0, hand.position, np.zeros(3), np.zeros(6)
-    rows = np.empty((round(DURATION / TICK), 9))
+    up, down = (Link(trial.delay, trial.jitter if trial.delay else 0.0, trial.loss if trial.delay else 0.0, chance) for _ in range(2))
+    hand, loop = Hand(*trial.hand, TICK, trial.goal(0.0)), HapticLoop(Limits())
+    tip = Tip(trial.scale * np.array(hand.position), None if trial.surface is None else Surface(**trial.surface))
+    newest, heard, touched, none = 0, hand.position, np.zeros(3), np.zeros(6)
+    rows = np.empty((round(trial.duration / TICK), 9))
     for i, row in enumerate(rows):
         t = i * TICK
         up.send(t, hand.position)
         if i % round(PERIOD / TICK) == 0:
             for number, position in up.arrived(t):
                 newest, heard = max((newest, heard), (number, position))
-            command = scale * np.array(heard)
+            command = trial.scale * np.array(heard)
             touched = tip.follow(command)
             wrench = np.array([*touched, 0.0, 0.0, 0.0])
-            planes = builder.planes(np.array(heard), command, np.eye(3), scale, following=True, tip_wrench=wrench, rigid_wrench=none, elapsed=PERIOD)
+            planes = builder.planes(np.array(heard), command, np.eye(3), trial.scale, following=True, tip_wrench=wrench, rigid_wrench=none, elapsed=PERIOD)
             down.send(t + PERIOD, planes_of(ContactModel(header=Header(), planes=planes)))
         for number, planes in down.arrived(t):
             loop.receive(planes, number, t)
         force = loop.tick(t, hand.position, hand.velocity, permitted=True)
         row[:] = *hand.position, *force, *touched
-        hand.move(force, way(t, depth, slide), (0.0, 0.0, 0.0))
+        hand.move(force, trial.goal(t), (0.0, 0.0, 0.0))
     return rows
 
 
-CASES: dict[str, tuple[Callable[[], Surface | None], float, float]] = {
-    "table, 200 N/m": (lambda: None, 1.0, 0.0),
-    "table, stroked": (lambda: None, 1.0, 0.02),
-    "spring, 300 N/m": (lambda: Surface(300.0), 0.2, 0.0),
-    "spring, 1000 N/m": (lambda: Surface(1000.0), 0.2, 0.0),
-    "tissue, power 1.5": (lambda: Surface(500.0, power=1.5), 0.2, 0.0),
-    "tissue, damping 4 N s/m": (lambda: Surface(500.0, power=1.5, damping=4.0), 0.2, 0.0),
-    "tissue, rubbed": (lambda: Surface(500.0, power=1.5, friction=0.3), 0.2, 0.03),
-    "hard, 20 kN/m": (lambda: Surface(2e4, damping=20.0), 0.2, 0.0),
-    "hard, rubbed": (lambda: Surface(2e4, damping=20.0, friction=0.3), 0.2, 0.03),
-    "spring, 300 N/m, scale 1": (lambda: Surface(300.0), 1.0, 0.0),
+CASES = {
+    "table, 200 N/m": Trial(scale=1.0),
+    "table, stroked": Trial(scale=1.0, slide=0.02),
+    "spring, 300 N/m": Trial({"stiffness": 300.0}),
+    "spring, 1000 N/m": Trial({"stiffness": 1000.0}),
+    "tissue, power 1.5": Trial({"stiffness": 500.0, "power": 1.5}),
+    "tissue, damping 4 N s/m": Trial({"stiffness": 500.0, "power": 1.5, "damping": 4.0}),
+    "tissue, rubbed": Trial({"stiffness": 500.0, "power": 1.5, "friction": 0.3}, slide=0.03),
+    "hard, 20 kN/m": Trial({"stiffness": 2e4, "damping": 20.0}),
+    "hard, rubbed": Trial({"stiffness": 2e4, "damping": 20.0, "friction": 0.3}, slide=0.03),
+    "spring, 300 N/m, scale 1": Trial({"stiffness": 300.0}, scale=1.0),
 }
+
+
+def random_trials(count: int) -> Iterator[Trial]:
+    """Yield contacts, hands and links as they may be."""
+    chance = random.Random(1)
+    for _ in range(count):
+        surface = {"stiffness": 10 ** chance.uniform(1.7, 4.2), "power": chance.choice((1.0, 1.5, 2.0))}
+        surface |= {"damping": chance.choice((0.0, 1.0, 4.0)), "friction": chance.choice((0.0, 0.2, 0.4))}
+        yield Trial(
+            surface,
+            scale=chance.choice((0.1, 0.2, 0.4, 1.0)),
+            delay=chance.choice((0.0, 0.07, 0.1, 0.2, 0.3)),
+            jitter=chance.choice((0.0, 0.01, 0.03)),
+            loss=chance.choice((0.0, 0.02, 0.05)),
+            depth=chance.uniform(0.003, 0.02),
+            slide=chance.choice((0.0, chance.uniform(0.005, 0.05))),
+            hand=(chance.choice((0.1, 0.15, 0.3)), chance.choice((100.0, 200.0, 400.0)), chance.choice((3.0, 4.0, 8.0))),
+        )
 
 
 def figures(rows: np.ndarray) -> dict[str, float]:
@@ -170,39 +209,55 @@ def figures(rows: np.ndarray) -> dict[str, float]:
 
 def largest_gain(stiffness: float, settling: float) -> float:
     """Return the largest |1 - tangent / secant| at which the loop is stable whatever the delay, by the small-gain theorem (docs/decisions/0025)."""
-    s = 1j * np.logspace(-1, 4, 200_001)
-    return float(np.min(np.abs((MASS * s**2 + DAMPING * s + GRIP + stiffness) * (1.0 + s * settling))) / stiffness)
+    s, (mass, grip, damping) = 1j * np.logspace(-1, 4, 200_001), Trial().hand
+    return float(np.min(np.abs((mass * s**2 + damping * s + grip + stiffness) * (1.0 + s * settling))) / stiffness)
+
+
+def show_margins() -> None:
+    for stiffness in (50.0, 100.0, 200.0, 400.0):
+        print(f"plane of {stiffness:3g} N/m: gain below", ", ".join(f"{largest_gain(stiffness, t):.2f} at {t * 1e3:g} ms" for t in (0.02, 0.1)))
+
+
+def show_random(count: int, *, naive: bool) -> None:
+    swinging = 0
+    for trial in random_trials(count):
+        found = figures(run(trial, Naive() if naive else trial.builder()))
+        if found["swing_m"] > 0.5e-3:
+            swinging += 1
+            print(f"{1e3 * found['swing_m']:.2f} mm: {trial}")
+    print(f"{swinging} of {count} swing by more than 0.5 mm")
+
+
+def show_cases(delays_ms: list[float], *, naive: bool) -> dict[str, dict[str, dict[str, float]]]:
+    results: dict[str, dict[str, dict[str, float]]] = {}
+    for name, case in CASES.items():
+        results[name] = {}
+        for delay in delays_ms:
+            trial = replace(case, delay=delay * 1e-3)
+            found = results[name][f"{delay:g} ms"] = figures(run(trial, Naive() if naive and trial.surface else trial.builder()))
+            swing = f"swing {1e3 * found['swing_before_m']:8.4f} {1e3 * found['swing_m']:8.4f} mm"
+            force = f"hand {found['hand_force_n']:.3f} N of {found['tip_force_n']:.3f}, peak {found['peak_hand_force_n']:.3f}"
+            print(f"{name:26} {delay:4g} ms  {swing}   {force}", flush=True)
+    return results
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--delays-ms", type=float, nargs="+", default=[0, 70, 100, 200, 300])
-    parser.add_argument("--depth-mm", type=float, default=15.0, help="of the hand's goal below the surface")
     parser.add_argument("--naive", action="store_true")
+    parser.add_argument("--random", type=int, metavar="COUNT")
     parser.add_argument("--margin", action="store_true")
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--output", type=Path)
+    parser.add_argument("--output", type=Path, help="JSON")
     args = parser.parse_args()
     if args.margin:
-        for stiffness in (50.0, 100.0, 200.0, 400.0):
-            print(f"plane of {stiffness:3g} N/m: gain below", ", ".join(f"{largest_gain(stiffness, t):.2f} at {t * 1e3:g} ms" for t in (0.02, 0.1)))
-        return
-    results: dict[str, dict[str, dict[str, float]]] = {}
-    for name, (surface, scale, slide) in CASES.items():
-        results[name] = {}
-        for delay in args.delays_ms:
-            builder = Naive() if args.naive else ContactModelBuilder(ForceParams(), [TABLE] if surface() is None else [])
-            rows = run(surface(), builder, scale=scale, delay=delay * 1e-3, depth=args.depth_mm * 1e-3, slide=slide)
-            found = results[name][f"{delay:g} ms"] = figures(rows)
-            if not args.json:
-                swing = f"swing {1e3 * found['swing_before_m']:8.4f} {1e3 * found['swing_m']:8.4f} mm"
-                force = f"hand {found['hand_force_n']:.3f} N of {found['tip_force_n']:.3f}, peak {found['peak_hand_force_n']:.3f}"
-                print(f"{name:26} {delay:4g} ms  {swing}   {force}")
-    if args.output:
-        args.output.write_text(json.dumps(results, indent=2) + "\n")
-    if args.json:
-        print(json.dumps(results))
+        show_margins()
+    elif args.random:
+        show_random(args.random, naive=args.naive)
+    else:
+        results = show_cases(args.delays_ms, naive=args.naive)
+        if args.output:
+            args.output.write_text(json.dumps(results, indent=2) + "\n")
 
 
 if __name__ == "__main__":
