@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
 import json
 import platform
 import sys
@@ -32,11 +31,6 @@ class Finding:
     """Nothing runs without it."""
 
 
-_LIBRARIES = (
-    ("device", "LibOVR", ("LibOVRRT64_1", "OVRRT64_1"), "Oculus headsets", "install the Oculus runtime (Windows)"),
-    ("device", "OpenXR", ("openxr_loader",), "head-mounted displays", "apt-get install libopenxr-loader1"),
-)
-
 _ROS = (
     ("ROS 2", "rclpy", "source the setup.bash of a ROS 2 installation before starting trocar"),
     ("ROS 1", "rospy", "apt-get install python3-rospy, and let this environment see /usr/lib/python3/dist-packages"),
@@ -44,8 +38,8 @@ _ROS = (
 
 
 def examine() -> list[Finding]:
-    """Look at Python, Zenoh, certificates, the extras, the kinds of participants, device libraries, OpenGL and ROS. Starts no device."""
-    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _certificates, _extras, _kinds, _libraries, _checks, _ros)
+    """Look at Python, Zenoh, certificates, the extras, the kinds of participants, what packages bring checks for, and ROS. Starts no device."""
+    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _certificates, _extras, _kinds, _checks, _ros)
     return [finding for section in sections for finding in section()]
 
 
@@ -94,12 +88,6 @@ def _kinds() -> Iterator[Finding]:
     broken = registry.broken()
     for name, kind in sorted(registry.kinds().items()):
         yield Finding(kind.role, name, name not in broken, broken.get(name, f"from {kind.distribution}"), f"pip install --force-reinstall {kind.distribution}")
-
-
-def _libraries() -> Iterator[Finding]:
-    for area, name, stems, use, remedy in _LIBRARIES:
-        found = next((path for stem in stems if (path := ctypes.util.find_library(stem))), None)
-        yield Finding(area, name, found is not None, f"{found or 'not found'}: {use}", remedy)
 
 
 def _checks() -> Iterator[Finding]:

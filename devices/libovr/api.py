@@ -29,6 +29,7 @@ __all__ = [
     "PoseState",
     "SessionStatus",
     "TrackingState",
+    "check",
     "default_library",
     "load",
 ]
@@ -183,3 +184,12 @@ def load(library: str) -> Api:
     except (OSError, AttributeError) as error:
         raise DeviceError(f"LibOVR cannot be loaded from '{library}' ({error})") from error
     return api
+
+
+def check() -> tuple[bool, str, str]:
+    """Return whether this machine has the library, which, and what mends it where it has not: for `trocar doctor`. Starts nothing."""
+    remedy = "install the Oculus (Meta Quest Link) application (Windows)"
+    try:
+        return True, f"{load(default_library()).ovr_GetVersionString().decode(errors='replace')}: headsets of Oculus", remedy
+    except DeviceError as error:
+        return False, str(error), remedy

@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from devices.headset import Headset, HeadsetParams, Runtime
-from schemas.errors import MissingExtraError
+from schemas.errors import DeviceError, MissingExtraError
 
-__all__ = ["OpenXr", "OpenXrParams"]
+__all__ = ["OpenXr", "OpenXrParams", "check"]
 
 
 class OpenXrParams(HeadsetParams):
@@ -30,12 +30,32 @@ class OpenXr(Headset):
     def open(self, directory: Path) -> None:
         """Begin anew. Raises MissingExtraError where pyopenxr is not installed."""
         super().open(directory)
-        os.environ.setdefault("XR_LOADER_DEBUG", "none")  # what the loader would print at every try, the diagnosis says once
         if find_spec("xr") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind openxr)", "openxr", "pyopenxr")
+        _hush()
 
     def connect(self) -> Runtime:
         """Connect to the runtime. Raises DeviceError where there is none."""
         from devices.openxr.runtime import OpenXrRuntime
 
         return OpenXrRuntime(self.params.origin)
+
+
+def _hush() -> None:
+    """Keep the loader from printing at every try what the diagnosis says once."""
+    os.environ.setdefault("XR_LOADER_DEBUG", "none")
+
+
+def check() -> tuple[bool, str, str]:
+    """Return whether this machine has a runtime that can be used, what was found, and what mends it: for `trocar doctor`. Starts nothing."""
+    if find_spec("xr") is None:
+        return False, "pyopenxr is not installed", "pip install 'trocar[openxr]'"
+    from devices.openxr.runtime import lacking, offered
+
+    _hush()
+    remedy = "install SteamVR or Monado, and make it the system's active OpenXR runtime"
+    try:
+        problem = lacking(offered())
+    except DeviceError as error:
+        return False, str(error), remedy
+    return not problem, problem or "the active runtime gives poses without pictures: head-mounted displays", remedy

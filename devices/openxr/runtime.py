@@ -14,7 +14,7 @@ from devices.openxr import clock
 from devices.vendor_axes import Vector3
 from schemas.errors import DeviceError
 
-__all__ = ["ORIGINS", "OpenXrRuntime"]
+__all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
 
 HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
 """A session without graphics, which is needed; being told whether somebody wears the headset, which is welcome."""
@@ -22,6 +22,25 @@ ORIGINS = {"eye": xr.ReferenceSpaceType.LOCAL, "floor": xr.ReferenceSpaceType.ST
 _VALID = xr.SpaceLocationFlags.ORIENTATION_VALID_BIT | xr.SpaceLocationFlags.POSITION_VALID_BIT
 """Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the position."""
 _Event = TypeVar("_Event", bound=Structure)
+
+
+def offered() -> set[str]:
+    """Return the names of the extensions of the system's active runtime, which this loads and does not start. Raises DeviceError where there is none."""
+    try:
+        return {extension.extension_name.decode() for extension in xr.enumerate_instance_extension_properties()}
+    except xr.exception.XrException as error:
+        raise _unanswered(error) from error
+
+
+def lacking(found: set[str]) -> str:
+    """Return what is wrong with a runtime that offers `found`; nothing if it can be asked for a head."""
+    missing = [name for name in (HEADLESS, clock.EXTENSION) if name not in found]
+    return (
+        f"this OpenXR runtime does not offer {' and '.join(missing)}, without which a head cannot be asked for; take one that does, such as"
+        " SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
+        if missing
+        else ""
+    )
 
 
 class OpenXrRuntime:
@@ -51,19 +70,14 @@ class OpenXrRuntime:
 
     @staticmethod
     def _make_instance() -> xr.Instance:
+        found = offered()
+        version = xr.Version(1, 0, 0)
+        about = xr.ApplicationInfo(application_name="trocar", application_version=1, engine_name="trocar", engine_version=1, api_version=version)
+        enabled = [HEADLESS, clock.EXTENSION, *({PRESENCE} & found)]
         try:
-            offered = {extension.extension_name.decode() for extension in xr.enumerate_instance_extension_properties()}
-            if missing := [name for name in (HEADLESS, clock.EXTENSION) if name not in offered]:
-                raise DeviceError(
-                    f"this OpenXR runtime does not offer {' and '.join(missing)}, without which a head cannot be asked for; take one that does, such as"
-                    " SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
-                )
-            enabled = [HEADLESS, clock.EXTENSION, *({PRESENCE} & offered)]
-            version = xr.Version(1, 0, 0)
-            about = xr.ApplicationInfo(application_name="trocar", application_version=1, engine_name="trocar", engine_version=1, api_version=version)
             return xr.create_instance(xr.InstanceCreateInfo(application_info=about, enabled_extension_names=enabled))
-        except xr.exception.XrException as error:
-            raise DeviceError(f"no OpenXR runtime answers ({_said(error)}); start one, and make it the system's active one") from error
+        except xr.exception.XrException as error:  # also if it lacks something: only a failure makes the loader look for the active runtime anew
+            raise DeviceError(lacking(found)) if lacking(found) else _unanswered(error) from error
 
     def locate(self) -> HeadState | NoHead:
         """Return where the head is now. Raises DeviceError where the runtime or the session is gone."""
@@ -130,6 +144,10 @@ def _as(event: xr.EventDataBuffer, kind: type[_Event]) -> _Event:
 
 def _vector(v: xr.Vector3f) -> Vector3:
     return v.x, v.y, v.z
+
+
+def _unanswered(error: xr.exception.XrException) -> DeviceError:
+    return DeviceError(f"no OpenXR runtime answers ({_said(error)}); start one, and make it the system's active one")
 
 
 def _said(error: Exception) -> str:

@@ -236,3 +236,12 @@ def test_a_wrong_library_is_an_error_and_a_missing_one_a_diagnosis(tmp_path):
     device.open(tmp_path)
     (sample,) = device.read(0)
     assert "install the Oculus" in sample.message.message
+
+
+def test_doctor_is_told_of_the_library(library, monkeypatch):
+    works, detail, remedy = api.check()
+    assert not works
+    assert "libOVRRT64" in detail
+    assert "install" in remedy
+    monkeypatch.setattr(api, "default_library", lambda: str(library))
+    assert api.check()[:2] == (True, "1.32.0-standin: headsets of Oculus")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.openxr.device import OpenXr, OpenXrParams
+from devices.openxr.device import OpenXr, OpenXrParams, check
 from devices.vendor_axes import vector
 from hub.testing import check_device
 from robots import rotation
@@ -208,9 +208,11 @@ def test_whatever_fails_is_told_and_tried_again(read, runtime, call, code, messa
     assert read(300)[0].count("pose") >= 50
 
 
-def test_a_runtime_that_wants_pictures_is_told_apart(read, runtime):
+def test_a_runtime_that_wants_pictures_is_told_apart_until_another_one_is_active(read, runtime):
     runtime.without_headless = 1
     assert "does not offer XR_MND_headless" in read()[1]["diagnostics"].message
+    runtime.without_headless = 0
+    assert read(300)[0].count("pose") >= 50
 
 
 def test_no_runtime_at_all(monkeypatch, tmp_path):
@@ -225,3 +227,32 @@ def test_without_the_package_the_line_that_brings_it(monkeypatch):
     monkeypatch.setattr("devices.openxr.device.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"trocar\[openxr\]"):
         OpenXr("head", OpenXrParams()).open(Path())
+
+
+@pytest.fixture
+def forgotten(runtime):
+    """The loader keeps the runtime that it has asked until an instance of it is destroyed."""
+
+    def forget():
+        reader = Reader()
+        reader()
+        reader.device.close()
+
+    forget()
+    yield
+    runtime.without_headless = 0
+    forget()
+
+
+@pytest.mark.parametrize("case", ["works", "lacks", "absent", "not installed"])
+def test_doctor_is_told_of_the_runtime_without_starting_it(forgotten, runtime, case, monkeypatch, tmp_path):
+    runtime.without_headless = int(case == "lacks")
+    with monkeypatch.context() as here:
+        if case == "absent":
+            here.setenv("XR_RUNTIME_JSON", str(tmp_path / "nowhere.json"))
+        if case == "not installed":
+            here.setattr("devices.openxr.device.find_spec", lambda name: None)
+        works, detail, remedy = check()
+    assert works == (case == "works")
+    assert {"works": "gives poses", "lacks": "does not offer XR_MND_headless", "absent": "no OpenXR runtime answers"}.get(case, "pyopenxr") in detail
+    assert ("trocar[openxr]" in remedy) == (case == "not installed")
