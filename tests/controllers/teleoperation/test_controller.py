@@ -149,6 +149,54 @@ def test_the_command_never_jumps(moves, orientation):
         away = move in ("press", "silent") or (away and session.teleoperation._engagement.phase is Phase.CLUTCHED)
 
 
+PARAMS = {
+    "hold": {"orientation": "hold"},
+    "follow": {"orientation": "follow", "instrument": "400006"},
+    "velocity": {"law": "velocity", "instrument": "400006"},
+    "held": {"engage": "held", "instrument": "400006"},
+    "gate": {"align": "gate", "orientation": "follow", "engage": "held"},
+    "camera": {"view": "camera", "instrument": "MUSHA_HAND", "contact_period": "2 ms"},
+    "table": {"planes": [{"normal": [0, 0, 1], "distance": "-113.6 mm", "stiffness": "200 N/m"}]},
+}
+
+
+BAD_DAYS = ("lead", "lead", "leap", "press", "release", "both", "silent", "scale", "view", "off", "on", "gripper")
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.sampled_from(["hold", "follow", "velocity", "held", "gate", "camera"]), st.lists(st.sampled_from(BAD_DAYS), min_size=5, max_size=40), st.integers(0, 99)
+)
+def test_whatever_happens_the_arm_holds_or_follows_within_its_limits(mode, days, seed):
+    """Nobody who does not follow moves; whoever takes over moves nothing in that step; nothing is faster or further than the joints are."""
+    session, random, ready = Session(**PARAMS[mode]), np.random.default_rng(seed), True
+    chain = session.chain
+    session.step()
+    follows = session.follows
+    for day in days:
+        session.hand[:3] += random.normal(0.0, 0.1 if day == "leap" else 1e-3, 3)
+        session.turn_hand(random.normal(0.0, 1.0 if day == "leap" else 0.01, 3))
+        session.twist[:] = random.normal(0.0, 0.1, 6)
+        session.scale[0] = random.uniform(-0.1, 1.2) if day == "scale" else session.scale[0]
+        if day == "view":
+            session.values["base_in_view"][3:] = rotation.exp(random.normal(0.0, 1.0, 3))
+        session.values["gripper"][0] = random.uniform(-0.5, 1.5) if day == "gripper" else session.values["gripper"][0]
+        events = {"press": [[1, 1]], "release": [[0, 0]], "both": [[1, 0], [0, 1]]}.get(day, [])
+        arm = {"off": ("PAUSED", True), "on": ("ENABLED", True)}.get(day)
+        ready = ready if arm is None else arm[0] == "ENABLED"
+        before = session.command
+        session.step(*events, stale=day == "silent", arm=arm)
+        moved = np.abs(session.command - before)
+        assert all(np.isfinite(session.outputs[name]).all() for name in ("servo_jp", "goal_cp"))
+        assert (session.command >= chain.lower).all()
+        assert (session.command <= chain.upper).all()
+        if ready:
+            assert (moved <= chain.velocity * H * 1e-9 * (1 + 1e-9)).all()
+            assert not moved.any() or (session.follows and (follows or mode == "velocity"))
+        assert session.follows <= ready
+        follows = session.follows
+
+
 def wander(session, steps, seed):
     random = np.random.default_rng(seed)
     for _ in range(steps):
@@ -159,16 +207,6 @@ def wander(session, steps, seed):
         clutch = [[[1, 0]], [[0, 1]], [], [], []][random.integers(5)]
         session.step(*clutch, stale=random.random() < 0.1)
     return session
-
-
-PARAMS = {
-    "hold": {"orientation": "hold"},
-    "follow": {"orientation": "follow", "instrument": "400006"},
-    "velocity": {"law": "velocity", "instrument": "400006"},
-    "gate": {"align": "gate", "orientation": "follow", "engage": "held"},
-    "camera": {"view": "camera", "instrument": "MUSHA_HAND", "contact_period": "2 ms"},
-    "table": {"planes": [{"normal": [0, 0, 1], "distance": "-113.6 mm", "stiffness": "200 N/m"}]},
-}
 
 
 @pytest.mark.parametrize("params", PARAMS.values(), ids=PARAMS.keys())
