@@ -21,7 +21,7 @@ _CONDITIONS = tuple(Condition)
 
 def lost(phase: Phase, code: int, device: str | None, cause: str) -> tuple[Level, str]:
     """Return the diagnosis of a stylus that no process has; `cause` is what else is known."""
-    why = cause or Code.text(code)
+    why = cause or (Code.text(code) if code else "no cause is known")
     if phase is Phase.ABSENT:
         known = f"that the vendor's setup program knows it as '{device}'" if device else "that the vendor's setup program has it as the default device"
         return Level.ERROR, f"it cannot be opened ({why}): see that it is plugged in and switched on, and {known}; {_AGAIN}"

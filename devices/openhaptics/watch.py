@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from devices.openhaptics.exchange import State
-from devices.openhaptics.hdapi import Code
-from devices.openhaptics.probe import Probe
+from devices.openhaptics.probe import Finding, Probe, absence
 from devices.openhaptics.process import ServoProcess
 from devices.openhaptics.stylus import Phase, Spec
 from schemas.errors import DeviceError
@@ -128,8 +127,7 @@ class Watch:
 
     def _hear(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
         if "absent" in message:
-            code = message["absent"]
-            self._lose(message["stylus"], Phase.BUSY if Code.is_busy(code) else Phase.ABSENT, code, "", now)
+            self._lose(message["stylus"], *absence(message["absent"]), "", now)
             if self.lost.keys() >= set(process.names):
                 self._end(process, now)
         elif "stylus" in message:
@@ -164,6 +162,7 @@ class Watch:
 
     def _lose(self, name: str, phase: Phase, code: int, cause: str, now: float) -> None:
         if name in self.lost:
+            self.lost[name].cause = self.lost[name].cause or cause
             return
         lasted = now - self._started > _LASTING
         delay = _FIRST_RETRY if lasted else self._delays[name]
@@ -186,8 +185,14 @@ class Watch:
             elif self._probe is None:
                 self._probe = Probe(ServoProcess(self._library, [self._specs[name] for name in due]), now)
 
-    def _take_note(self, found: Mapping[str, bool], now: float) -> None:
-        for name in found.keys() & self.lost.keys():
-            self.lost[name].found = found[name]
-            self.lost[name].retry = now + self._delays[name]
+    def _take_note(self, found: Mapping[str, Finding | None], now: float) -> None:
+        """Take in what a probe has found of lost styluses."""
+        for name, finding in found.items():
+            lost = self.lost[name]
+            if finding is not None and not finding.phase.is_lost:
+                lost.found = True
+                continue
+            if finding is not None:
+                lost.phase, lost.code, lost.cause = finding.phase, finding.code, ""
+            lost.retry = now + self._delays[name]
             self._delays[name] = min(2.0 * self._delays[name], _LAST_RETRY)
