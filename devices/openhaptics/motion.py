@@ -12,7 +12,7 @@ __all__ = ["Tip"]
 
 _SMOOTHING = 0.01
 """Time constant with which the angular velocity is smoothed, s: a Touch's gimbal has potentiometers, and a hand turns no faster than some Hz."""
-_UNIT = 1e-2
+_UNIT = 0.1
 """How far the length of an axis may be from 1, squared: HDAPI's rotations have small errors, what is no rotation has great ones."""
 
 
