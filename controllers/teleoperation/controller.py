@@ -134,7 +134,7 @@ class Teleoperation(Stepped):
             return
         if self._engagement.takes_over:
             self._law.engage(hand, self._tip, to_base, scale)
-        self._command[:] = self._law.step(self._command, hand, to_base, scale, seconds * self._chain.velocity)
+        self._command[:] = self._law.step(self._command, hand, self._tip, to_base, scale, seconds * self._chain.velocity)
         self._find_tip()
 
     def _lead_jaw(self, gripper: float, seconds: float) -> None:

@@ -11,6 +11,8 @@ change while it leads: so no change moves the tip, and no motion of the hand is 
 
 from __future__ import annotations
 
+from math import radians
+
 import numpy as np
 
 from robots import rotation
@@ -19,6 +21,9 @@ from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
 __all__ = ["PoseLaw"]
+
+_MOST_LAG = radians(90.0)
+"""Of the tip's orientation behind its goal: half of where it would turn round; ours."""
 
 
 class PoseLaw:
@@ -44,7 +49,7 @@ class PoseLaw:
         self._tip0[:] = self.goal[:] = tip
         self._to_base[:], self._scale[0] = to_base, scale
 
-    def step(self, command: Vector, hand: Vector, to_base: Vector, scale: float, largest_move: Vector) -> Vector:
+    def step(self, command: Vector, hand: Vector, tip: Vector, to_base: Vector, scale: float, largest_move: Vector) -> Vector:
         """Return the joint positions, shape (n,), after `command`, with the hand at `hand`; arguments as of `engage` and `pursue`."""
         if scale != self._scale[0] or (to_base != self._to_base).any():
             self.engage(self._hand.copy(), self.goal.copy(), to_base, scale)
@@ -54,4 +59,8 @@ class PoseLaw:
             offset = rotation.product(rotation.conjugate(rotation.product(to_base, self._hand0[3:])), self._tip0[3:])
             goal = rotation.product(rotation.product(to_base, hand[3:]), offset)
             self.goal[3:] = goal / np.linalg.norm(goal)
+            lag = rotation.log(rotation.product(self.goal[3:], rotation.conjugate(tip[3:])))
+            if (angle := float(np.linalg.norm(lag))) > _MOST_LAG:
+                self.goal[3:] = rotation.product(rotation.exp(lag * (_MOST_LAG / angle)), tip[3:])
+                self.engage(hand, self.goal.copy(), to_base, scale)
         return pursue(self._chain, command, self.goal[:3], self.goal[3:], largest_move)

@@ -28,10 +28,11 @@ def test_ten_thousand_clutch_cycles_do_not_drift():
     there, turned = home[:3, 3].copy(), home[:3, :3].copy()
     for _ in range(10_000):
         hand = leap(random)
-        law.engage(hand, np.concatenate([frame[:3, 3], rotation.from_matrix(frame)]), to_base, scale)
+        tip = np.concatenate([frame[:3, 3], rotation.from_matrix(frame)])
+        law.engage(hand, tip, to_base, scale)
         way, turn = stray(random, there - home[:3, 3])
         moved = np.concatenate([hand[:3] + way, rotation.product(rotation.exp(turn), hand[3:])])
-        command = law.step(command, moved, to_base, scale, 1e-3 * chain.velocity)
+        command = law.step(command, moved, tip, to_base, scale, 1e-3 * chain.velocity)
         there += scale * way
         turned = rotation.matrix(rotation.exp(turn)) @ turned
         frame = chain.forward(command)
@@ -85,6 +86,25 @@ def test_beyond_the_range_the_arm_waits_where_it_is_nearest_and_comes_back_with_
         assert depth <= session.chain.upper[2]
         assert abs(depth - min(0.12 + share * out, session.chain.upper[2])) < 1e-9
     assert np.allclose(session.tip, start, atol=1e-12)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_hand_that_rolls_on_past_the_limit_does_not_turn_the_tip_round(sense):
+    """Roll ends at 260 degrees. The hand goes on for 300 more and comes back: the tip stands, then follows once it is less than 90 degrees behind."""
+    start = [0.0, 0.0, 0.12, sense * 4.0, 0.0, 0.0]
+    session = Session(instrument=DRIVER, orientation="follow", start=start)
+    session.values["measured_js"][:6] = start
+    session.step()
+    limit, ahead, rolls = session.chain.upper[3], session.turn[:, 2], []
+    for degree in (*[1.0] * 330, *[-1.0] * 330):
+        session.turn_hand(sense * np.radians(degree) * ahead)
+        session.step(count=2)
+        rolls.append(sense * session.command[3])
+    out, back = np.diff(rolls[:330]), np.diff(rolls[330:])
+    assert (out >= -1e-9).all()
+    assert max(rolls) == pytest.approx(limit)
+    assert (back <= 1e-9).all()
+    assert rolls[-1] == pytest.approx(limit - np.radians(330.0 - 90.0), abs=1e-6)
 
 
 def test_a_scale_or_a_view_that_changes_while_the_hand_moves_loses_none_of_its_way():
