@@ -27,7 +27,8 @@ class Clock:
         self.late_steps = 0
         alone = not realtime and len(plan.hosts()) == 1
         self._window = window or (max(1, _WINDOW_NS // plan.step_ns) if alone else 1)
-        self._realtime = realtime
+        self.realtime = realtime
+        """Whether steps follow the wall clock."""
         self.steps = steps
         self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets} | {device.period for device in plan.meetings()})
         self._wall_zero_ns = monotonic_ns()
@@ -62,7 +63,7 @@ class Clock:
     def advance(self, count: int) -> None:
         """Go on by `count` steps; in real time wait for the wall clock, or slip by as much as the steps came late."""
         self.step += count
-        if not self._realtime:
+        if not self.realtime:
             return
         ahead_ns = self._wall_zero_ns + self.time_ns - monotonic_ns()
         if ahead_ns >= 0:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from time import monotonic, monotonic_ns, sleep
 
 import zenoh
-from zenoh.handlers import Callback, FifoChannel
+from zenoh.handlers import Callback
 
 from hub.account import Account
+from hub.acks import Acks
+from hub.bond_check import check_bonds
 from hub.clock import Clock
 from hub.control import ControlServer, RunState
-from hub.coupling import stable_step_problem
 from hub.endpoint import free_endpoint, require_loopback
 from hub.fleet import Fleet, Watchdog
 from hub.gate import Gate
@@ -34,10 +34,9 @@ from hub.recorder import Recorder
 from hub.summary import Progress, Summary
 from hub.wire import Drops, Wire, open_session
 from schemas.codec import decode, encode
-from schemas.errors import MessageError, ParticipantError, ScenarioError, SessionError
+from schemas.errors import MessageError, ScenarioError, SessionError
 from schemas.keys import Keys
-from schemas.lockstep import Permission, Report, pack_permission, unpack_report
-from schemas.ports import BondSide
+from schemas.lockstep import Permission, Report, pack_permission
 from schemas.ros import StringMessage
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Grant
@@ -48,7 +47,6 @@ log = logging.getLogger(__name__)
 
 _PROGRESS_S = 0.1
 _STATUS_S = 0.5
-_NO_STEPS: Mapping[str, int] = {}
 
 
 class Session:
@@ -145,9 +143,8 @@ class Session:
     def _open(self, session: zenoh.Session) -> None:
         """Declare everything on `session`, and lay out what runs in this process."""
         keys = self._keys
-        self._by_ack = {keys.ack(name): self.plan.members[name] for name in self.plan.order}
-        self._acks = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
-        self._failures = Failures(wake=lambda: self._wake(session))
+        self._acks = Acks(session, keys, self.plan, self._run_id, self._drops)
+        self._failures = Failures(wake=self._wake)
         self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, list(self._observers.away.values()), self._fail)
         block, real_time, cdr = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME, zenoh.Encoding.APPLICATION_CDR
         self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
@@ -183,7 +180,7 @@ class Session:
         bonds = self._host.configure(self._directory)
         self._intake.open(self._directory)
         self._await_hosts(hosts)
-        self._check_steps({**bonds, **self._membership.bonds()})
+        check_bonds(self.plan, {**bonds, **self._membership.bonds()})
         self._await_links()
 
     def _is_needed(self, host: str) -> bool:
@@ -205,28 +202,17 @@ class Session:
             if monotonic() > deadline:
                 raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {doors}")
 
-    def _check_steps(self, bonds: Mapping[str, Sequence[BondSide]]) -> None:
-        for index, planned in enumerate(self.plan.bonds):
-            bond = planned.bond
-            motion, force = (next(s for s in bonds[end.participant] if s.name == end.port) for end in (bond.motion, bond.force))
-            step_s = self.plan.members[bond.force.participant].period * self.plan.step_ns / 1e9
-            problem = stable_step_problem(bond, motion, force, step_s)
-            if problem and bond.check == "refuse":
-                raise ScenarioError(f"{problem} To run all the same, set 'check: warn' on the bond.", path=("bonds", index))
-            if problem:
-                log.warning("bond %s: %s", bond.name, problem)
-
     def _await_links(self) -> None:
         waiting = [name for name in self.plan.order if name in self._away]
         self._watchdog.wait_for(waiting)
         while waiting or not self._host.linked() or not self._observers.linked():
             self._host.publish_initial()
             self._check()
-            sample = self._acks.try_recv()
-            if sample is None:
+            ready = self._acks.ready(waiting)
+            if ready is None:
                 sleep(0.005)
-            elif (accepted := self._accept(sample, waiting)) is not None:
-                waiting.remove(accepted[0].name)
+            else:
+                waiting.remove(ready)
         self._watchdog.wait_for(())
 
     def _loop(self, progress: Callable[[Progress], None] | None) -> None:
@@ -293,12 +279,16 @@ class Session:
         self._host.run(grant, lambda member, report: self._reports.append((member, report, None)))
         self._watchdog.wait_for(waiting)
         while waiting:
-            accepted = self._accept(self._acks.recv(), waiting, grant, steps)
-            if accepted is not None:
+            accepted = self._acks.receive(waiting, grant, steps)
+            if accepted is None:
+                self._check()
+            else:
                 waiting.remove(accepted[0].name)
                 self._reports.append(accepted)
         self._watchdog.wait_for(())
         self._account.acknowledged(granted_ns)
+        if self._clock.realtime:
+            self._settle()  # now rather than when the next sample of a device waits
         count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         self._clock.advance(count)
         self.state.spend(count)
@@ -312,32 +302,6 @@ class Session:
             steps = {name: (end - 1) // period - (begin - 1) // period for name, period in periods.items()}
             self._schedules[key] = [name for name in self.plan.order if steps[name]], steps
         return self._schedules[key]
-
-    def _accept(
-        self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None, steps: Mapping[str, int] = _NO_STEPS
-    ) -> tuple[Member, Report, bytes] | None:
-        """Return a valid report on this grant, in which participants take `steps` (None: on being ready).
-
-        Raises what it reports as a failure; drops and counts anything else.
-        """
-        try:
-            member = self._by_ack.get(str(sample.key_expr))
-            if member is None:
-                self._check()
-                raise MessageError("belongs to no participant of this run")
-            payload = sample.payload.to_bytes()
-            count = steps.get(member.name, 0)
-            report = unpack_report(payload, count, count * len(member.bonds))
-            if report.run != self._run_id:
-                raise MessageError(f"belongs to run {report.run:x}, this is run {self._run_id:x}")
-            if report.error:
-                raise ParticipantError(member.name, report.step, report.error)
-            if member.name not in waiting or report.step != (-1 if grant is None else grant.step):
-                raise MessageError(f"reports on step {report.step}, for which nobody waits")
-        except MessageError as error:
-            self._drops.count(sample, error)
-            return None
-        return member, report, payload
 
     def _settle(self) -> None:
         """Book the reports that have come in, and publish the energy books when they are due."""
@@ -376,21 +340,16 @@ class Session:
         here = self.plan.members[participant].host == "hub"  # of another host only the grant is known
         self._failures.report(participant, max(self._clock.step, self._host.step) if here else self._clock.step, cause)
 
-    def _wake(self, session: zenoh.Session) -> None:
+    def _wake(self) -> None:
         """Make the step loop look at the failures: it may wait for acks, or be inside a participant of this process."""
-        session.put(self._keys.ack("hub"), b"")
+        self._acks.wake()
         self._interrupt()
 
     def _check(self) -> None:
         """Raise the first failure, if there is one: in the words of a participant, if they are here already."""
         if self._failures.first is None:
             return
-        while (sample := self._acks.try_recv()) is not None:
-            member = self._by_ack.get(str(sample.key_expr))
-            with contextlib.suppress(MessageError):
-                report = unpack_report(sample.payload.to_bytes(), 0, 0)
-                if member is not None and report.run == self._run_id and report.error:
-                    raise ParticipantError(member.name, report.step, report.error)
+        self._acks.raise_failure()
         self._failures.check()
 
     def _came_or_went(self, sample: zenoh.Sample) -> None:
