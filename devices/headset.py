@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
 from pydantic import Field
 
 from devices.diagnosis import Diagnosis, Level
 from devices.samples import pose_sample, twist_sample
 from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
 from hub.participant import Device, Params, Sample
+from robots import rotation
 from schemas.errors import DeviceError
 from schemas.ports import Port
 from schemas.quantity import Duration
@@ -42,7 +44,7 @@ class HeadState:
     position: Vector3
     orientation: Quaternion
     linear: Vector3 | None
-    """None where the runtime does not know it, which leaves the twist out."""
+    """None where the runtime does not know it: then it is how far the head has come since the state before, over the time between."""
     angular: Vector3 | None
 
 
@@ -91,7 +93,7 @@ class Headset(Device):
             )
         )
         self._runtime: Runtime | None = None
-        self._newest: float | None = None
+        self._newest: HeadState | None = None
         self._due_ns = self._retry_ns = self._newest_ns = 0
 
     @abstractmethod
@@ -123,24 +125,38 @@ class Headset(Device):
             return self._diagnosis.tell(Level.ERROR, f"{error}; it is looked for again every second")
 
     def _located(self, t: int, runtime: Runtime) -> list[Sample]:
-        state = runtime.locate()
+        state, before = runtime.locate(), self._newest
         if isinstance(state, NoHead):
+            self._newest = None
             return self._diagnosis.tell(state.level, state.message, runtime.hardware)
-        if state.time == self._newest:
+        if before is not None and state.time == before.time:
             still = t - self._newest_ns > self._max_age_ns
             return self._diagnosis.tell(Level.STALE, "the runtime gives no new poses; look at its own software", runtime.hardware) if still else []
-        self._newest, self._newest_ns = state.time, t
+        self._newest, self._newest_ns = state, t
         try:
-            pose = pose_sample(self._pose, t, vector(*state.position), quaternion(*state.orientation))
-            if state.linear is None or state.angular is None:
-                return [*self._diagnosis.tell(Level.WARN, "the runtime gives no velocity; look at its own software", runtime.hardware), pose]
-            twist = twist_sample(self._twist, t, vector(*state.linear), vector(*state.angular))
+            samples = [pose_sample(self._pose, t, vector(*state.position), quaternion(*state.orientation))]
+            linear, angular = _velocities(before, state)
+            if linear is not None and angular is not None:
+                samples.append(twist_sample(self._twist, t, vector(*linear), vector(*angular)))
         except ValueError as error:  # what is not finite, too
+            self._newest = None
             return self._diagnosis.tell(Level.ERROR, f"the runtime gives no pose: {error}; look at its own software", runtime.hardware)
-        return [*self._diagnosis.tell(Level.OK, "the head is tracked", runtime.hardware), pose, twist]
+        return [*self._diagnosis.tell(Level.OK, "the head is tracked", runtime.hardware), *samples]
 
     def close(self) -> None:
         """Let go of the runtime."""
         if self._runtime is not None:
             self._runtime.close()
         self._runtime = None
+        self._newest = None
+
+
+def _velocities(before: HeadState | None, now: HeadState) -> tuple[Vector3 | None, Vector3 | None]:
+    """Return velocity and angular velocity in the vendors' axes; None where neither the runtime nor two poses tell."""
+    if before is None or (now.linear is not None and now.angular is not None):
+        return now.linear, now.angular
+    dt = now.time - before.time
+    vx, vy, vz = ((np.array(now.position) - before.position) / dt).tolist()
+    turn = rotation.product(np.array(now.orientation), rotation.conjugate(np.array(before.orientation)))
+    wx, wy, wz = (rotation.log(turn) / dt).tolist()
+    return now.linear or (vx, vy, vz), now.angular or (wx, wy, wz)

@@ -128,11 +128,32 @@ def test_a_pose_that_is_not_valid_is_none(read, runtime, flags):
 
 
 @pytest.mark.parametrize("flags", [0, 1, 2])
-def test_without_a_velocity_there_is_no_twist(read, runtime, flags):
+def test_what_the_runtime_does_not_know_of_the_velocity_is_taken_from_two_poses(read, runtime, flags):
     runtime.velocity_flags = flags
-    ports, got = read(3)
-    assert ports == ["diagnostics", "pose", "pose", "pose"]
-    assert (got["diagnostics"].level, got["diagnostics"].message[:29]) == (1, "the runtime gives no velocity")
+    runtime.linear[:], runtime.angular[:] = (9.0, 0.0, 0.0), (0.0, 9.0, 0.0)
+    start = rotation.exp(np.array([0.2, -0.4, 0.6]))
+    runtime.orientation[:], runtime.position[:] = start, (1.0, 1.0, 1.0)
+    ports, _ = read()
+    assert ports == ["diagnostics", "pose"]
+    before = runtime.time
+    turn, way = np.array([0.01, 0.02, -0.03]), np.array([0.001, -0.002, 0.003])
+    runtime.orientation[:], runtime.position[:] = rotation.product(rotation.exp(turn), start), 1.0 + way
+    ports, got = read()
+    assert ports == ["pose", "twist"]
+    dt, twist = (runtime.time - before) * 1e-9, got["twist"].twist
+    linear = (9.0, 0.0, 0.0) if flags & 1 else way / dt
+    angular = (0.0, 9.0, 0.0) if flags & 2 else turn / dt
+    assert np.allclose([twist.linear.x, twist.linear.y, twist.linear.z], vector(*linear), rtol=1e-3)
+    assert np.allclose([twist.angular.x, twist.angular.y, twist.angular.z], vector(*angular), rtol=1e-3)
+
+
+def test_no_velocity_is_taken_across_a_gap(read, runtime):
+    runtime.velocity_flags = 0
+    read(3)
+    runtime.location_flags = 0
+    read()
+    runtime.location_flags, runtime.position[0] = 3, 5.0
+    assert read()[0] == ["diagnostics", "pose"]
 
 
 def test_a_headset_that_sleeps_and_wakes(read, runtime):
