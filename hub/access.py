@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hub.credentials import CONSOLE
+from hub.credentials import OBSERVER
 from hub.plan import Member, Plan
 from schemas.keys import Keys
 
@@ -40,7 +40,7 @@ def access_settings(plan: Plan, session: str) -> dict[str, Any]:
     """Return Zenoh's settings by which each remote participant of `plan` may do its part in `session`, and nothing else."""
     keys = Keys(session)
     rights = {member.name: _part(plan, keys, member) for member in plan.members.values() if member.host.startswith("remote/")}
-    rights[CONSOLE] = [*rights.get(CONSOLE, ()), *_asks(Keys("*").status), *_hears(keys.status)]  # all that `trocar ls` needs
+    rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]  # all that `trocar ls` needs
     rules = {f"{name} {index}": rule for name, its in rights.items() for index, rule in enumerate(its)}
     access = {
         "enabled": True,

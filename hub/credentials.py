@@ -15,12 +15,12 @@ import typer
 
 from schemas.errors import ConnectError
 
-__all__ = ["CONSOLE", "HUB", "Certificate", "Credentials", "default_directory", "examine", "load"]
+__all__ = ["HUB", "OBSERVER", "Certificate", "Credentials", "default_directory", "examine", "load"]
 
 HUB = "hub"
 """Name of the certificate with which a hub listens."""
 
-CONSOLE = "console"
+OBSERVER = "observer"
 """Name of the certificate with which anybody may read the status of a session, and nothing else."""
 
 _KEY = re.compile("-----BEGIN PRIVATE KEY-----.*?-----END PRIVATE KEY-----\n", re.DOTALL)
@@ -38,7 +38,7 @@ class Credentials:
 
     @property
     def name(self) -> str:
-        """Whom the certificate names: a participant, `hub` or `console`."""
+        """Whom the certificate names: a participant, `hub` or `observer`."""
         return self.file.stem
 
     def listening(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import zenoh
 from pydantic import BaseModel
 
 from hub.control import ask
-from hub.credentials import CONSOLE
+from hub.credentials import OBSERVER
 from hub.endpoint import is_loopback
 from hub.reach import reach
 from hub.wire import open_session
@@ -34,12 +34,12 @@ ANSWER_S = 2.0
 def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) -> list[SessionStatus]:
     """Return the status of every session whose hub listens on one of `endpoints`.
 
-    On another machine that needs the certificate `console`, which is looked for in `certificates`; raises ConnectError if there is no hub.
+    On another machine that needs the certificate `observer`, which is looked for in `certificates`; raises ConnectError if there is no hub.
     On this machine whoever else listens there is passed over.
     """
     found: dict[str, SessionStatus] = {}
     for endpoint in endpoints:
-        with suppress(*_OTHERS) if is_loopback(endpoint) else nullcontext(), reach(endpoint, CONSOLE, certificates) as session:
+        with suppress(*_OTHERS) if is_loopback(endpoint) else nullcontext(), reach(endpoint, OBSERVER, certificates) as session:
             found |= {status.session: status for status in _statuses(session)}
     return [found[name] for name in sorted(found)]
 

@@ -125,7 +125,7 @@ def test_the_command_line_makes_and_shows_them(tmp_path):
     assert "there is no certificate" in run(app, ["show", *place]).output
     assert run(app, ["init", "hub.example", *place]).exit_code == 0
     assert run(app, ["issue", "touch", *place]).exit_code == 0
-    assert run(app, ["issue", "console", "--days", "2", *place]).exit_code == 0
+    assert run(app, ["issue", "observer", "--days", "2", *place]).exit_code == 0
     assert run(app, ["renew", *place]).exit_code == 0
     shown = run(app, ["show", *place]).output
     for word in ("hub.example", "participant touch", "(29 days)", "(1 days)", "(396 days)", "reading the status"):

@@ -160,16 +160,16 @@ def test_a_remote_engine_hears_grants_too(hub):
         wait_for(lambda: grants and contact)
 
 
-def test_a_console_reads_the_status_and_nothing_else(hub, told):
-    with hub.client(hub.authority.issued("console")) as console:
-        assert asks(console, Keys("*").status) == [KEYS.status]
-        status, other = hears(console, KEYS.status), hears(console, "**")
-        assert asks(console, KEYS.control("shutdown")) == []
+def test_an_observer_reads_the_status_and_nothing_else(hub, told):
+    with hub.client(hub.authority.issued("observer")) as observer:
+        assert asks(observer, Keys("*").status) == [KEYS.status]
+        status, other = hears(observer, KEYS.status), hears(observer, "**")
+        assert asks(observer, KEYS.control("shutdown")) == []
         sleep(0.1)
         hub.say()
         wait_for(lambda: status)
         assert set(other) == {KEYS.status}
-        told("refused to 'console'", "query on trocar/s/control/shutdown")
+        told("refused to 'observer'", "query on trocar/s/control/shutdown")
 
 
 FORBIDDEN = {
