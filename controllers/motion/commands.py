@@ -67,10 +67,12 @@ class Commands:
         self._drives.apply(self._joints, np.zeros(len(self._chain.joints)))
 
     def _servo_jp(self, message: JointState) -> None:
-        self._follow(goals.joint_values(self._chain, message, "position"))
+        goal, velocity = goals.joint_values(self._chain, message, "position"), goals.stated_velocity(self._chain, message)
+        self._drives.follow(self._joints, goal, self._period, velocity)
 
     def _servo_jr(self, message: JointState) -> None:
-        self._follow(self._joints.newest_goal + goals.joint_values(self._chain, message, "position"))
+        goal = self._joints.newest_goal + goals.joint_values(self._chain, message, "position")
+        self._drives.follow(self._joints, goal, self._period)
 
     def _servo_jf(self, message: JointState) -> None:
         self._drives.apply(self._joints, goals.efforts(self._chain, message))
@@ -80,9 +82,6 @@ class Commands:
 
     def _move_jr(self, message: JointState) -> None:
         self._move(self._joints.newest_goal + goals.joint_values(self._chain, message, "position"))
-
-    def _follow(self, goal: Vector) -> None:
-        self._drives.follow(self._joints, goal, self._period)
 
     def _move(self, goal: Vector) -> None:
         self._drives.move(self._joints, goal, self.ratio)

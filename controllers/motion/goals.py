@@ -13,16 +13,18 @@ from schemas.errors import MotionError
 from schemas.ros import JointState, Point, Pose, Quaternion, Twist, Vector3, Wrench
 from schemas.vectors import Vector
 
-__all__ = ["check_frame", "efforts", "frame", "joint_values", "rotation_matrix", "twist", "vector", "wrench"]
+__all__ = ["check_frame", "efforts", "frame", "joint_values", "rotation_matrix", "stated_velocity", "twist", "vector", "wrench"]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
+_MOST = 1e9
+"""In SI units. No force, velocity, gain or place is meant to be larger, and what is computed of such numbers stays finite."""
 
 
-def joint_values(chain: SerialChain, message: JointState, part: Literal["position", "effort"]) -> Vector:
-    """Return positions or efforts, shape (n,), in the order of the chain; a message that names its joints may have them in any."""
+def joint_values(chain: SerialChain, message: JointState, part: Literal["position", "velocity", "effort"]) -> Vector:
+    """Return positions, velocities or efforts, shape (n,), in the order of the chain; a message that names its joints may have them in any."""
     names = [joint.name for joint in chain.joints]
-    values: Vector = message.position if part == "position" else message.effort
+    values: Vector = getattr(message, part)
     if values.shape != (len(names),):
         raise MotionError(f"{values.size} values of {part}, expected {len(names)}: {', '.join(names)}")
     if message.name:
@@ -31,6 +33,11 @@ def joint_values(chain: SerialChain, message: JointState, part: Literal["positio
         values = values[[message.name.index(name) for name in names]]
     _check_finite(values, part)
     return values
+
+
+def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
+    """Return the velocities, shape (n,), with which a goal is to be passed; None where none are stated, or zeros alone."""
+    return joint_values(chain, message, "velocity") if message.velocity.any() else None
 
 
 def efforts(chain: SerialChain, message: JointState) -> Vector:
@@ -81,9 +88,11 @@ def wrench(message: Wrench) -> Vector:
 
 
 def vector(message: Point | Vector3, part: str) -> Vector:
-    """Return the vector, shape (3,); `part` names it where it is not finite."""
+    """Return the vector, shape (3,); `part` names it where it is not finite, or too large to be meant."""
     values = np.array([message.x, message.y, message.z])
     _check_finite(values, part)
+    if (np.abs(values) > _MOST).any():
+        raise MotionError(f"{part} {values.tolist()}: allowed are numbers up to {_MOST:g}")
     return values
 
 

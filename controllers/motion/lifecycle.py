@@ -60,7 +60,7 @@ class Lifecycle:
     @property
     def is_busy(self) -> bool:
         """Whether the arm powers, homes or moves."""
-        return bool(self._powering[0] or self._homing[0]) or self._drives.is_moving
+        return bool(self._powering[0] or (self._homing[0] and self.state is not State.PAUSED)) or self._drives.is_moving
 
     @property
     def desired_state(self) -> str:
@@ -131,11 +131,12 @@ class Lifecycle:
 
     def _pause(self) -> None:
         self._drives.rest()
-        self._homing[0] = 0.0
         self._state[0] = State.PAUSED
 
     def _resume(self) -> None:
         self._state[0] = State.ENABLED
+        if self._homing[0]:
+            self._drives.move(self._drives.joints, self._home, _FULL)
 
     def _finish_powering(self) -> None:
         self._powering[0], self._state[0] = 0.0, State.ENABLED

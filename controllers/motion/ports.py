@@ -43,7 +43,7 @@ COMMANDS = {
     "set_base_frame": (_POSE, "where the arm's base is to be taken to stand, in the frame of measured_cp, with `reference: world` and without setup joints"),
     "hold": (_EMPTY, "brake, and stay"),
     "free": (_EMPTY, "let go: no effort but gravity compensation"),
-    "servo_jp": (_JOINT_STATE, "follow these positions"),
+    "servo_jp": (_JOINT_STATE, "follow these positions, with these velocities where they are stated"),
     "servo_jr": (_JOINT_STATE, "follow positions relative to the newest goal, or the setpoint if nothing is followed"),
     "servo_cp": (_POSE, "follow this pose of the tip"),
     "servo_cr": (_POSE, "follow a pose shifted and turned along the axes of the frame that it names, relative to the newest goal, or the setpoint"),

@@ -24,7 +24,7 @@ _LOOKS = 200
 _PASSING = 1e-9
 """rad and m by which rounding may carry a trajectory past a joint's range. What hides between two looks is clipped as it comes."""
 _ROWS = 8
-_SCALARS = 7
+_SCALARS = 8
 
 
 class Activity(IntEnum):
@@ -53,8 +53,8 @@ class Setpoint:
         self.position, self.velocity, self._acceleration_now, self.goal, self._arrival = rows[:5]
         self._origin = rows[5:]  # position, velocity and acceleration where the trajectory starts
         scalars = self.state[_ROWS * n :]
-        self._activity, self._elapsed, self._since, self._waiting, self._pending = (scalars[i : i + 1] for i in range(5))
-        self._ratio = scalars[5:]  # of velocity, and of acceleration and jerk
+        self._activity, self._elapsed, self._since, self._waiting, self._pending, self._stated = (scalars[i : i + 1] for i in range(6))
+        self._ratio = scalars[6:]  # of velocity, and of acceleration and jerk
         self._ruckig, self._trajectory = Ruckig(n), Trajectory(n)
 
     @property
@@ -76,11 +76,12 @@ class Setpoint:
     def follow(self, goal: Vector, h: float, velocity: Vector | None = None) -> None:
         """Go to `goal`, shape (n,), inside the ranges, the newest of a stream or a single one; `h` is the step (s).
 
-        Of a stream the setpoint reaches each goal when the next is due, with the stream's own velocity, so it neither lags by more
-        than that nor stops in between. The sender may state the velocity, shape (n,), else it is that from goal to goal.
+        Of a stream the setpoint reaches each goal when the next is due, in a straight line from the last one, so it neither lags by
+        more than that nor stops in between. Where the sender states the velocity at the goal, shape (n,), it gets there in a cubic.
         """
         streaming = self.activity is Activity.FOLLOW and self._since[0] <= STREAM_GAP
         interval = max(float(self._since[0]), h) if streaming else h
+        self._stated[0] = velocity is not None
         if velocity is None and streaming:
             velocity = (goal - self.goal) / interval
         self._arrival[:] = 0.0 if velocity is None else _clip(velocity, -self._velocity, self._velocity)
@@ -175,10 +176,18 @@ class Setpoint:
         wait = max(float(self._waiting[0]), h)
         away = self.goal - self.position - wait * self._arrival  # from where a setpoint that is in time would be now
         most, most_down, most_up = self._fastest(np.array([np.abs(away), self.position - self._lower, self._upper - self.position]), h)
-        self._steer(self._arrival + _clip(away / wait, -most, most), most_down, most_up, h)
+        faster = self._bend(wait, h) if self._stated[0] else away / wait
+        self._steer(self._arrival + _clip(faster, -most, most), most_down, most_up, h)
         self._waiting[0] = max(wait - h, 0.0)
         if not self._waiting[0]:
-            self._arrival[:] = 0.0
+            self._arrival[:] = self._stated[0] = 0.0
+
+    def _bend(self, wait: float, h: float) -> Vector:
+        """Return by how much the next step's velocity, shape (n,), is over that of arrival, on the cubic that arrives after `wait` seconds."""
+        mean = (self.goal - self.position) / wait
+        now, then = self.velocity - mean, self._arrival - mean  # the cubic less the straight line
+        share = h / wait
+        return mean + now - share * (2.0 * now + then) + share * share * (now + then) - self._arrival
 
     def _steer(self, wanted: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
         """Take a step with the velocity nearest to `wanted`, shape (n,), that the limits and the way left to either side allow."""

@@ -61,6 +61,31 @@ def test_home_powers_then_homes():
     assert np.allclose(rig.setpoint, HOME, atol=1e-12)
 
 
+def test_homing_that_is_paused_goes_on_when_it_is_resumed():
+    rig = Rig({"PSM1": {"instrument": "400006", "start": GOAL}}, initial_state="disabled").step().command("home").step(200)
+    assert rig.command("pause").states() == [("PAUSED", False, False)]
+    rig.step(100)
+    before = rig.setpoint
+    assert (rig.step(100).setpoint == before).all()
+    assert rig.command("resume").states() == [("ENABLED", False, True)]
+    assert rig.until_idle().states() == [("ENABLED", True, False)]
+    assert np.allclose(rig.setpoint, HOME, atol=1e-12)
+
+
+def test_a_stream_of_joints_may_state_its_velocity():
+    lag = {}
+    for stated in (False, True):
+        rig, errors = Rig().step(), []
+        for k in range(0, 1000, 10):
+            angle, spread = 2 * np.pi * 0.5 * (k + 10) * 1e-3, np.array([1, 1, 0.2, 1, 1, 1])
+            goal, velocity = HOME + 0.05 * (1 - np.cos(angle)) * spread, 0.05 * np.pi * np.sin(angle) * spread
+            before = rig.step(9, servo_jp=JointState(position=goal, velocity=velocity if stated else np.zeros(6))).setpoint
+            errors.append(np.abs((rig.step().setpoint - before) / 1e-3 - velocity).max())
+        lag[stated] = max(errors[20:])
+        assert not rig.said("error")
+    assert lag[True] < 0.2 * lag[False]
+
+
 def test_home_of_a_homed_arm_moves_nothing_but_is_answered():
     rig = Rig().step(2, move_jp=jp(*GOAL)).until_idle()
     before = rig.setpoint
@@ -290,6 +315,11 @@ EVERY = [
     ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
     ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "PSM2_base"), "frame 'PSM2_base', allowed are PSM1_base"),
     ("servo_cr", raw_pose((0.0, 0.0, -0.5), (0.0, 0.0, 0.0, 1.0)), "pose cannot be reached: joint insertion at"),
+    ("servo_jp", JointState.model_construct(name=[], position=HOME, velocity=np.array([0.1]), effort=np.zeros(0)), "1 values of velocity, expected 6"),
+    ("servo_jp", JointState.model_construct(name=[], position=HOME, velocity=np.full(6, NAN), effort=np.zeros(0)), "every number must be finite"),
+    ("body__servo_cf", cf(1e308, 0, 1e308, 0, -1e308, 0), "allowed are numbers up to 1e+09"),
+    ("servo_cs", cs(twist=[1e300] * 6), "allowed are numbers up to 1e+09"),
+    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], position_positive={"p": (1e300, 0, 0)}), "allowed are numbers up to 1e+09"),
     ("servo_ci", ci([0.0, NAN, -0.12, 0, 0, 0, 1]), "every number must be finite"),
     ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 0]), "norm 0, allowed is 1 within 0.001"),
     ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], "world"), "frame 'world', allowed are PSM1_base"),
