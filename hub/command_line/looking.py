@@ -11,9 +11,10 @@ from rich.console import Console
 from rich.markup import escape
 
 from hub import doctor as doctor_module
-from hub.command_line.display import console, table
+from hub.command_line.display import LATENCY_COLUMNS, console, latency_rows, table
 from hub.command_line.hosting import Certificates
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
+from hub.latency import by_way
 from hub.launch import plan_of
 from hub.plan import Plan
 from hub.scenario_file import load
@@ -71,16 +72,13 @@ def ls(
         return
     rows = [(s.session, s.state, p.name, p.role, p.host, p.pid, p.step) for s in sessions for p in s.participants]
     out.print(table(rows, "session", "state", "name", "role", "host", "pid", "step"))
-    for title, of_session in (("device", _device_rows), ("latency", _latency_rows)):
+    for columns, of_session in ((_DEVICE_COLUMNS, _device_rows), (LATENCY_COLUMNS, _latency_rows)):
         if told := [(status.session, *row) for status in sessions for row in of_session(status)]:
             out.print()
-            out.print(table(told, "session", *_COLUMNS[title]))
+            out.print(table(told, "session", *columns))
 
 
-_COLUMNS = {
-    "device": ("device", "its clock to the hub's", "known within", "link"),
-    "latency": ("latency", "stream", "count", "p50", "p99", "largest"),
-}
+_DEVICE_COLUMNS = ("device", "its clock to the hub's", "known within", "link")
 
 
 def _session_row(status: SessionStatus) -> dict[str, Any]:
@@ -96,8 +94,7 @@ def _device_rows(status: SessionStatus) -> Iterator[tuple[str, ...]]:
 
 
 def _latency_rows(status: SessionStatus) -> Iterator[tuple[object, ...]]:
-    for one in status.latencies:
-        yield one.way, one.stream, one.count, *(f"{1e3 * seconds:.3f} ms" for seconds in (one.p50_s, one.p99_s, one.largest_s))
+    return latency_rows(by_way(status.latencies))
 
 
 def doctor(*, as_json: Json = False) -> None:

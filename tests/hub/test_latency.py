@@ -7,12 +7,12 @@ from hub.latency import Histogram, Latencies, by_way
 
 
 @given(st.lists(st.integers(0, 2**45), min_size=1, max_size=200), st.sampled_from([0.01, 0.5, 0.99, 1.0]))
-def test_percentiles_are_right_within_half_a_bin(times, share):
+def test_percentiles_are_right_within_a_bin(times, share):
     histogram = Histogram()
     for time in times:
         histogram.add(time)
     exact = int(np.percentile(times, 100 * share, method="inverted_cdf"))
-    assert histogram.percentile(share) == pytest.approx(exact, rel=1 / 64, abs=0.5)
+    assert histogram.percentile(share) == pytest.approx(exact, rel=1 / 32, abs=0.5)
     assert (histogram.count, histogram.largest_ns) == (len(times), max(times))
 
 
@@ -20,8 +20,7 @@ def test_percentiles_are_right_within_half_a_bin(times, share):
 def test_one_time_is_told_as_it_was(time):
     histogram = Histogram()
     histogram.add(time)
-    assert histogram.percentile(0.5) <= time
-    assert histogram.percentile(0.5) == pytest.approx(time, rel=1 / 64)
+    assert histogram.percentile(0.5) == pytest.approx(time, rel=1e-15)
 
 
 def test_memory_does_not_grow():

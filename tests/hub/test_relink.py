@@ -116,6 +116,7 @@ def test_the_arm_holds_in_an_outage_and_goes_on_after_it(prepare):
 
 
 def test_on_the_command_line(prepare, monkeypatch, capfd):
+    monkeypatch.setenv("COLUMNS", "160")
     session = prepare(SCENARIO)
     seen = []
 
