@@ -17,12 +17,14 @@ from schemas.vectors import Vector
 
 __all__ = ["ContactEstimate"]
 
-_TOUCH = 0.03
-"""N; less is no contact: below what a hand feels (0.06 N at a finger), above what a tissue engine leaves when nothing touches."""
+_TOUCH = 0.05
+"""N; less is no contact: below what a hand feels (0.06 N at a finger), above what an instrument's coupling to tissue needs to speed it up in free air."""
 _CONE = 0.5
 """Slope of the friction cone: a force in it may be a push along the normal with friction across. A lubricated instrument rubs with less."""
 _STIFFEST = 5e3
 """N/m; no secant is taken for stiffer, so that the first force, at no depth, has a finite one."""
+_MEAN = 0.02
+"""s; time constant of the means of force and tip. As both lag alike, they belong to each other."""
 _RISE, _FALL = 0.1, 0.02
 """s; time constants of stiffness and friction: slow where the hand gets more force, quick where it gets less."""
 _REACH = 0.05
@@ -32,11 +34,12 @@ _REACH = 0.05
 class ContactEstimate:
     """One surface near the tip, in the arm's base frame. Its numbers live in a part of its owner's state."""
 
-    SIZE = 13
+    SIZE = 17
 
     def __init__(self, state: Vector) -> None:
-        """Remember in `state`, shape (SIZE,); zeros know of no surface."""
-        self._normal, self._tip, self._touched, self._depth, self._stiffness, self._friction, self._known = np.split(state, [3, 6, 9, 10, 11, 12])
+        """Remember in `state`, shape (SIZE,); zeros know of nothing."""
+        parts = np.split(state, [3, 6, 9, 12, 13, 14, 15, 16])
+        self._normal, self._tip, self._force, self._touched, self._depth, self._stiffness, self._friction, self._known, self._started = parts
 
     @property
     def known(self) -> bool:
@@ -49,11 +52,6 @@ class ContactEstimate:
         return self._normal
 
     @property
-    def depth(self) -> float:
-        """How far the tip is below the surface, m."""
-        return float(self._depth[0])
-
-    @property
     def stiffness(self) -> float:
         """N/m."""
         return float(self._stiffness[0])
@@ -63,22 +61,31 @@ class ContactEstimate:
         """Coulomb's coefficient."""
         return float(self._friction[0])
 
+    def depth(self, tip: Vector) -> float:
+        """Return how far a tip at this position (3,), m, is below the surface, m."""
+        return float(self._depth[0] + self._normal @ (self._tip - tip))
+
     def update(self, tip: Vector, force: Vector, scale: float, elapsed: float) -> None:
         """Take the position (3,) of the tip, m, the force (3,) on it, N, the metres of the tip per metre of the hand, and the time since the last call, s."""
-        size = float(np.linalg.norm(force))
+        if not self._started[0]:
+            self._tip[:], self._started[0] = tip, 1.0
+        share = 1.0 - exp(-elapsed / _MEAN)
+        move = share * (tip - self._tip)
+        self._tip += move
+        self._force += share * (force - self._force)
         if self.known:
-            self._follow(tip - self._tip)
-        self._tip[:] = tip
+            self._follow(move)
+        size = float(np.linalg.norm(self._force))
         if size < _TOUCH:
             self._depth[0] = min(self._depth[0], 0.0)
-            if np.linalg.norm(tip - self._touched) > _REACH * scale:
+            if np.linalg.norm(self._tip - self._touched) > _REACH * scale:
                 self._known[0] = self._stiffness[0] = self._friction[0] = 0.0
             return
-        self._turn(force / size)
-        self._touched[:], self._known[0] = tip, 1.0
-        push = float(self._normal @ force)
+        self._turn(self._force / size)
+        self._touched[:], self._known[0] = self._tip, 1.0
+        push = float(self._normal @ self._force)
         depth = self._depth[0] = max(self._depth[0], push / _STIFFEST)
-        across = float(np.linalg.norm(force - push * self._normal))
+        across = float(np.linalg.norm(self._force - push * self._normal))
         _approach(self._stiffness, push / depth, elapsed)
         _approach(self._friction, across / push, elapsed)
 

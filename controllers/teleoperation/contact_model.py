@@ -103,7 +103,7 @@ class ContactModelBuilder:
         ]
         felt = (estimate for estimate in (self._tissue, self._rigid) if estimate.known)
         planes += [
-            self._plane(hand, to_base.T @ surface.normal, surface.depth / scale, gain * surface.stiffness, friction=surface.friction) for surface in felt
+            self._plane(hand, to_base.T @ surface.normal, surface.depth(tip) / scale, gain * surface.stiffness, friction=surface.friction) for surface in felt
         ]
         return planes
 
