@@ -6,8 +6,8 @@ in its base frame, p and P those of the tip in the arm's, R the orientation of t
     p = p0 + s R (x - x0),    P = R H A0  with  A0 = (R H0)' P0.
 
 A reference is taken from where hand and command are whenever the hand takes over, and from the *last* hand and goal when scale or view
-change while it leads: so no change moves the tip, and no motion of the hand is lost. It is taken anew as well while the tip, at a limit of its joints, is turned
-too far away from the goal: past half a turn the nearest way there is the other way round.
+change while it leads: so no change moves the tip, and no motion of the hand is lost. It is taken anew as well while the tip, at a limit of its joints, is
+turned too far away from the goal: past half a turn the nearest way there is the other way round.
 """
 
 from __future__ import annotations
