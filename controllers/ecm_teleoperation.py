@@ -86,8 +86,9 @@ def joint_velocities(chain: SerialChain, q: Vector, twist: Vector, mode: str, fr
     if mode == "position":
         velocities[_INSERTION] = twist[0] if free[_INSERTION] else 0.0
     elif turning := [joint for joint in _TURNING if free[joint]]:
-        jacobian = chain.jacobian(chain.frames(q), frame="tip")[3:, turning]  # (3, <= 3)
-        velocities[turning] = np.linalg.pinv(jacobian) @ (_CAMERA_IN_HEAD @ twist[3:])
+        frames = chain.frames(q)
+        jacobian = frames[-1, :3, :3].T @ frames[turning, :3, 2].T  # (3, <= 3): the joints' axes in the camera's frame
+        velocities[turning] = np.linalg.lstsq(jacobian, _CAMERA_IN_HEAD @ twist[3:], rcond=None)[0]  # pinv(J_w) w, at a third of its cost
     return velocities
 
 
