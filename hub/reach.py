@@ -8,7 +8,7 @@ from pathlib import Path
 
 import zenoh
 
-from hub.credentials import Credentials, examine, load
+from hub.credentials import HUB, Credentials, examine, load
 from hub.endpoint import address, is_loopback
 from hub.wire import open_session
 from schemas.errors import ConnectError
@@ -38,9 +38,14 @@ def reach(endpoint: str, name: str, certificates: Path | None = None, *, mode: s
     credentials = load(name, certificates)
     examine(credentials)
     try:
-        return open_session("client", connect=[endpoint], security=credentials.connecting())
+        session = open_session("client", connect=[endpoint], security=credentials.connecting())
     except ConnectError as error:
         raise ConnectError(f"cannot reach the hub at {endpoint}: {obstacle(host, port, credentials) or error}") from error
+    names = {link.auth_identifier for link in session.info.links()}
+    if names - {HUB}:  # Zenoh also trusts the authorities of the web, none of which vouches for a name without a domain
+        session.close()
+        raise ConnectError(f"who answers at {endpoint} is no hub of the authority of {credentials.file}: it shows that of {', '.join(map(str, names))}")
+    return session
 
 
 def obstacle(host: str, port: int, credentials: Credentials) -> str:

@@ -6,8 +6,9 @@ import threading
 
 import pytest
 
+from hub import certs
 from hub.access import access_settings
-from hub.credentials import Credentials
+from hub.credentials import Credentials, load
 from hub.endpoint import free_endpoint
 from hub.gate import Gate
 from hub.plan import Plan
@@ -50,6 +51,18 @@ def test_nothing_is_in_the_way_of_a_good_certificate(authority, port):
     assert obstacle("127.0.0.1", port, authority.issued("touch")) == ""
     with reach(f"tls/127.0.0.1:{port}", "touch", authority.directory) as session:
         assert list(session.info.routers_zid())
+
+
+def test_a_server_that_is_no_hub_is_left_alone(authority, tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(certs, "HUB", "www.example")
+        certs.renew(authority.directory, ["127.0.0.1"], 1)
+    port = free_port()
+    with (
+        open_session("router", listen=[f"tls/127.0.0.1:{port}"], security=load("www.example", authority.directory).listening()),
+        pytest.raises(ConnectError, match=r"is no hub of the authority of .*touch\.pem: it shows that of www\.example"),
+    ):
+        reach(f"tls/127.0.0.1:{port}", "touch", authority.issued("touch").file)
 
 
 def test_the_hub_has_another_name(authority, port):
