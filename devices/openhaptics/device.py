@@ -126,7 +126,8 @@ class _Stylus:
     def read(self, states: list[State], lost: Lost | None, offset_ns: int) -> list[Sample]:
         """Return the samples of these states, in the clock that is `offset_ns` ahead of time.perf_counter."""
         if lost is not None:
-            return [*self._gone(), *self._diagnosis.tell(*diagnoses.lost(lost.phase, lost.code, self._params.device, lost.cause), self._hardware)]
+            diagnosis = diagnoses.FOUND if lost.found else diagnoses.lost(lost.phase, lost.code, lost.cause, self._params.device)
+            return [*self._gone(), *self._diagnosis.tell(*diagnosis, self._hardware)]
         samples: list[Sample] = []
         for state in states:
             samples += self._buttons(state, offset_ns)

@@ -9,7 +9,7 @@ from devices.openhaptics.exchange import State
 from devices.openhaptics.hdapi import Code, Style
 from devices.openhaptics.stylus import Phase
 
-__all__ = ["lost", "present"]
+__all__ = ["FOUND", "lost", "present"]
 
 _AGAIN = "it is tried again by itself"
 _CALIBRATE = {
@@ -19,8 +19,11 @@ _CALIBRATE = {
 _CONDITIONS = tuple(Condition)
 
 
-def lost(phase: Phase, code: int, device: str | None, cause: str) -> tuple[Level, str]:
-    """Return the diagnosis of a stylus that no process has; `cause` is what else is known."""
+FOUND = Level.WARN, "it is back, and is taken up as soon as no other hand of this host holds its dead-man"
+
+
+def lost(phase: Phase, code: int, cause: str, device: str | None) -> tuple[Level, str]:
+    """Return the diagnosis of a stylus that cannot be had; `cause` is what is known beside the error's code."""
     why = cause or (Code.text(code) if code else "no cause is known")
     if phase is Phase.ABSENT:
         known = f"that the vendor's setup program knows it as '{device}'" if device else "that the vendor's setup program has it as the default device"

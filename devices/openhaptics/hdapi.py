@@ -165,6 +165,12 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 """Result and arguments; HDulong and HDSchedulerHandle are the platform's long: 4 bytes on Windows, 8 on Linux."""
 
+_SWITCHES = "hdGetBooleanv"
+"""Only a dead-man that is a switch needs it."""
+
+_MOST_ERRORS = 64
+"""That are taken at a time: a callback may not go on for ever."""
+
 Hdapi = Any
 """The loaded library: its functions by name, with their types set."""
 
@@ -207,8 +213,9 @@ def load(path: Path) -> Hdapi:
             os.add_dll_directory(str(path.parent))  # hd.dll needs its siblings
         hd = _library(str(path))
         for name, (result, arguments) in _FUNCTIONS.items():
-            function = getattr(hd, name)
-            function.restype, function.argtypes = result, arguments
+            if name != _SWITCHES or hasattr(hd, name):
+                function = getattr(hd, name)
+                function.restype, function.argtypes = result, arguments
     except (OSError, AttributeError) as error:
         word = ctypes.sizeof(c_void_p) * 8
         raise DeviceError(f"OpenHaptics cannot be loaded from '{path}' ({error}); this Python has {word} bits, and so must the library") from error
@@ -216,8 +223,11 @@ def load(path: Path) -> Hdapi:
 
 
 def errors(hd: Hdapi) -> list[tuple[int, int]]:
-    """Empty the library's stack of errors; return (code, handle) of each, the newest first."""
+    """Take the errors off the library's stack; return (code, handle) of each, the newest first."""
     found: list[tuple[int, int]] = []
-    while (info := hd.hdGetError()).errorCode:
+    for _ in range(_MOST_ERRORS):
+        info = hd.hdGetError()
+        if not info.errorCode:
+            break
         found.append((info.errorCode, info.hHD))
     return found

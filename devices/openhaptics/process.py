@@ -44,6 +44,7 @@ class ServoProcess:
                 stdout=subprocess.PIPE,
                 text=True,
                 pass_fds=inherited,
+                process_group=0,  # Ctrl-C is for this process, which then ends that one
                 env={"GTDD_HOME": _CALIBRATIONS, **os.environ},
                 creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
             )
@@ -112,3 +113,4 @@ class ServoProcess:
         with self._process.stdout as lines:
             for line in lines:
                 self._said.put(json.loads(line))
+        self._said.put({"ended": True})

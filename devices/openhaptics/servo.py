@@ -170,7 +170,6 @@ def _terminate(_signal: int, _frame: object) -> NoReturn:
 
 def main() -> NoReturn:
     """Serve until the input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the device's process, which then closes the input
     signal.signal(signal.SIGTERM, _terminate)
     say = _voice()
     config = json.loads(sys.stdin.readline())

@@ -78,7 +78,8 @@ class Watch:
         said = self._process.said(_LOADING)
         if not said or "loaded" not in said[0]:
             self.close()
-            raise DeviceError(str(said[0].get("failed")) if said else f"the servo process does not answer: is '{self._library}' the library of OpenHaptics?")
+            silent = f"the servo process ends or hangs when it loads '{self._library}': is that the library of OpenHaptics?"
+            raise DeviceError(said[0].get("failed", silent) if said else silent)
         for message in said[1:]:
             self._hear(self._process, message, now)
 

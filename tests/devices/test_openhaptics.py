@@ -102,13 +102,15 @@ def hands(library: Path, world: HdWorld, tmp_path: Path) -> Iterator[Callable[..
 
 
 def _press(world: HdWorld, hands: Hands, *styluses: str) -> None:
-    """Bring the hands into the contact, from above, until they feel it."""
-    for device in world.devices:
-        device.buttons, device.target[1] = 1, 0.03
-    hands.until(lambda: all(hands.has_told("force is on", s) for s in styluses))
-    for device in world.devices:
-        device.target[1] = -0.005
-    hands.until(lambda: all(hands.force(s) > 1.2 for s in styluses))
+    """Bring the hands into the contact, from above, until they feel it; again, if a busy machine was silent for so long that the force went."""
+    while not all(hands.force(s) > 1.2 for s in styluses):
+        for device in world.devices:
+            device.buttons, device.target[1] = 1, 0.03
+        hands.until(lambda: all(hands.told(s)[-1:] == ["force is on"] for s in styluses))
+        for device in world.devices:
+            device.target[1] = -0.005
+        tried = monotonic()
+        hands.until(lambda: all(hands.force(s) > 1.2 for s in styluses) or monotonic() > tried + 3.0)  # noqa: B023 - called before the next turn
 
 
 def test_it_keeps_the_contract_of_a_device(library: Path, world: HdWorld) -> None:
@@ -156,9 +158,8 @@ def test_a_stylus_that_is_unplugged_and_plugged_in_again(world: HdWorld, hands: 
     assert one.force() == 0.0
     one.forget()
     one.until(lambda: one.gives("left") and one.force("left") == 0.0)  # its process was replaced
-    updates = world.devices[0].updates
     world.devices[0].plugged = 1
-    one.until(lambda: world.devices[0].updates > updates and world.devices[0].owner == 0)  # found, and let go of again
+    one.until(lambda: one.has_told("it is back, and is taken up as soon as no other hand"))
     one.forget()
     one.until(lambda: len(one.samples["left/pose"]) > 100)
     assert not one.gives()  # as long as the other hand holds its dead-man it is not disturbed
@@ -199,7 +200,7 @@ def test_a_storm_of_warnings_is_told_once(world: HdWorld, hands: Callable[..., H
     assert one.force() == 0.0
     assert one.gives()
     world.devices[0].target[1] = 0.03
-    one.until(lambda: one.has_told("force is on"))
+    one.until(lambda: one.told()[-1] == "force is on")
 
 
 @pytest.mark.parametrize(("blow", "words"), [(signal.SIGKILL, "the servo process has ended"), (signal.SIGSTOP, "no frame for 1 s")])
@@ -216,14 +217,10 @@ def test_the_servo_process_is_lost(world: HdWorld, hands: Callable[..., Hands], 
 
 def test_the_host_is_killed_with_force_on_the_hands(library: Path, world: HdWorld) -> None:
     """The hub's end is silence of the contact models, in test_openhaptics_servo; this is the end of the process that passes them on."""
-    for device in world.devices:
-        device.buttons, device.target[1] = 1, 0.03
     with subprocess.Popen([sys.executable, host.__file__, str(library), "1"], env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}) as process:
         try:
-            _await(lambda: _forces(world.rows(0)).size > 300)
-            for device in world.devices:
-                device.target[1] = -0.005
-            _await(lambda: all(_forces(world.rows(i))[-1] > 1.2 for i in (0, 1)))
+            while not all(_forces(world.rows(i))[-1:] > 1.2 for i in (0, 1)):
+                _lift_and_press(world)
         finally:
             process.kill()
     killed = monotonic()
@@ -234,6 +231,14 @@ def test_the_host_is_killed_with_force_on_the_hands(library: Path, world: HdWorl
         assert force[-1] == 0.0
         assert rows[force > 0.0, Row.TIME].max() - killed < 0.15
         assert np.diff(force).max() < 0.1 + 1e-9
+
+
+def _lift_and_press(world: HdWorld) -> None:
+    """Let both hands, with their dead-men held, go up and down; a busy host may be silent meanwhile, so this may need more than one try."""
+    for height in (0.03, -0.005):
+        for device in world.devices:
+            device.buttons, device.target[1] = 1, height
+        sleep(0.7)
 
 
 def _forces(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -256,9 +261,10 @@ def test_the_callback_does_not_wait_for_the_host(world: HdWorld, hands: Callable
     busy = monotonic()
     while monotonic() < busy + 0.5:
         sum(range(1000))
-    idle_rows, busy_rows = (world.rows(0, since)[: len(world.rows(0, busy))] for since in (start, busy))
-    idle, hard = (float(np.median(rows[:, Row.CALLBACK])) for rows in (idle_rows, busy_rows))
-    assert hard < 10.0 * idle
+    rows = world.rows(0, start)
+    idle, hard = rows[rows[:, Row.TIME] < busy], rows[rows[:, Row.TIME] >= busy]
+    assert np.median(hard[:, Row.CALLBACK]) < 10.0 * np.median(idle[:, Row.CALLBACK])
+    assert len(hard) > 0.5 * len(idle)
 
 
 def test_a_stylus_that_is_not_there_is_told_of_and_comes(world: HdWorld, hands: Callable[..., Hands]) -> None:
