@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from devices.diagnosis import Diagnosis, Level
+from devices.pace import Pace
 from devices.samples import pose_sample, twist_sample
 from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
 from hub.participant import Device, Params, Sample
@@ -23,9 +24,6 @@ from schemas.ports import Port
 from schemas.quantity import Duration
 
 __all__ = ["HeadState", "Headset", "HeadsetParams", "NoHead", "Runtime"]
-
-_RETRY_NS = 1_000_000_000
-"""A runtime that is not there is looked for once a second: starting one takes seconds."""
 
 
 class HeadsetParams(Params):
@@ -83,7 +81,7 @@ class Headset(Device):
     def __init__(self, name: str, params: HeadsetParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._period_ns, self._max_age_ns = round(1e9 / params.rate), params.max_age
+        self._rate, self._max_age_ns = params.rate, params.max_age
         self._diagnosis = Diagnosis(name)
         self._pose, self._twist = (
             Port(name=port, causality="output", type=type_, frame=f"{name}_base", max_age_ns=params.max_age, clock="wall", description=text)
@@ -94,7 +92,8 @@ class Headset(Device):
         )
         self._runtime: Runtime | None = None
         self._newest: HeadState | None = None
-        self._due_ns = self._retry_ns = self._newest_ns = 0
+        self._newest_ns = 0
+        self._pace = Pace(self._rate)
 
     @abstractmethod
     def connect(self) -> Runtime:
@@ -108,20 +107,19 @@ class Headset(Device):
     def open(self, directory: Path) -> None:  # noqa: ARG002
         """Begin anew; the runtime is connected to by the first `read`."""
         self._diagnosis = Diagnosis(self.name)
-        self._due_ns = self._retry_ns = self._newest_ns = 0
+        self._pace = Pace(self._rate)
 
     def read(self, t: int) -> list[Sample]:
         """Return pose and twist if they are known and due, and a diagnosis whenever that changes."""
-        if t < self._due_ns or (self._runtime is None and t < self._retry_ns):
+        if not self._pace.due(t):
             return []
-        self._due_ns = max(self._due_ns + self._period_ns, t)
         try:
             if self._runtime is None:
                 self._runtime = self.connect()
             return self._located(t, self._runtime)
         except DeviceError as error:
             self.close()
-            self._retry_ns = t + _RETRY_NS
+            self._pace.failed(t)
             return self._diagnosis.tell(Level.ERROR, f"{error}; it is looked for again every second")
 
     def _located(self, t: int, runtime: Runtime) -> list[Sample]:

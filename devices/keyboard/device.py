@@ -14,6 +14,7 @@ from pydantic import Field
 
 from devices.diagnosis import Diagnosis, Level
 from devices.keyboard.virtual_stylus import VirtualStylus
+from devices.pace import Pace
 from devices.samples import button_sample, pose_sample, twist_sample
 from hub.participant import Device, Params, Sample
 from schemas.errors import DeviceError, MissingExtraError
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Keyboard", "KeyboardParams"]
 
-_RETRY_NS = 1_000_000_000
 _LONGEST_NS = 100_000_000
 """If nobody read for longer, the stylus goes on as if it had been this long: it must not leap."""
 
@@ -70,7 +70,7 @@ class Keyboard(Device):
     def _begin(self) -> None:
         self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed)
         self._pressed = (False, False)
-        self._due_ns = self._retry_ns = self._last_ns = 0
+        self._pace, self._last_ns = Pace(self.params.rate), 0
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -87,14 +87,13 @@ class Keyboard(Device):
 
     def read(self, t: int) -> list[Sample]:
         """Return where the stylus is by now, the buttons if they have changed, and a diagnosis if that has."""
-        if t < self._due_ns or (self._window is None and t < self._retry_ns):
+        if not self._pace.due(t):
             return []
-        self._due_ns = max(self._due_ns + round(1e9 / self.params.rate), t)
         try:
             return self._heard(t, self._window or self._opened())
         except DeviceError as error:
             self.close()
-            self._retry_ns = t + _RETRY_NS
+            self._pace.failed(t)
             return self._diagnosis.tell(Level.ERROR, f"{error}; it is tried again every second")
 
     def _opened(self) -> Window:
