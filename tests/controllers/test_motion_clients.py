@@ -8,6 +8,7 @@ from robots.dvrk import arms
 from robots.dvrk.dynamics import STANDARD_GRAVITY
 from robots.dvrk.inertia import ENDOSCOPE_MASS
 from robots.dvrk.instruments import instrument, instruments
+from robots.dvrk.kinematics_queries import KinematicsQueries
 from schemas.crtk import StringStamped
 from schemas.ros import BoolMessage, Header, StringMessage, Time
 from tests.controllers.motion_rig import CART, HOME, PSM1, Rig, cp, jp
@@ -213,6 +214,17 @@ class TestKnownWeight:
         assert not self.told(rig).any()
         rig.step(1, ECM__use_gravity_compensation=BoolMessage(data=True), ECM__state_command=command("disable"))
         assert not self.told(rig).any()
+
+
+@pytest.mark.parametrize("arm", CART)
+def test_the_kinematics_services_agree_with_what_is_told(arm):
+    """With the base frame from `SUJ/<arm>/measured_cp` `forward_kinematics` gives `measured_cp`, and `inverse_kinematics` leads back from `local/`."""
+    rig = Rig(CART).step(10)
+    told = {name: rig.outputs[f"{arm}/{name}"] for name in ("measured_js", "measured_cp", "local/measured_cp")}
+    queries, jp_told = KinematicsQueries(arms.chain(arm)), told["measured_js"][: told["measured_js"].size // 3]
+    assert np.allclose(queries.forward(jp_told, rig.outputs[f"SUJ/{arm}/measured_cp"]).value, told["measured_cp"], atol=1e-12)
+    assert np.allclose(queries.forward(jp_told).value, told["local/measured_cp"], atol=1e-12)
+    assert np.allclose(queries.inverse(told["local/measured_cp"], jp_told + 0.01).value, jp_told, atol=1e-9)
 
 
 READ = """operating_state desired_state goal_reached error warning status measured_js setpoint_js measured_cp setpoint_cp measured_cv local/measured_cp
