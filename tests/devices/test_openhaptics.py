@@ -219,17 +219,17 @@ def test_the_host_is_killed_with_force_on_the_hands(library: Path, world: HdWorl
     """The hub's end is silence of the contact models, in test_openhaptics_servo; this is the end of the process that passes them on."""
     with subprocess.Popen([sys.executable, host.__file__, str(library), "1"], env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}) as process:
         try:
-            while not all(_forces(world.rows(i))[-1:] > 1.2 for i in (0, 1)):
+            while not all((_forces(world.rows(i))[-1:] > 1.2).any() for i in (0, 1)):
                 _lift_and_press(world)
         finally:
+            killed = monotonic()
             process.kill()
-    killed = monotonic()
     _await(lambda: world.devices[0].owner == 0)
     for index in (0, 1):
         rows = world.rows(index)
         force = _forces(rows)
         assert force[-1] == 0.0
-        assert rows[force > 0.0, Row.TIME].max() - killed < 0.15
+        assert rows[force > 0.0, Row.TIME].max() - killed < 0.15 + rows[:, Row.GAP].max()  # a tick may come late on a busy machine
         assert np.diff(force).max() < 0.1 + 1e-9
 
 
