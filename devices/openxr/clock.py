@@ -20,6 +20,9 @@ if sys.platform == "win32":
 else:
     EXTENSION, _FUNCTION = "XR_KHR_convert_timespec_time", "xrConvertTimespecTimeToTimeKHR"
 
+_TIME_INVALID = -30
+"""XR_ERROR_TIME_INVALID."""
+
 
 class _Timespec(ctypes.Structure):
     _fields_ = (("tv_sec", c_int64), ("tv_nsec", c_long))
@@ -35,14 +38,20 @@ def _now() -> Any:
 
 
 def runtime_clock(instance: xr.Instance) -> Callable[[], int]:
-    """Return a function that tells the time now as an XrTime, ns. The instance must have been made with `EXTENSION`."""
+    """Return a function that tells the time now as an XrTime, ns. The instance must have been made with `EXTENSION`.
+
+    The function raises TimeInvalidError where the runtime does not know the time yet, and DeviceError where it fails.
+    """
     prototype = CFUNCTYPE(c_int32, c_void_p, c_void_p, POINTER(c_int64))
     convert = prototype(cast(xr.get_instance_proc_addr(instance, _FUNCTION), c_void_p).value or 0)
     handle = cast(instance, c_void_p)
 
     def now() -> int:
         found = c_int64()
-        if result := convert(handle, byref(_now()), byref(found)):
+        result = convert(handle, byref(_now()), byref(found))
+        if result == _TIME_INVALID or (not result and found.value <= 0):
+            raise xr.TimeInvalidError
+        if result:
             raise DeviceError(f"the OpenXR runtime does not tell the time ({_FUNCTION} returned {result}); restart it")
         return found.value
 

@@ -88,6 +88,8 @@ class OpenXrRuntime:
             if not self._present:
                 return NoHead(Level.WARN, "nobody wears the headset; put it on")
             return self._located(self._now())
+        except xr.TimeInvalidError:  # SteamVR, at the start (cmbruns/pyopenxr_examples, issue 12)
+            return NoHead(Level.WARN, "the OpenXR runtime does not tell the time yet; wait, or restart it")
         except xr.exception.XrException as error:
             raise DeviceError(f"the OpenXR runtime or the headset is gone ({_said(error)}); start it, plug it in") from error
 

@@ -216,7 +216,7 @@ def test_a_runtime_that_ends_is_looked_for_until_it_is_back(read, runtime, end):
         ("create_space", -31, "refuses a session"),
         ("locate", -17, "is gone"),
         ("locate", -13, "is gone"),
-        ("convert", -30, "does not tell the time"),
+        ("convert", -2, "does not tell the time"),
     ],
 )
 def test_whatever_fails_is_told_and_tried_again(read, runtime, call, code, message):
@@ -227,6 +227,17 @@ def test_whatever_fails_is_told_and_tried_again(read, runtime, call, code, messa
     assert (runtime.instances, runtime.sessions) == (0, 0)
     setattr(runtime, call, 0)
     assert read(300)[0].count("pose") >= 50
+
+
+@pytest.mark.parametrize("call", ["locate", "convert"])
+def test_a_runtime_that_does_not_know_the_time_yet_is_waited_for(read, runtime, call):
+    setattr(runtime, call, -30)
+    ports, got = read(3)
+    assert ports == ["diagnostics"]
+    assert "does not tell the time yet" in got["diagnostics"].message
+    assert (runtime.instances, runtime.sessions) == (1, 1)
+    setattr(runtime, call, 0)
+    assert read()[0] == ["diagnostics", "pose", "twist"]
 
 
 def test_a_runtime_that_wants_pictures_is_told_apart_until_another_one_is_active(read, runtime):
