@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from controllers.motion.limits import STREAM_GAP
 from robots import rotation
 from robots.dvrk import arms
-from schemas.ros import BoolMessage
+from schemas.ros import BoolMessage, Float64Message
 from tests.controllers.motion_rig import CART, EMPTY, HOME, PSM1, Rig, cf, ci, cp, cs, jp
 
 CHAIN = arms.chain("PSM1")
@@ -321,6 +321,28 @@ class TestCannula:
         assert not rig.step(1, ECM__servo_cp=orders["deep"]).said("warning", "ECM")
         rig.step(1, ECM__servo_cp=orders["shallow"])
         assert "allowed from 0.04 on" in rig.said("error", "ECM")[0]
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        {"servo_cr": cp([0.002, 0, 0, 0, 0, 0, 1])},
+        {"servo_cs": cs(twist=TWIST)},
+        {"servo_cs": cs([*CHAIN.forward(Q)[:3, 3], *rotation.from_matrix(CHAIN.forward(Q))], TWIST, frame="PSM1_base")},
+        {"servo_cs": cs(wrench=[0.1, 0.2, 0.3, 0, 0, 0.01])},
+        {"servo_ci": ci([0, 0, -0.1, 0, 0, 0, 1], position_positive={"p": (-9, -9, -9)}), "body__set_cf_orientation_absolute": ON},
+        {"body__servo_cf": cf(0.1, 0.2, 0.3, 0, 0, 0.01), "body__set_cf_orientation_absolute": ON},
+        {"trajectory_j__set_ratio_v": Float64Message(data=0.3), "move_cp": cp([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], "PSM1_base")},
+    ],
+)
+def test_a_checkpoint_in_the_middle_of_a_command_to_the_tip_goes_on_to_the_same_bits(order):
+    rig, other = Rig().step().step(1, move_jp=jp(*Q)).until_idle().step(4, **order), Rig()
+    other.motion.restore(rig.motion.save())
+    for name, value in rig.sensed.items():
+        other.sensed[name][:] = value
+    other.t = rig.t
+    assert [other.step().motion.state_hash() for _ in range(200)] == [rig.step().motion.state_hash() for _ in range(200)]
+    assert not rig.said("error")
 
 
 @settings(max_examples=25, deadline=None)
