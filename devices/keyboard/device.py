@@ -82,6 +82,7 @@ class Keyboard(Device):
         if find_spec("pygame") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind keyboard)", "keyboard", "pygame-ce")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # which it would print
+        os.environ.setdefault("SDL_NO_SIGNAL_HANDLERS", "1")  # with its own a SIGTERM would no longer end this process
         self._diagnosis = Diagnosis(self.name)
         self._begin()
 

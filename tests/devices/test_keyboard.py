@@ -1,5 +1,7 @@
 """Keys and gamepad on SDL's driver without a screen; events are posted as SDL would."""
 
+import signal
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -170,6 +172,20 @@ def test_a_driver_that_shows_nothing_is_no_screen(monkeypatch):
     monkeypatch.delenv("SDL_VIDEODRIVER")
     monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
     assert "no screen" in Desk().read()["diagnostics"].message
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows ends processes without asking them")
+def test_a_process_with_a_window_ends_when_it_is_told_to():
+    code = """
+from pathlib import Path
+import os, signal
+from devices.keyboard.device import Keyboard, KeyboardParams
+device = Keyboard("keys", KeyboardParams())
+device.open(Path())
+assert any(sample.port == "pose" for sample in device.read(0))
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=False, timeout=60).returncode == -signal.SIGTERM
 
 
 def test_one_window_a_process(desk):
