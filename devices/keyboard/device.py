@@ -1,4 +1,4 @@
-"""Keyboard or gamepad as a stylus (kind `keyboard`), for people who have neither stylus nor headset.
+"""Keyboard or gamepad as a stylus or a head (kind `keyboard`), for people who have neither stylus nor headset.
 
 pygame-ce gives window, keys and gamepads on every desktop. The window is opened in the thread that reads.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -30,10 +30,18 @@ __all__ = ["Keyboard", "KeyboardParams"]
 _LONGEST_NS = 100_000_000
 """If nobody read for longer, the stylus goes on as if it had been this long: it must not leap."""
 
+_FRAMES = {
+    "stylus": "of the tip; z out of the point, x to the right when it points away from the user",
+    "head": "of the head: x ahead, y to the left, z up",
+}
+
 
 class KeyboardParams(Params):
-    """How fast the stylus moves."""
+    """What the keys move, and how fast."""
 
+    stands_for: Annotated[
+        Literal["stylus", "head"], Field(description="whose axes the moved frame has: a stylus', z out of its point, or a head's, x ahead")
+    ] = "stylus"
     speed: Annotated[Speed, Field(gt=0.0, le=1.0, description="of the stylus' tip, at most")] = 0.1
     turn_speed: Annotated[float, Field(gt=0.0, le=10.0, description="of the stylus, at most, rad/s")] = 1.0
     rate: Annotated[float, Field(gt=0.0, le=1000.0, description="samples per second at most")] = 250.0
@@ -43,7 +51,7 @@ class KeyboardParams(Params):
 class Keyboard(Device):
     """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus; nothing but the last while its window is not in focus.
 
-    The stylus starts at the origin of `<participant>_base`, pointing level away from the user, and is moved by keys (devices.keyboard.keys).
+    What is moved starts at the origin of `<participant>_base`, pointing level away from the user; devices.keyboard.keys has the keys.
     """
 
     params_model: ClassVar[type[Params]] = KeyboardParams
@@ -57,8 +65,8 @@ class Keyboard(Device):
         self._pose, self._twist = (
             Port(name=port, causality="output", type=type_, frame=frame, max_age_ns=params.max_age, clock="wall", description=text)
             for port, type_, text in (
-                ("pose", "geometry_msgs/msg/PoseStamped", "of the tip; z out of the point, x to the right when it points away from the user"),
-                ("twist", "geometry_msgs/msg/TwistStamped", "of the tip, along the axes of the base frame"),
+                ("pose", "geometry_msgs/msg/PoseStamped", _FRAMES[params.stands_for]),
+                ("twist", "geometry_msgs/msg/TwistStamped", "of the same, along the axes of the base frame"),
             )
         )
         told = "each press and release: 0 the dead-man, 1 the jaw"
@@ -68,7 +76,7 @@ class Keyboard(Device):
         self._begin()
 
     def _begin(self) -> None:
-        self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed)
+        self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed, self.params.stands_for)
         self._pressed = (False, False)
         self._pace, self._last_ns = Pace(self.params.rate), 0
 

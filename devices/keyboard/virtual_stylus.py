@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -58,9 +59,10 @@ def _limited(share: Vector3, speed: float) -> Vector:
 class VirtualStylus:
     """Pose and twist in its base frame (x ahead, y left, z up), and how far its gripper is open."""
 
-    def __init__(self, speed: float, turn_speed: float) -> None:
-        """Take the largest velocity (m/s) and angular velocity (rad/s)."""
+    def __init__(self, speed: float, turn_speed: float, stands_for: Literal["stylus", "head"] = "stylus") -> None:
+        """Take the largest velocity (m/s) and angular velocity (rad/s), and whose axes its own frame is to have: a head's are x ahead, y left, z up."""
         self._speed, self._turn_speed = speed, turn_speed
+        self._axes = np.array([0.0, 0.0, 0.0, 1.0]) if stands_for == "stylus" else rotation.conjugate(_LEVEL)
         self._position, self._orientation = np.zeros(3), _LEVEL
         self._linear, self._angular = np.zeros(3), np.zeros(3)
         self.gripper = 1.0
@@ -79,7 +81,7 @@ class VirtualStylus:
     def pose(self) -> tuple[Vector3, Quaternion]:
         """Position (m) and quaternion (x, y, z, w)."""
         x, y, z = self._position.tolist()
-        qx, qy, qz, qw = self._orientation.tolist()
+        qx, qy, qz, qw = rotation.product(self._orientation, self._axes).tolist()
         return (x, y, z), (qx, qy, qz, qw)
 
     @property

@@ -114,6 +114,16 @@ def test_a_held_key_turns_the_stylus(desk, key):
     assert np.allclose([w.x, w.y, w.z], expected / 0.4, atol=1e-9)
 
 
+def test_what_stands_for_a_head_starts_and_turns_as_a_head_does():
+    desk = Desk(stands_for="head")
+    assert np.allclose(_numbers(desk.read()["pose"])[1], np.eye(3), atol=1e-12)
+    desk.press("left", "w")
+    got = desk.read(100)
+    assert np.allclose(_numbers(got["pose"])[1], rotation.matrix(rotation.exp(np.array([0, 0, 0.4]))), atol=1e-9)
+    assert (got["twist"].twist.angular.z, got["twist"].twist.linear.x) == (pytest.approx(1.0), pytest.approx(0.1))
+    desk.device.close()
+
+
 def test_two_keys_are_no_faster_than_one(desk):
     desk.press("w", "a")
     v = desk.read()["twist"].twist.linear
