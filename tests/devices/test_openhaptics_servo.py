@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import math
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,9 @@ from devices.haptics.contact import Plane
 from devices.haptics.limits import Limits
 from devices.haptics.safety import Condition
 from devices.openhaptics import hdapi
+from devices.openhaptics.callback import Servo
 from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, State, device_ends, model_doubles, servo_ends
 from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, INVALID_HANDLE, Code
-from devices.openhaptics.servo import Servo
 from devices.openhaptics.stylus import Phase, Spec, Stylus
 from schemas.errors import DeviceError
 from tests.devices.standins import build
@@ -272,6 +274,11 @@ def test_errors_come_with_their_handle_the_newest_first(rig: Callable[..., Rig])
     one.hd.hdUpdateCalibration(AUTO)
     one.hd.hdSetSchedulerRate(3)
     assert hdapi.errors(one.hd) == [(Code.INVALID_VALUE, 1), (Code.INVALID_OPERATION, 1)]
+
+
+def test_the_servo_process_holds_nothing_that_could_delay_a_callback() -> None:
+    code = "import sys, devices.openhaptics.servo; print(*{m.split('.')[0] for m in sys.modules} & {'numpy', 'pydantic', 'zenoh', 'hub', 'logging'})"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == ""
 
 
 def test_names_of_errors() -> None:
