@@ -75,6 +75,14 @@ class Site:
         file.write_text(SCENARIO.replace("FILE", str(self.told)))
         self.session = launch(load_scenario(str(file), ()), endpoint=free_endpoint(range(1)), outside=[self.endpoint], certificates=self.authority.directory)
 
+    def cut(self):
+        """Take the network between both machines away."""
+        ip("-n", self._namespace, "link", "set", f"{self._namespace[7:]}-in", "down")
+
+    def mend(self):
+        """Bring it back."""
+        ip("-n", self._namespace, "link", "set", f"{self._namespace[7:]}-in", "up")
+
     def start(self, *words, **options):
         """Start a Python process in the other namespace."""
         command = ["ip", "netns", "exec", self._namespace, sys.executable, "-P", *map(str, words)]
@@ -131,6 +139,43 @@ def test_a_stylus_of_another_machine_moves_the_simulation_and_is_told_of_it(site
     assert summary.measures["pressed"] > 20
     assert site.told.read_text().startswith("words word ")
     assert "takes part in session 'hand'" in said[-1]
+
+
+def test_a_network_that_is_gone_for_three_seconds_comes_back_by_itself(site):
+    fresh_steps, outcome, hosts = [0.0], [], [site.device("player"), site.device("pad")]
+
+    def gain(seconds):
+        before = fresh_steps[-1]
+        sleep(seconds)
+        return fresh_steps[-1] - before
+
+    def cut_and_mend():
+        try:
+            until = monotonic() + 30
+            while fresh_steps[-1] < 50 and monotonic() < until:
+                sleep(0.05)
+            site.cut()
+            sleep(0.5)  # its samples have grown old
+            outcome.append(gain(2.5))
+            site.mend()
+            until = monotonic() + 20
+            while gain(0.5) < 50 and monotonic() < until:
+                pass
+            outcome.append(gain(1.0))
+        finally:
+            site.session.state.shutdown()
+
+    console = threading.Thread(target=cut_and_mend)
+    console.start()
+    summary = site.session.run(lambda progress: fresh_steps.append(progress.live["fresh_steps"][0]))
+    console.join()
+    for host in hosts:
+        host.terminate()
+    said = [host.communicate()[0] for host in hosts]
+    while_cut, after = outcome
+    assert while_cut == 0.0, said
+    assert after > 300, said
+    assert summary.state == "done"
 
 
 STRANGER = """
