@@ -10,6 +10,7 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.complaints import Complaints
 from hub.device_loop import DeviceLoop
 from hub.devices import SimulatedDevices
 from hub.inlets import Inlets
@@ -58,6 +59,7 @@ class Intake:
         for uplink, loop in zip(self._uplinks, self._loops.values(), strict=True):
             loop.attach(uplink)
         self.relink = Relink(self._plan, session, self._keys, self.simulated.links)
+        self._complaints = Complaints(self._plan, self._keys, session, self._drops)
         self._away = [m.name for m in members.values() if m.role == "device" and m.host != "hub"]
         wall = [member for member in members.values() if member.role == "device" and not member.follows_clock]
         spoken = [(m.name, p.name) for m in wall for p in m.ports if p.causality == "output" and self._is_heard(m.name, p.name)]
@@ -141,3 +143,4 @@ class Intake:
         self.simulated.close()
         for entity in (*self._subscribers, self.relink):
             entity.undeclare()
+        self._complaints.close()
