@@ -16,7 +16,9 @@ pace: realtime
 participants:
   player: {kind: "toys:Player", clock: wall, max_age_ms: 100, host: remote}
   deaf: {kind: "toys:Deaf"}
+  loud: {kind: "toys:Loud"}
 connections:
+  - loud.out -> player.noise
   - player.hand -> deaf.hand
   - player.buttons -> deaf.buttons
 measure:
@@ -121,9 +123,10 @@ def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
         until(lambda: running.is_followed())
         proxy.hold()
         sleep(0.3)
-        before = running.fresh
+        before, step = running.fresh, running.status.step
         sleep(2.7)
         assert running.fresh - before < 50
+        assert running.status.step > step + 500  # what is for the device waits for nobody
         proxy.go_on()
         until(lambda: running.is_followed())
         assert running.status.participants[0].pid == process.pid

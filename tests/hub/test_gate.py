@@ -53,6 +53,7 @@ PLAN = Plan(
     bonds=(),
 )
 CONTACT, SECRET = (KEYS.output("engine", "robot", port) for port in ("contact", "secret"))
+FEED = KEYS.feed("robot", "contact")
 
 
 class Hub:
@@ -78,7 +79,7 @@ class Hub:
             query.reply(str(query.key_expr).replace("/*/", "/s/", 1), b"a secret")
 
     def say(self):
-        for key in (CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
+        for key in (CONTACT, FEED, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
             self.router.put(key, b"said")
 
     @contextmanager
@@ -139,7 +140,7 @@ def test_a_device_does_its_part(hub, told, caplog):
         told("'touch' connects from 127.0.0.1:")
         assert asks(touch, Keys("*").join("remote/touch")) == [KEYS.join("remote/touch")]
         assert asks(touch, KEYS.control("clock")) == [KEYS.control("clock")]
-        contact, link, alive = hears(touch, CONTACT), hears(touch, KEYS.link("touch")), []
+        contact, link, alive = hears(touch, FEED), hears(touch, KEYS.link("touch")), []
         touch.liveliness().declare_subscriber(KEYS.alive("hub", "hub"), Callback(lambda sample: alive.append(sample.kind)), history=True)
         touch.liveliness().declare_token(KEYS.alive("device", "touch"))
         sleep(0.1)
@@ -192,7 +193,7 @@ ASKED = [
     "trocar/**",
     "@/*/router/**",
 ]
-READ = [SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
+READ = [CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
 
 
 @pytest.mark.parametrize("deed", FORBIDDEN)
@@ -219,11 +220,11 @@ def test_a_device_asks_nothing_that_is_not_for_it(hub, told, key):
 @pytest.mark.parametrize("key", READ)
 def test_a_device_hears_nothing_that_is_not_for_it(hub, told, key):
     with hub.client(hub.authority.issued("touch")) as touch:
-        own, heard = hears(touch, CONTACT), hears(touch, key)
+        own, heard = hears(touch, FEED), hears(touch, key)
         told("refused to 'touch' at 127.0.0.1:", f" on {key}")
         hub.say()
         wait_for(lambda: own)
-        assert set(heard) <= {CONTACT, KEYS.link("touch")}  # what the session is sent for its other subscribers
+        assert set(heard) <= {FEED, KEYS.link("touch")}  # what the session is sent for its other subscribers
 
 
 def test_a_participant_that_the_session_has_not_gets_nothing(hub, told):

@@ -18,6 +18,7 @@ class CongestionControl:
 
 class Priority:
     REAL_TIME: ClassVar[Priority]
+    INTERACTIVE_HIGH: ClassVar[Priority]
     DATA: ClassVar[Priority]
 
 class Encoding:
