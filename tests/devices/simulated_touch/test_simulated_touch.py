@@ -212,3 +212,21 @@ def test_a_misspelt_word_deep_in_a_scenario_is_told_with_the_right_one(tmp_path:
     (line,) = str(refused.value).splitlines()
     assert line.startswith(f"{file}:4:")
     assert line.endswith("there is no 'bottons' here. Did you mean 'buttons'? Known: at, buttons, orientation, position.")
+
+
+def test_a_hand_too_fast_has_no_force_until_it_lets_go_and_the_diagnosis_says_so() -> None:
+    path = [
+        {"at": 0, "position": [0, 0, 0.2], "buttons": [0]},
+        {"at": "0.1 s", "position": [0, 0, 0.02]},  # 3 m/s
+        {"at": "1.5 s", "position": [0, 0, -0.01]},
+        {"at": "2 s", "position": [0, 0, 0.02], "buttons": []},
+        {"at": "2.1 s", "buttons": [0]},
+        {"at": "3.5 s"},
+        {"at": "4 s", "position": [0, 0, -0.01]},
+    ]
+    samples = _play(_device(path, safety={"passivity": True}), 4.5)
+    forces = np.linalg.norm(_forces(samples), axis=1)
+    assert not forces[:500].any()
+    assert forces[-1] == pytest.approx(1.0, abs=0.01)
+    told = [message.message for message in _of(samples, "diagnostics")]
+    assert [text.partition(";")[0] for text in told] == ["force is on", "no force: the hand was too fast", "no force: the dead-man is not held", "force is on"]
