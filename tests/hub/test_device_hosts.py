@@ -3,9 +3,11 @@
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from signal import SIGKILL, SIGTERM
 from time import monotonic, sleep
 
+from hub.endpoint import free_endpoint
 from hub.live import live_sessions
 from tests.hub.proxy import Proxy
 
@@ -148,4 +150,23 @@ def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
         assert [device.device for device in until(lambda: running.status.devices)] == ["player"]
         running.end()
     assert "device 'player' is gone, what it leads holds: start 'trocar device player' again, or mend the network" in caplog.text
+    assert (tmp_path / "player.log").read_text().count("takes part") == 2
+
+
+def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
+    (tmp_path / "session.yaml").write_text(SCENARIO)
+    endpoint = free_endpoint(range(1))
+    command = [sys.executable, "-P", "-m", "hub.command_line", "run", str(tmp_path / "session.yaml"), "--listen", endpoint]
+
+    def is_followed():
+        return any(one.stream == "player.hand" and one.count > 50 for status in live_sessions([endpoint]) for one in status.latencies)
+
+    with ExitStack() as stack:
+        for signal in (SIGKILL, SIGTERM):
+            with subprocess.Popen(command, stderr=subprocess.DEVNULL) as hub:
+                until(lambda: live_sessions([endpoint]))
+                if signal == SIGKILL:
+                    stack.enter_context(player(endpoint, tmp_path / "player.log"))
+                until(is_followed)
+                hub.send_signal(signal)
     assert (tmp_path / "player.log").read_text().count("takes part") == 2
