@@ -124,8 +124,8 @@ class Intake:
     def _told(self, sample: zenoh.Sample) -> None:
         try:
             status = decode(DeviceStatus, sample.payload.to_bytes())
-            if str(sample.key_expr) != self._keys.device_status(status.device):
-                raise MessageError(f"tells of '{status.device}' under another name")
+            if str(sample.key_expr) != self._keys.device_status(status.device) or status.device not in self._plan.members:
+                raise MessageError(f"tells of '{status.device}', which is no device of this name here")
         except MessageError as error:
             self._drops.count(sample, error)
             return
