@@ -286,6 +286,12 @@ def test_names_of_errors() -> None:
     assert Code.text(0x0999) == "HDAPI error 0x0999"
 
 
+def test_the_library_is_found_where_the_loader_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "libHD.so").touch()
+    monkeypatch.setenv("LD_LIBRARY_PATH", f"/nowhere:{tmp_path}")
+    assert hdapi.find(None) == tmp_path / "libHD.so"
+
+
 def test_a_library_that_is_not_there_or_is_another(tmp_path: Path) -> None:
     with pytest.raises(DeviceError, match=r"no library of OpenHaptics at '.*hd\.dll'.*'library: PATH'"):
         hdapi.find(tmp_path / "hd.dll")
