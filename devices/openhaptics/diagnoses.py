@@ -30,7 +30,7 @@ def lost(phase: Phase, code: int, cause: str, device: str | None) -> tuple[Level
         return Level.ERROR, f"it cannot be opened ({why}): see that it is plugged in and switched on, and {known}; {_AGAIN}"
     if phase is Phase.BUSY:
         return Level.ERROR, f"another program uses it{f' ({why})' if code else ''}: end that program; {_AGAIN}"
-    return Level.ERROR, f"it has failed ({why}): see to its cable and power; {_AGAIN}"
+    return Level.ERROR, f"it has failed ({why}){': see to its cable and power' if code else ''}; {_AGAIN}"
 
 
 def present(state: State, refusal: str) -> tuple[Level, str]:
