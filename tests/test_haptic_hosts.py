@@ -95,6 +95,7 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(star
     hand.until(lambda: len(world.rows()) > 0, "the servo runs")
     hand.until(lambda: _presses(hand), "the hand feels the table")
     hub.kill()
+    hub.wait()
     killed = monotonic()
     sleep(0.5)
     rows = world.rows(since=killed)
