@@ -241,5 +241,6 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
     log = "\n".join(caplog.messages)
     for words in ("it shows no certificate", "its certificate is of another authority", "it does not speak TLS"):
         assert f"gate: refused a connection: {words}" in log
+    assert re.search(rf"gate: the connection from {OTHER_ADDRESS}:\d+ was not let in", log)
     for key in keys:
         assert re.search(rf"gate: refused to 'pad' at {OTHER_ADDRESS}:\d+: to put on {key}", log)
