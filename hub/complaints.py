@@ -6,10 +6,12 @@ Those that the session has started itself log the same where everybody sees it.
 from __future__ import annotations
 
 import logging
+from time import monotonic_ns
 
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.allowance import Allowance
 from hub.plan import Plan
 from hub.wire import Drops
 from schemas.codec import decode
@@ -23,6 +25,10 @@ log = logging.getLogger(__name__)
 
 _LONGEST = 500
 """Characters of a message from elsewhere that are logged."""
+
+
+_RATE = 10.0
+"""Diagnoses of one device that are looked at in a second."""
 
 
 class Complaints:
@@ -42,8 +48,12 @@ class Complaints:
         self._subscribers = [session.declare_subscriber(keys.output("device", *source), self._listener("/".join(source))) for source in ports]
 
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
+        allowance = Allowance(_RATE)
+
         def hear(sample: zenoh.Sample) -> None:
             try:
+                if not allowance.spend(monotonic_ns()):
+                    raise MessageError(f"more than {_RATE:g} diagnoses/s")
                 status = decode(DiagnosticStatus, sample.payload.to_bytes())
             except MessageError as error:
                 self._drops.count(sample, error)

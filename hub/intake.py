@@ -10,6 +10,7 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.allowance import Allowance
 from hub.complaints import Complaints
 from hub.device_loop import DeviceLoop
 from hub.devices import SimulatedDevices
@@ -32,6 +33,10 @@ __all__ = ["Intake"]
 _SWITCH_S = 5e-4
 """How long a step may compute in Python before a device's sample is taken, instead of 5 ms: it brought the median of `bench/latency.py` from 2.5
 to 2.2 ms."""
+
+
+_STATUSES = 10.0
+"""How often the host of a device may tell of it, in a second; it does so once."""
 
 
 class Intake:
@@ -61,6 +66,7 @@ class Intake:
         self.relink = Relink(self._plan, session, self._keys, self.simulated.links)
         self._complaints = Complaints(self._plan, self._keys, session, self._drops)
         self._away = [m.name for m in members.values() if m.role == "device" and m.host != "hub"]
+        self._status_allowance = Allowance(_STATUSES * (1.0 + len(members)))
         wall = [member for member in members.values() if member.role == "device" and not member.follows_clock]
         spoken = [(m.name, p.name) for m in wall for p in m.ports if p.causality == "output" and self._is_heard(m.name, p.name)]
         self._subscribers = [session.declare_subscriber(self._keys.output("device", *source), self._listener(*source)) for source in spoken]
@@ -113,9 +119,14 @@ class Intake:
             self._observers.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
+        allowance = Allowance(self._plan.members[device].rate_limit)
+
         def take(sample: zenoh.Sample) -> None:
+            now_ns = monotonic_ns()
             try:
-                self._offer(device, port, sample.payload.to_bytes(), monotonic_ns(), Stamp.of(sample))
+                if not allowance.spend(now_ns):
+                    raise MessageError(f"device '{device}' sends more than {allowance.rate:g} messages/s on port '{port}' (rate_limit)")
+                self._offer(device, port, sample.payload.to_bytes(), now_ns, Stamp.of(sample))
             except MessageError as error:
                 self._drops.count(sample, error)
 
@@ -123,6 +134,8 @@ class Intake:
 
     def _told(self, sample: zenoh.Sample) -> None:
         try:
+            if not self._status_allowance.spend(monotonic_ns()):
+                raise MessageError("devices tell of themselves more often than they may")
             status = decode(DeviceStatus, sample.payload.to_bytes())
             if str(sample.key_expr) != self._keys.device_status(status.device) or status.device not in self._plan.members:
                 raise MessageError(f"tells of '{status.device}', which is no device of this name here")

@@ -151,3 +151,11 @@ def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connec
     assert counts["/device/player/out/buttons"] > 20
     assert counts["/device/player/out/hand"] > 20
     assert verify(recording).same
+
+
+def test_a_device_that_sends_more_than_it_may_is_held_to_it(prepare, caplog):
+    session = prepare(SCENARIO, "participants.player.rate_limit=50")
+    summary = session.run(until(session, lambda steps, fresh, pressed: steps > 1500))
+    assert summary.dropped_messages > 500
+    assert "device 'player' sends more than 50 messages/s on port 'buttons' (rate_limit)" in caplog.text
+    assert summary.measures["pressed"] < 50 * (1.0 + summary.wall_time_s) + 60
