@@ -210,6 +210,7 @@ def figures(rows: np.ndarray) -> dict[str, float]:
 def largest_gain(stiffness: float, settling: float) -> float:
     """Return the largest |1 - tangent / secant| at which the loop is stable whatever the delay, by the small-gain theorem (docs/decisions/0025)."""
     s, (mass, grip, damping) = 1j * np.logspace(-1, 4, 200_001), Trial().hand
+    damping += ForceParams().damping
     return float(np.min(np.abs((mass * s**2 + damping * s + grip + stiffness) * (1.0 + s * settling))) / stiffness)
 
 
