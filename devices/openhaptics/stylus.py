@@ -22,8 +22,6 @@ _CLEAN_FRAMES = 3
 """The scheduler starts before the first frame of a device exists (hopezzzz/3dtouch, touch_hd.py)."""
 _WARNING = 1.0
 """Time without a warning of the device after which force may come back, s."""
-_LOOK_TICKS = 128
-"""A calibration that stands is looked at once in this number of ticks."""
 
 
 class Phase(IntEnum):
@@ -55,7 +53,7 @@ class Phase(IntEnum):
 
 _LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
 _POSED = {Phase.READY, Phase.WARNED}
-_READY, _SETTLING = Phase.READY, Phase.SETTLING
+_READY, _SETTLING, _CALIBRATED = Phase.READY, Phase.SETTLING, Calibration.OK.value
 """As plain names: Python 3.11 looks a member of an enumeration up in a quarter of a microsecond."""
 
 
@@ -84,7 +82,7 @@ class Stylus:
         self._loop: HapticLoop | None = None
         self._code = self._style = 0
         self._calibrated = False
-        self._clean = self._pretending = self._ticks = 0
+        self._clean = self._pretending = 0
         self._permitted = False
         self._warned = -inf
         self._transform, self._velocity, self._force = (c_double * 16)(), (c_double * 3)(), (c_double * 3)()
@@ -104,9 +102,7 @@ class Stylus:
         hd.hdGetIntegerv(Get.BUTTONS, self._buttons)
         self._permitted = self._dead_man()
         moved = self._tip.move(self._transform[:], self._velocity[:], now)
-        if not self._calibrated or self._ticks % _LOOK_TICKS == 0:
-            self._look()
-        self._ticks += 1
+        self._look()
         self._judge(now, valid=moved)
         self._send(self._render(now))
 
@@ -147,17 +143,18 @@ class Stylus:
         return bool(self._switch.value) is held
 
     def _look(self) -> None:
-        """Look at the calibration, and update it where that can be done; force is on only while it stands."""
+        """Look at the calibration, and update it where that can be done. Force output is on only while it stands."""
         hd = self._hd
         calibration = hd.hdCheckCalibration()
+        if (calibration == _CALIBRATED) is not self._calibrated:
+            self._calibrated = not self._calibrated
+            (hd.hdEnable if self._calibrated else hd.hdDisable)(FORCE_OUTPUT)
+        if self._calibrated:
+            return
         self._style = self._style or self._best_style()
         in_place = self._style != Style.ENCODER_RESET or self._buttons.value  # where a person has to put it, the person says so
         if calibration == Calibration.NEEDS_UPDATE and in_place:
             hd.hdUpdateCalibration(self._style)
-            calibration = hd.hdCheckCalibration()
-        if (calibration == Calibration.OK) is not self._calibrated:
-            self._calibrated = not self._calibrated
-            (hd.hdEnable if self._calibrated else hd.hdDisable)(FORCE_OUTPUT)
         errors(hd)  # of an update that the device did not want now
 
     def _best_style(self) -> int:

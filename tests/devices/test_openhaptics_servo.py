@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import Phase as HypothesisPhase
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from devices.haptics.contact import Plane
 from devices.haptics.limits import Limits
@@ -24,7 +27,7 @@ from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, INVALID_
 from devices.openhaptics.stylus import Phase, Spec, Stylus
 from schemas.errors import DeviceError
 from tests.devices.standins import build
-from tests.devices.standins.hd import AUTO, ENCODER_RESET, INKWELL, NEEDS_MANUAL_INPUT, NEEDS_UPDATE, HdWorld
+from tests.devices.standins.hd import AUTO, ENCODER_RESET, INKWELL, NEEDS_MANUAL_INPUT, NEEDS_UPDATE, OK, HdWorld
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
@@ -59,6 +62,7 @@ class Rig:
             self.models.append(models)
             self._states.append(states)
         self.servo = Servo(self.hd, self.styluses)
+        self._last: list[State] = [None, None]  # pyright: ignore[reportAttributeAccessIssue]  # there is one after the first tick
         self.now = 100.0
         self.answer = CALLBACK_CONTINUE
         self.sent: list[float] = []
@@ -68,31 +72,33 @@ class Rig:
         for stylus in self.styluses:
             stylus.allow(Limits(), passivity=False)
 
-    def run(self, ticks: int = 5, *, touching: bool = False) -> State:
-        """Go on; return the last state of the first stylus. `touching`: fresh contact models arrive."""
+    def run(self, ticks: int = 5, *, planes: list[Plane] | None = None, touching: bool = False) -> State:
+        """Go on; return the last state of the first stylus. `planes`: contact models of these arrive; `touching`: of the floor."""
+        planes = [FLOOR] if touching else planes
         for _ in range(ticks):
             self.now += DT
             self.hd.standin_tick(DT)
-            if touching:
+            if planes is not None:
                 for models in self.models:
-                    models.write(model_doubles([FLOOR], round(self.now * 1e9), self.now))
+                    models.write(model_doubles(planes, round(self.now * 1e9), self.now))
             if self.answer == CALLBACK_CONTINUE:
                 self.answer = self.servo.tick(self.now)
             self.sent.append(math.hypot(*self.world.motors(0)))
         return self.state(0)
 
     def state(self, stylus: int) -> State:
-        return State.of(self._states[stylus].read()[-1])
+        self._last[stylus] = next((State.of(record) for record in reversed(self._states[stylus].read())), self._last[stylus])
+        return self._last[stylus]
 
-    def press(self) -> State:
+    def press(self, ticks: int = 2000) -> State:
         """Bring both hands into the contact, from above and with the dead-man held, until the force is there."""
         self.allow()
         for device in self.world.devices:
             device.buttons, device.target[1] = 1, 0.03
-        self.run(500, touching=True)
+        self.run(ticks // 4, touching=True)
         for device in self.world.devices:
             device.target[1] = -0.005
-        return self.run(2000, touching=True)
+        return self.run(ticks, touching=True)
 
 
 @pytest.fixture
@@ -259,6 +265,47 @@ def test_an_exception_in_the_callback_ends_in_a_frame_without_force_on_every_han
     assert (one.answer, one.servo.failure) == (CALLBACK_DONE, "ValueError: a bug")
     assert Phase(state.phase) is Phase.FAULT
     assert [math.hypot(*one.world.motors(i)) for i in (0, 1)] == [0.0, 0.0]
+
+
+numbers = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf])
+events = st.one_of(
+    st.tuples(st.just("buttons"), st.integers(0, 3)),
+    st.tuples(st.just("placeholder"), st.integers(0, 1)),
+    st.tuples(st.just("calibration"), st.sampled_from([NEEDS_UPDATE, NEEDS_MANUAL_INPUT])),
+    st.tuples(st.just("inkwell"), st.integers(0, 1)),
+    st.tuples(st.just("error"), st.sampled_from([code for code in Code if code])),
+    st.tuples(st.just("planes"), st.lists(st.builds(Plane, *[numbers] * 8), max_size=4)),
+    st.tuples(st.just("height"), st.floats(-0.05, 0.05)),
+    st.tuples(st.just("silence"), st.booleans()),
+)
+
+
+@settings(max_examples=10, phases=[HypothesisPhase.generate])
+@given(days=st.lists(st.tuples(events, st.integers(1, 60)), max_size=12))
+def test_whatever_happens_the_force_keeps_its_limits(library: Path, tmp_path_factory: pytest.TempPathFactory, days: list[tuple[tuple[str, Any], int]]) -> None:
+    """From a hand with force in it, through random bad days: never above the limit, never up by more than the slew, zero where nothing permits it."""
+    one = Rig(library, tmp_path_factory.mktemp("world") / "world")
+    one.press(ticks=1000)
+    assert one.sent[-1] > 0.5
+    device, planes, silent = one.world.devices[0], [FLOOR], False
+    for (what, value), ticks in days:
+        if what == "error":
+            device.error, device.error_frames = value, 1
+        elif what == "planes":
+            planes = value
+        elif what == "silence":
+            silent = value
+        elif what == "height":
+            device.target[1] = value
+        else:
+            setattr(device, what, value)
+        for _ in range(ticks):
+            complained = device.error_frames and what == "error"
+            one.run(1, planes=None if silent else planes)
+            if complained or not device.buttons & 1 or device.calibration != OK or device.placeholder:
+                assert one.run(1, planes=None if silent else planes).force == (0.0, 0.0, 0.0)
+    assert max(one.sent) <= Limits().force + 1e-9
+    assert max(np.diff(one.sent)) <= 0.1 + 1e-9
 
 
 def test_a_clean_run_leaves_no_error_in_the_library(rig: Callable[..., Rig]) -> None:
