@@ -286,6 +286,8 @@ class _Wiring:
             values = f"values of {target.type}" if target.variability == "signal" else "events"
             raise ScenarioError(f"{values} cannot be extrapolated, as '{connection.source} -> {connection.target}' would", path=path)
         from_device, to_device = (self._members[end.participant].role == "device" for end in (one, other))
+        if to_device and connection.extrapolation == "linear":
+            raise ScenarioError(f"'{other.participant}' is a device, which is written what is there: 'extrapolation' is for participants that step", path=path)
         if from_device and to_device:
             raise ScenarioError("a device cannot feed a device: only the simulation lies between them", path=path)
         if from_device:

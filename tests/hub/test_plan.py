@@ -229,7 +229,11 @@ def test_the_force_side_takes_whole_steps_of_the_motion_side():
 
 @pytest.mark.parametrize(
     ("of", "message"),
-    [("c.out", "unknown participant 'c'"), ("a.in", "no output 'in' to measure"), ("a.out.force", r"'a.out' has no field 'force'. Known: angular, angular.x, .*, linear, linear.x")],
+    [
+        ("c.out", "unknown participant 'c'"),
+        ("a.in", "no output 'in' to measure"),
+        ("a.out.force", r"'a.out' has no field 'force'. Known: angular, angular.x, .*, linear, linear.x"),
+    ],
 )
 def test_measures_are_of_outputs(of, message):
     part = Part("a", out(type="geometry_msgs/msg/TwistStamped"), into(start=(0.0,)))
@@ -250,6 +254,12 @@ def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
     assert [(link.source, link.target, link.fresh) for link in plan.links] == [("a", "stylus", False)]
     assert [member.name for member in plan.meetings()] == ["stylus"]
     assert plan.order == ("a",)
+
+
+def test_nothing_is_extrapolated_for_a_device():
+    stylus, engine = Stylus("stylus", out("pose", type=POSE), into("force", size=3)), Part("a", out(size=3))
+    with pytest.raises(ScenarioError, match="'stylus' is a device, which is written what is there"):
+        plan_of(stylus, engine, connections=[{"source": "a.out", "target": "stylus.force", "extrapolation": "linear"}])
 
 
 def test_a_device_in_wall_time_is_read_at_a_rate_of_its_own():
