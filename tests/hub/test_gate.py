@@ -84,10 +84,10 @@ class Hub:
             self.router.put(key, b"said")
 
     @contextmanager
-    def client(self, credentials, protocol="tls"):
+    def client(self, credentials, protocol="tls", mode="client"):
         """Connect; raises ConnectError after a moment."""
         settings = {} if credentials is None else credentials.connecting()
-        with open_session("client", connect=[f"{protocol}/127.0.0.1:{self.port}"], security=settings | {"connect/timeout_ms": 300}) as session:
+        with open_session(mode, connect=[f"{protocol}/127.0.0.1:{self.port}"], security=settings | {"connect/timeout_ms": 300}) as session:
             yield session
 
     def close(self):
@@ -227,6 +227,24 @@ def test_a_device_hears_nothing_that_is_not_for_it(hub, told, key):
         hub.say()
         wait_for(lambda: own)
         assert set(heard) <= {FEED, KEYS.link("touch")}  # what the session is sent for its other subscribers
+
+
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_who_does_not_come_as_a_client_may_do_no_more(hub, told, mode):
+    with hub.client(hub.authority.issued("touch"), mode=mode) as touch:
+        heard, alive = hears(touch, "**"), []
+        touch.liveliness().declare_subscriber("**", Callback(lambda sample: alive.append(str(sample.key_expr))), history=True)
+        told("refused to 'touch' at 127.0.0.1:", "declare subscriber on **")
+        hub.say()
+        hub.heard.clear()
+        for key in (SECRET, KEYS.grant, KEYS.output("device", "head", "pose"), KEYS.output("device", "touch", "pose")):
+            touch.put(key, b"x")
+        touch.liveliness().declare_token(KEYS.alive("device", "head"))
+        assert asks(touch, KEYS.control("shutdown")) == []
+        sleep(0.3)
+        assert heard == []
+        assert set(alive) <= {KEYS.alive("hub", "hub"), KEYS.alive("device", "head")}  # what it may see, and what it said itself
+        assert set(hub.heard) <= {KEYS.output("device", "touch", "pose")}
 
 
 def test_a_participant_that_the_session_has_not_gets_nothing(hub, told):
