@@ -60,7 +60,8 @@ def access_settings(plan: Plan, session: str) -> dict[str, Any]:
         "key_exprs": [f"{keys.prefix}/device/**", f"{Keys('*').prefix}/control/**"],
         "size_limit": _DEVICE_BYTES,
     }
-    return {"access_control": access, "low_pass_filter": [size], "transport/link/rx/max_message_size": _MOST_BYTES}
+    limits = {"low_pass_filter": [size], "transport/link/rx/max_message_size": _MOST_BYTES}
+    return {"access_control": access, **limits, "scouting/gossip/enabled": False}  # who else is here, and at which address, is nobody's business
 
 
 def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
