@@ -6,8 +6,8 @@ import pytest
 from hub.complaints import Complaints
 from hub.endpoint import free_endpoint
 from hub.participant import Device, Params
-from hub.plan import make_plan
 from hub.wire import Drops, open_session
+from hub.wiring import make_plan
 from schemas.codec import encode
 from schemas.keys import Keys
 from schemas.ports import Port
