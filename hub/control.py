@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from time import monotonic_ns
+from time import monotonic, monotonic_ns, sleep
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -25,7 +25,9 @@ from schemas.keys import Keys
 from schemas.ports import BondSide
 from schemas.ros import StringMessage
 
-__all__ = ["ClockReply", "ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask"]
+__all__ = ["ClockReply", "ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask", "present"]
+
+_PATIENCE_S = 5.0
 
 R = TypeVar("R", bound=BaseModel)
 Q = TypeVar("Q", bound=BaseModel)
@@ -241,3 +243,15 @@ def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[
             except ValidationError as error:
                 raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
     raise ConnectError(f"nobody answers on {key}: is the hub running, and does its session have what this names?")
+
+
+def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
+    """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask` raises."""
+    deadline = monotonic() + _PATIENCE_S
+    while True:
+        try:
+            return ask(session, keys.join(request.host), request, JoinReply, timeout_s=10.0)
+        except ConnectError:
+            if monotonic() > deadline:
+                raise
+            sleep(0.1)

@@ -20,7 +20,7 @@ import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from hub.clock_watch import ClockWatch
-from hub.control import Empty, JoinReply, JoinRequest, ask
+from hub.control import Empty, JoinReply, JoinRequest, ask, present
 from hub.device_host import DeviceHost
 from hub.device_loop import DeviceLoop
 from hub.host import Host
@@ -57,7 +57,7 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
     """
     request = JoinRequest(host=host, pid=os.getpid())
     with reach(endpoint, host.removeprefix("remote/"), certificates, mode="peer") as session:
-        reply = ask(session, Keys(session_name).join(host), request, JoinReply, timeout_s=10.0)
+        reply = present(session, Keys(session_name), request)
         keys = Keys(reply.session)
         with _ending_with_hub(session, keys):
             joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory))
