@@ -29,11 +29,9 @@ from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
 
 __all__ = ["Intake"]
 
-
 _SWITCH_S = 5e-4
 """How long a step may compute in Python before a device's sample is taken, instead of 5 ms: it brought the median of `bench/latency.py` from 2.5
 to 2.2 ms."""
-
 
 _STATUSES = 10.0
 """How often the host of a device may tell of it, in a second; it does so once."""
@@ -47,6 +45,8 @@ class Intake:
         self._plan, self._keys, self._run, self._drops, self._inlets = plan, keys, run, drops, inlets
         self._connected = {(inlet.device, inlet.device_port) for inlet in plan.inlets}
         self._statuses: dict[str, DeviceStatus] = {}
+        self._latencies: dict[str, list[Latency]] = {}
+        """What the host of each device told last, also of one that is gone."""
         self._time_ns = 0
         self._switch_s = sys.getswitchinterval()
 
@@ -89,7 +89,7 @@ class Intake:
     def forget(self, device: str) -> None:
         """A device is gone: nothing is known of its clock any more."""
         self._inlets.offsets_ns.pop(device, None)
-        self._statuses.pop(device, None)
+        self._statuses = {name: status for name, status in self._statuses.items() if name != device}
 
     @property
     def statuses(self) -> list[DeviceStatus]:
@@ -99,7 +99,7 @@ class Intake:
     @property
     def latencies(self) -> list[Latency]:
         """How long samples took into the simulation, and its values out of it."""
-        told = (latency for status in self.statuses for latency in status.latencies)
+        told = (latency for _, latencies in sorted(self._latencies.items()) for latency in latencies)
         return [*self._inlets.latencies.messages(), *self.simulated.latencies.messages(), *told]
 
     def _is_heard(self, device: str, port: str) -> bool:
@@ -143,6 +143,7 @@ class Intake:
             self._drops.count(sample, error)
             return
         self._statuses = {**self._statuses, status.device: status}  # a new one: others may be looking through the old one
+        self._latencies = {**self._latencies, status.device: status.latencies}
         if status.round_trip_ns >= 0:
             self._inlets.offsets_ns[status.device] = status.offset_ns
 

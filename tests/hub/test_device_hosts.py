@@ -132,7 +132,11 @@ def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
         proxy.go_on()
         until(lambda: running.is_followed())
         assert running.status.participants[0].pid == process.pid
+        process.terminate()
+        process.wait(10)
+        until(lambda: running.status.participants[0].pid == 0)
         running.end()
+    assert running.summary.latency["state to force"]["loud.out -> player.noise"]["count"] > 100  # though the device is gone
     assert (tmp_path / "player.log").read_text().count("takes part") == 1
 
 
