@@ -27,9 +27,10 @@ class Clock:
         self.late_steps = 0
         alone = not realtime and len(plan.hosts()) == 1
         self._window = window or (max(1, _WINDOW_NS // plan.step_ns) if alone else 1)
-        self._realtime = realtime
+        self.realtime = realtime
+        """Whether steps follow the wall clock."""
         self.steps = steps
-        self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets})
+        self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets} | {device.period for device in plan.meetings()})
         self._wall_zero_ns = monotonic_ns()
 
     @property
@@ -45,7 +46,8 @@ class Clock:
     def horizon(self, most: int | None = None) -> int:
         """Return how many steps the next grant covers.
 
-        No participant that listens to a device may start a step inside a grant, or it would miss the newest samples.
+        No participant that listens to a device may start a step inside a grant, or it would miss the newest samples; and no device may be
+        due inside it that is to be written what the others have computed.
         """
         count = self._window if most is None else min(self._window, most)
         if self.steps is not None:
@@ -61,7 +63,7 @@ class Clock:
     def advance(self, count: int) -> None:
         """Go on by `count` steps; in real time wait for the wall clock, or slip by as much as the steps came late."""
         self.step += count
-        if not self._realtime:
+        if not self.realtime:
             return
         ahead_ns = self._wall_zero_ns + self.time_ns - monotonic_ns()
         if ahead_ns >= 0:

@@ -1,4 +1,4 @@
-"""The control queryables of a session: join, pause, resume, step, set, shutdown; and the questions to ask them with.
+"""The control queryables of a session: join, clock, pause, resume, step, set, link, shutdown; and the questions to ask them with.
 
 Requests and replies are `std_msgs/String` messages that hold JSON.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from time import monotonic_ns
+from time import monotonic, monotonic_ns, sleep
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from zenoh.handlers import Callback
 
 from hub.inlets import Inlets
 from hub.plan import Plan
+from hub.relink import LinkRequest, Relink
 from hub.wire import Drops, PortCodec
 from schemas.codec import decode, encode, message_type
 from schemas.errors import ConnectError, MessageError, TrocarError
@@ -24,7 +25,9 @@ from schemas.keys import Keys
 from schemas.ports import BondSide
 from schemas.ros import StringMessage
 
-__all__ = ["ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask"]
+__all__ = ["ClockReply", "ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask", "present"]
+
+_PATIENCE_S = 5.0
 
 R = TypeVar("R", bound=BaseModel)
 Q = TypeVar("Q", bound=BaseModel)
@@ -69,11 +72,22 @@ class JoinRequest(_Json):
     """Why the host cannot go on: `participant: cause`."""
 
 
+class ClockReply(_Json):
+    """What time it is by the hub's monotonic clock: when the question came, and when the answer went."""
+
+    received_ns: int
+    replied_ns: int
+
+
 class JoinReply(_Json):
     """All that a host needs to make its participants."""
 
+    session: str
     run: int
+    admission: int
+    """Counts the hosts that were let in: a device's samples carry it, so that those of a host before it are known."""
     plan: Plan
+    """For another machine, the part of it that concerns the host."""
     params: dict[str, dict[str, Any]]
     directory: str
     watched: list[tuple[str, str]]
@@ -147,32 +161,49 @@ class Joins(Protocol):
 class ControlServer:
     """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, state: RunState, inlets: Inlets, joins: Joins, drops: Drops) -> None:
-        """Steer `state`, write into `inlets`, and let hosts join; what is refused is counted in `drops`."""
+    def __init__(self, session: zenoh.Session, keys: Keys, state: RunState, inlets: Inlets, relink: Relink, joins: Joins, drops: Drops) -> None:
+        """Steer `state`, write into `inlets`, change links and let hosts join; what is refused is counted in `drops`."""
         self._drops = drops
         self._inlets = inlets
         self._queryables = [
-            self._declare(session, keys.control("join"), JoinRequest, joins.join),
+            self._declare(session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)),
             self._declare(session, keys.control("pause"), Empty, lambda _: self._done(state.pause())),
             self._declare(session, keys.control("resume"), Empty, lambda _: self._done(state.resume())),
             self._declare(session, keys.control("step"), StepRequest, lambda request: self._done(state.step(request.steps))),
             self._declare(session, keys.control("set"), SetRequest, self._set),
+            self._declare(session, keys.control("link"), LinkRequest, relink.change),
+            self._declare(session, keys.control("clock"), Empty, self._clock),
             self._declare(session, keys.control("shutdown"), Empty, lambda _: self._done(state.shutdown())),
         ]
 
-    def _declare(self, session: zenoh.Session, key: str, model: type[Q], handler: Callable[[Q], BaseModel]) -> zenoh.Queryable[None]:
+    def _declare(
+        self, session: zenoh.Session, key: str, model: type[Q], handler: Callable[[Q], BaseModel], key_of: Callable[[Q], str] | None = None
+    ) -> zenoh.Queryable[None]:
+        """Answer on `key`; where that stands for several, `key_of` says on which of them a request may come."""
+
         def answer(query: zenoh.Query) -> None:
+            at = key
             with query:
                 try:
                     payload = b"" if query.payload is None else query.payload.to_bytes()
                     text = decode(StringMessage, payload).data if payload else "{}"
-                    reply = handler(model.model_validate_json(text))
+                    request = model.model_validate_json(text)
+                    if key_of is not None:
+                        if not query.key_expr.intersects(key_of(request)):
+                            raise MessageError(f"this request belongs on {key_of(request)}, and came on {query.key_expr}")
+                        at = key_of(request)
+                    reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
                     self._drops.refuse(key, error)
                     reply = Refusal(refused=str(error))
-                query.reply(key, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
+                query.reply(at, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
 
         return session.declare_queryable(key, Callback(answer))
+
+    @staticmethod
+    def _clock(_: Empty) -> ClockReply:
+        received_ns = monotonic_ns()
+        return ClockReply(received_ns=received_ns, replied_ns=monotonic_ns())
 
     @staticmethod
     def _done(_nothing: None) -> Empty:
@@ -211,4 +242,16 @@ def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[
                 raise MessageError(Refusal.model_validate_json(text).refused) from None
             except ValidationError as error:
                 raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
-    raise ConnectError(f"nobody answers on {key}: is the hub running, and is the session's name right?")
+    raise ConnectError(f"nobody answers on {key}: is the hub running, and does its session have what this names?")
+
+
+def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
+    """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask` raises."""
+    deadline = monotonic() + _PATIENCE_S
+    while True:
+        try:
+            return ask(session, keys.join(request.host), request, JoinReply, timeout_s=10.0)
+        except ConnectError:
+            if monotonic() > deadline:
+                raise
+            sleep(0.1)

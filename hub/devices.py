@@ -1,127 +1,105 @@
-"""Devices in a session: those that live in wall time run in a thread of their host, those that play by a script follow the clock."""
+"""Devices that follow the clock: read, and written to, at communication points."""
 
 from __future__ import annotations
 
-import logging
-import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from time import monotonic_ns
-
-import zenoh
-from zenoh.handlers import Callback
 
 from hub.cells import INITIAL
-from hub.inlets import Inlets
-from hub.participant import Device
+from hub.latency import Latencies
+from hub.link import Link
+from hub.participant import Device, Sample, Value
 from hub.plan import Member, Plan
-from hub.wire import Drops, PortCodec, Tag
+from hub.reader import Feed
+from hub.wire import Drops, Stamp
 from schemas.codec import encode
-from schemas.errors import MessageError, ParticipantError
-from schemas.keys import Keys
-from schemas.ports import Port
+from schemas.errors import ParticipantError
 
-__all__ = ["DeviceLoop", "ScriptedDevices"]
+__all__ = ["SimulatedDevices", "open_device"]
 
-log = logging.getLogger(__name__)
+Take = Callable[[str, Sample, bytes, int, Stamp], None]
+"""Gets a sample: device, sample, its bytes, when it arrived (simulated ns), and its stamp."""
 
 
-class ScriptedDevices:
-    """The devices of the hub's process that are read at every communication point."""
+class SimulatedDevices:
+    """The devices of the hub's process that follow the clock.
 
-    def __init__(self, devices: Mapping[str, Device]) -> None:
-        self._devices = dict(devices)
+    One that is written to, or sits behind a link, is met at every period of its own, wherever the participants are that feed it: first it is
+    written what they had computed by then, and then it is read. Any other is read whenever the hub looks.
+    """
+
+    def __init__(self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, Feed], drops: Drops) -> None:
+        """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a link."""
+        meetings = {member.name for member in plan.meetings()}
+        self._devices = [_Simulated(plan.members[n], device, feeds[n], n in meetings, drops) for n, device in devices.items()]
+        self.links = {device.name: device.link for device in self._devices}
+        self.latencies = Latencies()
+        """From a value to the device."""
 
     def open(self, directory: Path) -> None:
         """Open all; raises ParticipantError naming the one that cannot be."""
-        for name, device in self._devices.items():
-            _open(name, device, directory)
+        for one in self._devices:
+            open_device(one.name, one.device, directory)
 
-    def read(self, time_ns: int, step: int, inlets: Inlets) -> None:
-        """Offer all samples up to `time_ns` to the inlets; their age is counted in simulated time."""
-        for name, device in self._devices.items():
+    def exchange(self, time_ns: int, step: int, take: Take) -> None:
+        """Write to all devices that are due, and hand on what they have; raises ParticipantError."""
+        for one in self._devices:
+            if one.meets and step % one.member.period:
+                continue
             try:
-                for sample in device.read(time_ns):
-                    inlets.offer(name, sample.port, encode(sample.message), time_ns)
+                one.write(time_ns, step, self.latencies)
+                for sample, payload, arrival_ns, stamp in one.read(time_ns):
+                    take(one.name, sample, payload, arrival_ns, stamp)
             except Exception as error:
-                raise ParticipantError(name, step, f"{type(error).__name__}: {error}") from error
+                raise ParticipantError(one.name, step, f"{type(error).__name__}: {error}") from error
 
     def close(self) -> None:
         """Close all."""
-        for device in self._devices.values():
-            device.close()
+        for one in self._devices:
+            one.device.close()
 
 
-class DeviceLoop:
-    """Reads a device at its period in a thread of its own, and writes to it what the simulation has for it."""
+class _Simulated:
+    """One device, its link, and how far its samples have been counted."""
 
-    def __init__(
-        self, member: Member, plan: Plan, device: Device, session: zenoh.Session, keys: Keys, drops: Drops, *, failed: Callable[[str, str], None]
-    ) -> None:
-        """`drops` counts what the device is not given; `failed` is told the device's name and the cause when the loop ends by an error."""
-        self._name = member.name
-        self._device = device
-        self._period_s = member.period * plan.step_ns / 1e9
-        self._failed = failed
-        self._drops = drops
-        self._ending = threading.Event()
-        self._publishers = {
-            port.name: session.declare_publisher(keys.output("device", member.name, port.name), encoding=zenoh.Encoding.APPLICATION_CDR, express=True)
-            for port in member.ports
-            if port.causality == "output"
-        }
-        self._subscribers = [
-            self._subscribe(session, keys, plan, outlet.source, outlet.source_port, member.port(outlet.device_port))
-            for outlet in plan.outlets
-            if outlet.device == member.name
-        ]
-        self._thread = threading.Thread(target=self._run, name=f"device {member.name}", daemon=True)
+    def __init__(self, member: Member, device: Device, feed: Feed, meets: bool, drops: Drops) -> None:
+        self.name, self.member, self.device, self.meets = member.name, member, device, meets
+        self.link = Link(member.link)
+        self._feed, self._drops = feed, drops
+        self._ports = {port.name: port for port in member.ports}
+        self._sequence = dict.fromkeys(self._ports, 0)
+        self._newest_ns = dict.fromkeys(self._ports, INITIAL)
 
-    def start(self, directory: Path) -> None:
-        """Open the device and begin to read it."""
-        _open(self._name, self._device, directory)
-        self._thread.start()
+    def write(self, time_ns: int, step: int, latencies: Latencies) -> None:
+        """Write what has arrived from the simulation."""
+        self.link.settle(time_ns)
+        for port, valid_ns, value in self._feed.due(step):
+            self.link.line(self._ports[port]).send(valid_ns, (valid_ns, value))
+        for port in self._ports.values():
+            for _, (valid_ns, value) in self.link.line(port).arrived(time_ns) if port.causality == "input" else ():
+                self._write_one(port.name, valid_ns, value)
+                latencies.add("state to force", f"{self.name}.{port.name}", time_ns - valid_ns)
 
-    def _subscribe(self, session: zenoh.Session, keys: Keys, plan: Plan, source: str, source_port: str, port: Port) -> zenoh.Subscriber[None]:
-        member = plan.members[source]
-        codec = PortCodec(member.port(source_port).model_copy(update={"variability": port.variability}))
+    def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
+        newest_ns = self._newest_ns[port]
+        if valid_ns < newest_ns:
+            self._drops.refuse(f"{self.name}.{port}", f"the value of {valid_ns / 1e9:g} s comes late: that of {newest_ns / 1e9:g} s was here before it")
+            return
+        self._newest_ns[port] = valid_ns
+        self.device.write(port, value)
 
-        newest = (INITIAL - 1, 0)
-
-        def write(sample: zenoh.Sample) -> None:
-            nonlocal newest
-            try:
-                tag = Tag.of(sample)
-                if not tag.count or (tag.step, tag.index) <= newest:  # no events, or the value at time 0 again
-                    return
-                newest = tag.step, tag.index
-                self._device.write(port.name, codec.decode(sample.payload.to_bytes()))
-            except MessageError as error:
-                self._drops.count(sample, error)
-
-        return session.declare_subscriber(keys.output(member.key_role, source, source_port), Callback(write, indirect=True))
-
-    def _run(self) -> None:
-        start_ns = monotonic_ns()
-        try:
-            while not self._ending.wait(self._period_s):
-                for sample in self._device.read(monotonic_ns() - start_ns):
-                    self._publishers[sample.port].put(encode(sample.message))
-        except Exception as error:
-            log.exception("device '%s' has failed", self._name)
-            self._failed(self._name, f"{type(error).__name__}: {error}")
-
-    def close(self) -> None:
-        """End the loop and close the device."""
-        self._ending.set()
-        if self._thread.is_alive():
-            self._thread.join(timeout=2.0)
-        for entity in (*self._subscribers, *self._publishers.values()):
-            entity.undeclare()
-        self._device.close()
+    def read(self, time_ns: int) -> Iterator[tuple[Sample, bytes, int, Stamp]]:
+        """Yield the samples that have arrived at the hub: sample, its bytes, time of arrival, stamp."""
+        for sample in self.device.read(time_ns):
+            number = self._sequence[sample.port] = self._sequence[sample.port] + 1
+            self.link.line(self._ports[sample.port]).send(time_ns, (sample, encode(sample.message), Stamp(0, number, time_ns)))
+        for port in self._ports.values():
+            for arrival_ns, (sample, payload, stamp) in self.link.line(port).arrived(time_ns) if port.causality == "output" else ():
+                yield sample, payload, arrival_ns, stamp
 
 
-def _open(name: str, device: Device, directory: Path) -> None:
+def open_device(name: str, device: Device, directory: Path) -> None:
+    """Open a device; raises ParticipantError with its name."""
     try:
         device.open(directory)
     except Exception as error:

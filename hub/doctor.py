@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
 import json
 import platform
 import sys
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, entry_points
 from importlib.util import find_spec
 
-from hub import registry
+from hub import credentials, registry
 from hub.endpoint import free_endpoint
 from hub.wire import open_session
 from schemas.errors import TrocarError
@@ -32,12 +31,6 @@ class Finding:
     """Nothing runs without it."""
 
 
-_LIBRARIES = (
-    ("device", "OpenHaptics", ("HD",), "haptic styluses of 3D Systems", "install the OpenHaptics SDK and driver of 3D Systems"),
-    ("device", "LibOVR", ("LibOVRRT64_1", "OVRRT64_1"), "Oculus headsets", "install the Oculus runtime (Windows)"),
-    ("device", "OpenXR", ("openxr_loader",), "head-mounted displays", "apt-get install libopenxr-loader1"),
-)
-
 _ROS = (
     ("ROS 2", "rclpy", "source the setup.bash of a ROS 2 installation before starting trocar"),
     ("ROS 1", "rospy", "apt-get install python3-rospy, and let this environment see /usr/lib/python3/dist-packages"),
@@ -45,8 +38,8 @@ _ROS = (
 
 
 def examine() -> list[Finding]:
-    """Look at Python, Zenoh, the extras, the kinds of participants, device libraries, OpenGL and ROS. Starts no device."""
-    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _extras, _kinds, _libraries, _checks, _ros)
+    """Look at Python, Zenoh, certificates, the extras, the kinds of participants, what packages bring checks for, and ROS. Starts no device."""
+    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _certificates, _extras, _kinds, _checks, _ros)
     return [finding for section in sections for finding in section()]
 
 
@@ -67,6 +60,22 @@ def _zenoh() -> Iterator[Finding]:
         yield Finding("base", "Zenoh", True, f"eclipse-zenoh {distribution('eclipse-zenoh').version}, session over loopback", needed=True)
 
 
+def _certificates() -> Iterator[Finding]:
+    """Look at the certificates of this user, by which a hub and other machines know each other."""
+    directory = credentials.default_directory()
+    files = [file for file in sorted(directory.glob("*.pem")) if file.name != "ca.pem"]
+    if not files:
+        remedy = "trocar certs init, where the hub runs; elsewhere, a copy of what trocar certs issue NAME makes there"
+        yield Finding("network", "certificates", False, f"none in {directory}: a hub or a device on this machine cannot meet other machines", remedy)
+    for file in files:
+        try:
+            certificate = credentials.examine(credentials.load(file.stem, directory))
+        except TrocarError as error:
+            yield Finding("network", file.stem, False, str(error), f"trocar certs {'renew' if file.stem == credentials.HUB else f'issue {file.stem}'}")
+        else:
+            yield Finding("network", file.stem, True, f"certificate in {directory}, valid until {certificate.until:%Y-%m-%d %H:%M} UTC")
+
+
 def _extras() -> Iterator[Finding]:
     trocar = distribution("trocar")
     for extra in sorted(trocar.metadata.get_all("Provides-Extra") or []):
@@ -79,12 +88,6 @@ def _kinds() -> Iterator[Finding]:
     broken = registry.broken()
     for name, kind in sorted(registry.kinds().items()):
         yield Finding(kind.role, name, name not in broken, broken.get(name, f"from {kind.distribution}"), f"pip install --force-reinstall {kind.distribution}")
-
-
-def _libraries() -> Iterator[Finding]:
-    for area, name, stems, use, remedy in _LIBRARIES:
-        found = next((path for stem in stems if (path := ctypes.util.find_library(stem))), None)
-        yield Finding(area, name, found is not None, f"{found or 'not found'}: {use}", remedy)
 
 
 def _checks() -> Iterator[Finding]:

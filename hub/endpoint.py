@@ -1,4 +1,4 @@
-"""Where a hub listens on this machine, and where to look for hubs."""
+"""Where a hub listens, and where to look for hubs: on loopback without more ado, elsewhere through a gate that speaks TLS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ipaddress import ip_address
 
 from schemas.errors import ConnectError, ScenarioError
 
-__all__ = ["PORTS", "free_endpoint", "listening_endpoints", "require_loopback"]
+__all__ = ["PORTS", "address", "free_endpoint", "is_loopback", "listening_endpoints", "parted", "require_loopback"]
 
 PORTS = range(7447, 7467)
 """Zenoh's own port, and the next ones for further hubs on the same machine."""
@@ -29,28 +29,56 @@ def free_endpoint(ports: Iterable[int] = PORTS) -> str:
 
 
 def listening_endpoints() -> list[str]:
-    """Return the endpoints of the ports on loopback where somebody listens."""
-    found: list[str] = []
-    for port in PORTS:
-        with socket.socket() as probe:
-            probe.settimeout(0.2)
-            if probe.connect_ex(("127.0.0.1", port)) == 0:
-                found.append(_endpoint(port))
-    return found
+    """Return the endpoints of the ports where somebody listens on loopback alone: who listens on all addresses is the gate of a hub."""
+    return [_endpoint(port) for port in PORTS if _answers("127.0.0.1", port) and not _answers("127.0.0.2", port)]
+
+
+def _answers(address: str, port: int) -> bool:
+    with socket.socket() as probe:
+        probe.settimeout(0.2)
+        return probe.connect_ex((address, port)) == 0
+
+
+def parted(endpoints: Iterable[str]) -> tuple[str, list[str]]:
+    """Return the loopback endpoint of a hub, a free one if `endpoints` has none, and those at which its gate listens to other machines.
+
+    Raises ScenarioError if one of them is neither TCP on loopback nor TLS.
+    """
+    given = list(endpoints)
+    outside = [endpoint for endpoint in given if endpoint.startswith("tls/")]
+    inside = [require_loopback(endpoint) for endpoint in given if endpoint not in outside]
+    if len(inside) > 1:
+        raise ScenarioError(f"{', '.join(inside)}: a hub listens once on loopback")
+    taken = {address(endpoint)[1] for endpoint in outside}
+    return (inside[0] if inside else free_endpoint(port for port in PORTS if port not in taken)), outside
 
 
 def require_loopback(endpoint: str) -> str:
-    """Return `endpoint` if only this machine can reach it. Raises ScenarioError otherwise: off loopback a hub must not listen without mTLS."""
-    protocol, _, address = endpoint.partition("/")
-    host = address.rpartition(":")[0].strip("[]")
-    if protocol == "tcp":
-        with suppress(ValueError):
-            if host == "localhost" or ip_address(host).is_loopback:
-                return endpoint
+    """Return `endpoint` if only this machine can reach it. Raises ScenarioError otherwise."""
+    if is_loopback(endpoint):
+        return endpoint
     raise ScenarioError(
-        f"'{endpoint}' cannot be listened on: a hub listens on loopback only, such as tcp/127.0.0.1:7447. "
-        "From another machine, reach it through a tunnel: ssh -L 7447:127.0.0.1:7447 HUB"
+        f"'{endpoint}' cannot be listened on: a hub listens on loopback, such as tcp/127.0.0.1:7447, and to other machines by TLS, such as tls/0.0.0.0:7447"
     )
+
+
+def is_loopback(endpoint: str) -> bool:
+    """Say whether an endpoint is TCP within this machine."""
+    if not endpoint.startswith("tcp/"):
+        return False
+    host, _ = address(endpoint)
+    with suppress(ValueError):
+        return host == "localhost" or ip_address(host).is_loopback
+    return False
+
+
+def address(endpoint: str) -> tuple[str, int]:
+    """Return host and port of an endpoint such as tls/hub.example:7447. Raises ScenarioError if it is none."""
+    _, slash, rest = endpoint.partition("/")
+    host, colon, port = rest.rpartition(":")
+    if not (slash and colon and host and port.isdecimal()):
+        raise ScenarioError(f"'{endpoint}' is no endpoint: write tls/HOST:PORT, or tcp/127.0.0.1:PORT on the hub's own machine")
+    return host.strip("[]"), int(port)
 
 
 def _endpoint(port: int) -> str:

@@ -19,10 +19,10 @@ from hub.cells import INITIAL, Cell, RemoteCell
 from hub.inputs import Inputs
 from hub.participant import Outputs, Setup, Stepped
 from hub.plan import Member, Plan
+from hub.reader import Feed, Reader, as_messages
 from hub.wire import PortCodec, PortPublisher, Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.lockstep import Permission, Report
-from schemas.message import Message
 from schemas.ports import BondSide, Port
 from schemas.vectors import VectorCodec
 
@@ -35,24 +35,6 @@ Tap = Callable[[Member, Port, int, int, Any], None]
 
 Done = Callable[[Member, Report], None]
 """Gets the report of a participant that has done its part of a grant."""
-
-
-_Messages = Callable[[Any, int], tuple[Message, ...]]
-"""Takes a value and the time (ns) at which it is valid."""
-
-
-@dataclass(slots=True)
-class _Reader:
-    """An input port, the cell that feeds it, and how it is read."""
-
-    port: str
-    cell: Cell
-    fresh: bool
-    linear: bool
-    messages: _Messages | None
-    """For an event port: what makes its messages of a value of the source; None for a signal."""
-    stride_s: float
-    seen: int = INITIAL
 
 
 @dataclass(slots=True)
@@ -78,7 +60,7 @@ class _Slot:
     rates: dict[str, Any]
     events: dict[str, tuple[Any, ...]]
     stale: set[str]
-    readers: list[_Reader] = field(default_factory=list[_Reader])
+    readers: list[Reader] = field(default_factory=list[Reader])
     sinks: dict[int, list[_Sink]] = field(default_factory=dict[int, list[_Sink]])
     """By stride, so that a step looks only at those that are due."""
     work_ports: tuple[str, ...] = ()
@@ -108,7 +90,9 @@ class Host:
         for slot in self._slots:
             self._lay_sinks(slot)
         for slot in self._slots:
-            self._lay_readers(slot)
+            slot.readers = self._readers(slot.member)
+        self.feeds = {m.name: Feed(self._readers(m), plan.step_ns) for m in plan.members.values() if m.follows_clock and m.host == name}
+        """What the devices here that follow the clock are to be written."""
         self._lay_inlets()
 
     # --- laying out ------------------------------------------------------------------------------------------------
@@ -140,21 +124,24 @@ class Host:
             stride = self.plan.stride(member.name, port.name)
             depth = self._depth(member.name, port.name, here=True)
             readers = sorted({self.plan.members[k.target].host for k in self.plan.links if (k.source, k.source_port) == (member.name, port.name)} - {self.name})
-            publisher = self._wire.publisher(member, port, readers) if self._wire else None
+            feeds = (member.name, port.name) in {(outlet.source, outlet.source_port) for outlet in self.plan.outlets}
+            publisher = self._wire.publisher(member, port, readers, feeds=feeds) if self._wire else None
             cell = Cell(member.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
             sink = _Sink(port, vector, () if vector is None else vector.neutral.shape, cell, publisher)
             sinks = slot.sinks.setdefault(stride, [])
             sinks.insert(0 if readers else len(sinks), sink)  # first what another host waits for
 
-    def _lay_readers(self, slot: _Slot) -> None:
+    def _readers(self, reading: Member) -> list[Reader]:
+        readers: list[Reader] = []
         for link in self.plan.links:
-            if link.target != slot.member.name:
+            if link.target != reading.name:
                 continue
-            source, target = self.plan.members[link.source].port(link.source_port), slot.member.port(link.target_port)
-            cell, messages = self._cell(link.source, link.source_port), _messages(source, target)
+            source, target = self.plan.members[link.source].port(link.source_port), reading.port(link.target_port)
             stride_s = self.plan.stride(link.source, link.source_port) * self._step_s
-            slot.readers.append(_Reader(target.name, cell, link.fresh, link.linear, messages, stride_s))
+            cell = self._cell(link.source, link.source_port)
+            readers.append(Reader(target.name, cell, link.fresh, link.linear, as_messages(source, target), stride_s))
+        return readers
 
     def _cell(self, source: str, port: str) -> Cell:
         if source in self._by_name:
@@ -181,7 +168,8 @@ class Host:
         for inlet in self.plan.inlets:
             if inlet.target in self._by_name:
                 slot, port = self._by_name[inlet.target], self.plan.members[inlet.target].port(inlet.target_port)
-                self._inlets.setdefault((inlet.device, inlet.device_port), []).append((slot, port.name, PortCodec(port)))
+                codec = PortCodec(port.filled_from(self.plan.members[inlet.device].port(inlet.device_port)))
+                self._inlets.setdefault((inlet.device, inlet.device_port), []).append((slot, port.name, codec))
                 if port.variability == "signal":
                     slot.stale.add(port.name)
         fed = {(link.target, link.target_port) for link in self.plan.links} | {(i.target, i.target_port) for i in self.plan.inlets}
@@ -287,17 +275,13 @@ class Host:
         if slot.events:
             slot.events.clear()
 
-    def _read(self, slot: _Slot, reader: _Reader, step: int) -> None:
+    def _read(self, slot: _Slot, reader: Reader, step: int) -> None:
         cell = reader.cell
-        tag = cell.tag(step, fresh=reader.fresh)
         if reader.messages is not None:
-            arrived: list[Any] = []
-            while reader.seen < tag:
-                reader.seen = cell.after(reader.seen)
-                arrived.extend(reader.messages(cell.get(reader.seen), cell.valid_from(reader.seen) * self.plan.step_ns))
-            if arrived:
-                slot.events[reader.port] = tuple(arrived)
+            if arrived := reader.events(step, self.plan.step_ns):
+                slot.events[reader.port] = tuple(message for _, message in arrived)
             return
+        tag = cell.tag(step, fresh=reader.fresh)
         value = cell.get(tag)
         if reader.linear:
             rate = slot.rates[reader.port] = (value - cell.get(cell.before(tag))) / reader.stride_s
@@ -357,14 +341,3 @@ def _start_value(port: Port) -> Any:
     if codec.vector is None:
         return None
     return codec.vector.neutral.copy() if port.start is None else np.array(port.start, np.float64)
-
-
-def _messages(source: Port, target: Port) -> _Messages | None:
-    if target.variability == "signal":
-        return None
-    if source.variability == "event":
-        return lambda value, _: value
-    codec = PortCodec(source.filled_from(target)).vector
-    if codec is None:
-        return lambda value, _: (value,)
-    return lambda value, time_ns: (codec.to_message(value, time_ns),)

@@ -19,48 +19,65 @@ from time import sleep
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
-from hub.control import Empty, JoinReply, JoinRequest, ask
-from hub.devices import DeviceLoop
+from hub.clock_watch import ClockWatch
+from hub.control import Empty, JoinReply, JoinRequest, ask, present
+from hub.device_host import DeviceHost
+from hub.device_loop import DeviceLoop
 from hub.host import Host
 from hub.interrupt import Interrupt
 from hub.lane import may_spin
 from hub.participant import Device, Stepped
 from hub.plan import Member
+from hub.reach import reach
 from hub.registry import make
-from hub.wire import Drops, Wire, open_session
+from hub.uplink import DeviceUplink, Run
+from hub.wire import Drops, Wire
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.keys import Keys
 from schemas.lockstep import Permission, Report, pack_report, unpack_permission
 from schemas.ros import StringMessage
 
-__all__ = ["main", "run_host"]
+__all__ = ["main", "run_device", "run_host"]
 
 log = logging.getLogger(__name__)
 
 _PRIME_S = 0.01
+_IDLE_S = 0.2
 _PATIENCE_S = 2.0
 """How long a participant may go on computing after the hub is gone, before the process is ended under it."""
 
 
-def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | None = None) -> None:
-    """Join session `session_name` over `endpoint` and run host `host` until the hub ends.
+def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | None = None, certificates: Path | None = None) -> None:
+    """Join session `session_name` (`*`: whatever there is) over `endpoint` and run host `host` until the hub ends.
 
     A participant with `host: remote` is a host of its own, called `remote/<participant>`. Relative paths of the scenario
-    start at `directory`, by default where the hub has them.
+    start at `directory`, by default where the hub has them. `certificates`: as `hub.reach.reach` has it.
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
-    keys = Keys(session_name)
-    with open_session("peer", listen=["tcp/127.0.0.1:0"], connect=[endpoint]) as session:
-        request = JoinRequest(host=host, pid=os.getpid())
-        reply = ask(session, keys.control("join"), request, JoinReply, timeout_s=10.0)
+    request = JoinRequest(host=host, pid=os.getpid())
+    with reach(endpoint, host.removeprefix("remote/"), certificates, mode="peer") as session:
+        reply = present(session, Keys(session_name), request)
+        keys = Keys(reply.session)
         with _ending_with_hub(session, keys):
             joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory))
             try:
                 joined.serve()
             finally:
                 joined.close()
+
+
+def run_device(endpoint: str, session_name: str, name: str, *, directory: Path | None = None, certificates: Path | None = None) -> None:
+    """Join session `session_name` (`*`: whatever there is) over `endpoint` with the device `name`, and whatever comes after it, until Ctrl-C or SIGTERM.
+
+    `directory` and `certificates` are as for `run_host`. Raises ConnectError if there is no such hub to begin with, MessageError if it has no place for
+    the device, and ParticipantError if the device fails.
+    """
+    request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
+    host = DeviceHost(name, lambda: reach(endpoint, name, certificates), Keys(session_name), request, directory)
+    with Interrupt(), contextlib.suppress(KeyboardInterrupt):
+        host.serve()
 
 
 class _JoinedHost:
@@ -75,7 +92,6 @@ class _JoinedHost:
         first = next(iter(mine.values()))
         refused = session.declare_publisher(keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
-        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
         self._wire = Wire(session, keys, reply.run, self._drops, host, spin=may_spin(len(plan.hosts())), watched=reply.watched)
         self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
         self._acks = {
@@ -88,24 +104,32 @@ class _JoinedHost:
             )
             for member in self._host.members
         }
+        if self._acks:
+            self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
         self._next_step = 0
-        self._loops = [
-            DeviceLoop(plan.members[name], plan, device, session, keys, self._drops, failed=self._device_failed)
-            for name, device in made.items()
-            if isinstance(device, Device)
-        ]
+        devices = {name: device for name, device in made.items() if isinstance(device, Device)}
+        self._loops = {name: DeviceLoop(name, device, plan.members[name].read_ns, failed=self._device_failed) for name, device in devices.items()}
+        self._stack = contextlib.ExitStack()
+        if devices:
+            clock, run = self._stack.enter_context(ClockWatch(session, keys)), Run(plan, keys, reply.run, reply.admission)
+            for name, loop in self._loops.items():
+                uplink = DeviceUplink(plan.members[name], run, session, loop, self._drops, clock.offset)
+                self._stack.callback(uplink.close)
+                loop.attach(uplink)
         self._tokens = [session.liveliness().declare_token(keys.alive(member.key_role, name)) for name, member in mine.items()]
 
     def serve(self) -> None:
         """Configure, report ready, prime the links, and step until the hub says that the run is over."""
         try:
             bonds = self._host.configure(self._directory)
-            for loop in self._loops:
+            for loop in self._loops.values():
                 loop.start(self._directory)
         except ParticipantError as error:
-            ask(self._session, self._keys.control("join"), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
+            ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
             raise
-        ask(self._session, self._keys.control("join"), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        while not self._acks:  # devices alone, which live in threads of their own
+            sleep(_IDLE_S)
         grant = self._first_grant()
         while True:
             try:
@@ -153,12 +177,13 @@ class _JoinedHost:
         self._acks[member.name].put(pack_report(report))
 
     def _device_failed(self, name: str, cause: str) -> None:
-        ask(self._session, self._keys.control("join"), self._request.model_copy(update={"failed": f"{name}: {cause}"}), Empty)
+        ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{name}: {cause}"}), Empty)
 
     def close(self) -> None:
         """Close devices, participants and publishers."""
-        for loop in self._loops:
+        for loop in self._loops.values():
             loop.close()
+        self._stack.close()
         self._host.close()
         for token in self._tokens:
             token.undeclare()

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hub.latency import Latencies
 from hub.plan import Plan
-from hub.wire import PortCodec
-from schemas.errors import MessageError, did_you_mean
+from hub.wire import PortCodec, Stamp
+from schemas.errors import LateError, MessageError, did_you_mean
 from schemas.ports import Port
 from schemas.trocar_msgs import InletSample
 
@@ -31,9 +32,23 @@ class _Inlet:
     codec: PortCodec
     simulated: bool = False
     max_age_ns: int = 0
-    queue: deque[tuple[bytes, int]] = field(default_factory=deque[tuple[bytes, int]])
+    queue: deque[tuple[bytes, int, int | None]] = field(default_factory=deque[tuple[bytes, int, int | None]])
+    """Payload, arrival, and the time at which the device had it, by its own clock."""
     arrived_ns: int | None = None
     stale: bool = True
+    newest: tuple[int, int] = (0, 0)
+    """Admission and sequence number."""
+
+    @property
+    def name(self) -> str:
+        """The stream's name in reports."""
+        return f"{self.source}.{self.port}"
+
+    def follow(self, stamp: Stamp) -> None:
+        """Refuse what is not newer than what was here already; raises LateError."""
+        if stamp[:2] <= self.newest:
+            raise LateError(f"sample {stamp.sequence} of '{self.source}.{self.port}' comes late: {self.newest[1]} was here before it")
+        self.newest = stamp[:2]
 
 
 class Inlets:
@@ -42,11 +57,16 @@ class Inlets:
     def __init__(self, plan: Plan) -> None:
         """Make an inlet of every connected device output, and of every input that nothing feeds."""
         self._lock = threading.Lock()
+        self.latencies = Latencies()
+        """From a device to the grant."""
+        self.offsets_ns = {m.name: 0 for m in plan.members.values() if m.follows_clock or (m.role == "device" and m.host == "hub")}
+        """What is added to a device's clock to have that of the hub, as far as it is known."""
         self._inlets: dict[tuple[str, str], _Inlet] = {}
         for inlet in plan.inlets:
             port = plan.members[inlet.target].port(inlet.target_port)
             source = plan.members[inlet.device].port(inlet.device_port)
-            new = _Inlet(inlet.device, inlet.device_port, PortCodec(source.filled_from(port)), simulated=plan.members[inlet.device].follows_clock)
+            device = plan.members[inlet.device]
+            new = _Inlet(inlet.device, inlet.device_port, PortCodec(source.filled_from(port)), simulated=device.follows_clock)
             known = self._inlets.setdefault((inlet.device, inlet.device_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
         fed = {(link.target, link.target_port) for link in plan.links} | {(i.target, i.target_port) for i in plan.inlets}
@@ -66,18 +86,23 @@ class Inlets:
             raise MessageError(f"'{participant}.{port}' cannot be set.{did_you_mean(f'{participant}.{port}', ('.'.join(k) for k in self._settable))}")
         return found
 
-    def offer(self, participant: str, port: str, payload: bytes, now_ns: int) -> None:
-        """Take a sample that arrived at `now_ns` of the port's clock; raises MessageError if it is none of this port."""
+    def offer(self, participant: str, port: str, payload: bytes, now_ns: int, stamp: Stamp | None = None) -> None:
+        """Take a sample that arrived at `now_ns` of the port's clock; what is set by hand has no stamp.
+
+        Raises MessageError if it is none of this port, and LateError if a newer one was here before it.
+        """
         inlet = self._inlets.get((participant, port))
         if inlet is None:
             raise MessageError(f"no connection takes '{participant}.{port}'")
         inlet.codec.accept(payload)
         with self._lock:
+            if stamp is not None:
+                inlet.follow(stamp)
             if not inlet.codec.is_event:
                 inlet.queue.clear()
             elif len(inlet.queue) >= _MOST_QUEUED:
                 raise MessageError(f"'{participant}.{port}' has {_MOST_QUEUED} samples waiting; this one is refused")
-            inlet.queue.append((payload, now_ns))
+            inlet.queue.append((payload, now_ns, None if stamp is None else stamp.sent_ns))
             inlet.arrived_ns = now_ns
 
     def sample(self, time_ns: int, wall_ns: int) -> list[InletSample]:
@@ -92,8 +117,10 @@ class Inlets:
                 stale = inlet.stale
                 if inlet.arrived_ns is not None:
                     stale = bool(inlet.max_age_ns) and now_ns - inlet.arrived_ns > inlet.max_age_ns
-                for payload, arrived_ns in inlet.queue:
+                for payload, arrived_ns, sent_ns in inlet.queue:
                     entering.append(_sample(inlet, payload, stale=stale, age_ns=now_ns - arrived_ns))
+                    if sent_ns is not None and inlet.source in self.offsets_ns:
+                        self.latencies.add("device to grant", inlet.name, now_ns - sent_ns - self.offsets_ns[inlet.source])
                 if stale != inlet.stale and not inlet.queue:
                     entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
                 inlet.queue.clear()

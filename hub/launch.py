@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import distributions
 from pathlib import Path
 
 from hub import registry
+from hub.access import access_settings
+from hub.credentials import HUB, examine, load
 from hub.files import file_hashes
+from hub.gate import Gate
 from hub.participant import Device, Params, Stepped
-from hub.plan import Plan, make_plan
+from hub.plan import Plan
 from hub.scenario_file import ScenarioFile
 from hub.session import Session
+from hub.wiring import make_plan
 from schemas.scenario import Scenario
 
 __all__ = ["in_one_host", "launch", "plan_of"]
@@ -32,14 +36,33 @@ def in_one_host(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"participants": participants})
 
 
-def launch(loaded: ScenarioFile, *, endpoint: str | None = None, record: Path | None = None, one_host: bool = False) -> Session:
-    """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process."""
+def launch(
+    loaded: ScenarioFile,
+    *,
+    endpoint: str | None = None,
+    outside: Sequence[str] = (),
+    certificates: Path | None = None,
+    record: Path | None = None,
+    one_host: bool = False,
+) -> Session:
+    """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
+
+    `outside`: where other machines may join by TLS, with the hub's certificate; that is looked for in `certificates`, by default in this user's directory.
+    """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
     plan, participants = plan_of(scenario, loaded.params)
     here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
     directory = loaded.source.directory
     attachments = {} if record is None else _attachments(scenario, plan, loaded)
-    return Session(scenario, plan, here, directory, endpoint=endpoint, record=record, attachments=attachments)
+    gate = _gate(outside, certificates, plan, scenario.name) if outside else None
+    return Session(scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments)
+
+
+def _gate(endpoints: Sequence[str], certificates: Path | None, plan: Plan, session: str) -> Gate:
+    """Return a gate for the remote participants of `plan`; raises ConnectError if the hub has no valid certificate."""
+    credentials = load(HUB, certificates)
+    examine(credentials)
+    return Gate(endpoints, credentials.listening() | access_settings(plan, session))
 
 
 def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 import numpy as np
 
-from hub.plan import Plan, measured_port
+from hub.plan import Plan
+from hub.wiring import measured_port
 from schemas.scenario import Measure, Scenario
 from schemas.vectors import Vector
 
@@ -22,16 +24,26 @@ class _Meter:
         self.now = 0.0
         self._kind = measure.kind
         self._part = part
+        self._after = measure.after
         self._peak: float | None = None
+        self._least = inf
+        size = part.stop - part.start
+        self._low: Vector = np.full(size, inf)
+        self._high: Vector = np.full(size, -inf)
         self._drop = 0.0
         self._level, self._period = measure.level, period
         self._above = self._longest = 0
         self._sum = 0.0
         self._count = 0
 
-    def take(self, value: Vector) -> None:
+    def take(self, value: Vector, time_ns: int) -> None:
         part = value[self._part]
         self.now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
+        if time_ns < self._after:
+            return
+        self._least = min(self._least, self.now)
+        if self._kind == "swing":
+            self._low, self._high = np.minimum(self._low, part), np.maximum(self._high, part)
         if self._peak is None or self.now > self._peak:
             self._peak, self._drop = self.now, 0.0
         self._drop = max(self._drop, self._peak - self.now)
@@ -45,8 +57,8 @@ class _Meter:
     def result(self) -> float | None:
         if not self._count:
             return None
-        results = {"peak-norm": self._peak, "peak": self._peak, "mean": self._sum / self._count, "final": self.now}
-        return (results | {"drop": self._drop, "time-above": self._longest * self._period})[self._kind]
+        results = {"peak-norm": self._peak, "peak": self._peak, "least": self._least, "mean": self._sum / self._count, "final": self.now}
+        return (results | {"drop": self._drop, "swing": float(np.max(self._high - self._low)), "time-above": self._longest * self._period})[self._kind]
 
 
 class Measures:
@@ -57,8 +69,9 @@ class Measures:
         self.by_port: dict[tuple[str, str], list[_Meter]] = {}
         self._lock = threading.Lock()
         for name, measure in scenario.measure.items():
-            port, part = measured_port(plan.members[measure.of.participant], measure.of.port)
-            period = 1e-9 * plan.step_ns * plan.stride(measure.of.participant, port.name)
+            member = plan.members[measure.of.participant]
+            port, part = measured_port(member, measure.of.port)
+            period = 1e-9 * (member.read_ns or plan.step_ns * plan.stride(member.name, port.name))
             meter = self._meters[name] = _Meter(measure, part, period)
             self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
 
@@ -67,11 +80,11 @@ class Measures:
         """The (participant, port) pairs that are measured."""
         return list(self.by_port)
 
-    def take(self, participant: str, port: str, value: Any) -> None:
-        """Take a value of an output port."""
+    def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
+        """Take the value of an output port at a time."""
         for meter in self.by_port.get((participant, port), ()):
             with self._lock:
-                meter.take(value)
+                meter.take(value, time_ns)
 
     def live(self) -> Mapping[str, tuple[float, str]]:
         """Return the present value and unit of each measure that the progress line shows."""

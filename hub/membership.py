@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hub.control import Empty, JoinReply, JoinRequest
 from hub.plan import Plan
+from hub.wire import LEASE_MS
 from schemas.errors import MessageError, ParticipantError
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
@@ -52,6 +53,7 @@ class Membership:
         self._run = run
         self._failed = failed
         self._hosts: dict[str, JoinRequest] = {}
+        self._admissions = 0
         self._changed = threading.Condition()
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
@@ -63,8 +65,10 @@ class Membership:
         with self._changed:
             known = self._hosts.get(request.host)
             if known is not None and known.pid != request.pid:
-                raise MessageError(f"host '{request.host}' is here already, as process {known.pid}")
+                lease_s = LEASE_MS / 1e3
+                raise MessageError(f"host '{request.host}' is here already, as process {known.pid}: end that one, or wait {lease_s:g} s if it is cut off")
             self._hosts[request.host] = request
+            self._admissions += 1
             self._changed.notify_all()
         if request.failed:
             participant, _, cause = request.failed.partition(": ")
@@ -72,7 +76,16 @@ class Membership:
         if request.ready or request.failed:
             return Empty()
         params = {name: self._scenario.participants[name].params for name in names}
-        return JoinReply(run=self._run, plan=self._plan, params=params, directory=str(self._directory), watched=self._watched)
+        far = request.host.startswith("remote/")
+        return JoinReply(
+            session=self._scenario.name,
+            run=self._run,
+            admission=self._admissions,
+            plan=self._plan.seen_from(request.host) if far else self._plan,
+            params=params,
+            directory=str(self._directory),
+            watched=[output for output in self._watched if output[0] in names],
+        )
 
     def lose(self, host: str) -> None:
         """Forget a host, so that it may join again."""

@@ -89,7 +89,7 @@ class Observers:
     def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
         """Take an output value of a participant in this process, or one that came here by a lane."""
         if (member.name, port.name) in self.measures.by_port and step > INITIAL:
-            self.measures.take(member.name, port.name, value)
+            self.measures.take(member.name, port.name, value, time_ns)
         if self._recorder is not None:
             watched = self._watched[self._keys.output(member.key_role, member.name, port.name)]
             for item in value if watched.codec.is_event else (value,):
@@ -114,9 +114,24 @@ class Observers:
             return
         watched.newest = (tag.step, tag.index)
         if tag.step > INITIAL and not watched.codec.is_event:
-            self.measures.take(watched.member.name, watched.port.name, value)
+            self.measures.take(watched.member.name, watched.port.name, value, tag.time_ns)
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
+
+    def watches(self, device: str, port: str) -> bool:
+        """Say whether anybody wants to see what a device says on a port, whether or not it enters the simulation."""
+        return self._recorder is not None or (device, port) in self.measures.by_port
+
+    def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
+        """Take what a device said; what enters the simulation is recorded with its grant. Raises MessageError if it is none of the port."""
+        watched = self._watched[self._keys.output("device", device, port)]
+        measured = (device, port) in self.measures.by_port
+        if measured or not enters:
+            value = watched.codec.accept(payload)
+            if measured:
+                self.measures.take(device, port, value, time_ns)
+        if self._recorder is not None and not enters:
+            self._recorder.write(watched.channel, time_ns, payload)
 
     def grant(self, grant: Permission, payload: bytes) -> None:
         """Take a grant and the device samples in it."""

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from time import monotonic, monotonic_ns, sleep
 
 import zenoh
-from zenoh.handlers import Callback, FifoChannel
+from zenoh.handlers import Callback
 
 from hub.account import Account
+from hub.acks import Acks
+from hub.bond_check import check_bonds
 from hub.clock import Clock
 from hub.control import ControlServer, RunState
-from hub.coupling import stable_step_problem
-from hub.devices import DeviceLoop, ScriptedDevices
 from hub.endpoint import free_endpoint, require_loopback
 from hub.fleet import Fleet, Watchdog
+from hub.gate import Gate
 from hub.host import Host
 from hub.inlets import Inlets
+from hub.intake import Intake
 from hub.interrupt import Interrupt
 from hub.lane import may_spin
 from hub.measures import Measures
@@ -33,10 +34,9 @@ from hub.recorder import Recorder
 from hub.summary import Progress, Summary
 from hub.wire import Drops, Wire, open_session
 from schemas.codec import decode, encode
-from schemas.errors import MessageError, ParticipantError, ScenarioError, SessionError
+from schemas.errors import MessageError, ScenarioError, SessionError
 from schemas.keys import Keys
-from schemas.lockstep import Permission, Report, pack_permission, unpack_report
-from schemas.ports import BondSide
+from schemas.lockstep import Permission, Report, pack_permission
 from schemas.ros import StringMessage
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Grant
@@ -47,7 +47,6 @@ log = logging.getLogger(__name__)
 
 _PROGRESS_S = 0.1
 _STATUS_S = 0.5
-_NO_STEPS: Mapping[str, int] = {}
 
 
 class Session:
@@ -61,6 +60,7 @@ class Session:
         directory: Path,
         *,
         endpoint: str | None = None,
+        gate: Gate | None = None,
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
         grants: Iterator[Grant] | None = None,
@@ -68,13 +68,14 @@ class Session:
     ) -> None:
         """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this process.
 
-        `directory`: where relative paths of the scenario start. `grants`: re-simulate these instead of listening to devices.
+        `directory`: where relative paths of the scenario start. `gate`: lets other machines in. `grants`: re-simulate these instead of listening to devices.
         `on_report` sees what every participant reports of every grant.
         """
         self.scenario = scenario
         self.plan = plan
         self.endpoint = require_loopback(endpoint) if endpoint else free_endpoint()
         self.state = RunState()
+        self._gate = gate
         self._participants = participants
         self._directory = directory
         self._record = record
@@ -85,8 +86,9 @@ class Session:
         self._keys = Keys(scenario.name)
         steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
         self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
-        self._inlets = Inlets(plan)
         self._drops = Drops()
+        self._inlets = Inlets(plan)
+        self._intake = Intake(plan, self._keys, self._run_id, self._drops, self._inlets)
         self._away = {name for name in plan.order if plan.members[name].host != "hub"}
         self._common_period = math.lcm(*(plan.members[name].period for name in plan.order))
         self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
@@ -107,9 +109,11 @@ class Session:
         try:
             with self._interrupt, open_session("router", listen=[self.endpoint]) as session:
                 self._observers = Observers(self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder)
-                self._account = Account(self.scenario, self.plan, self._run_id, self._clock, self._drops, self._observers)
+                self._account = Account(self.scenario, self.plan, self._run_id, self._clock, self._drops, self._observers, self._intake)
                 self._open(session)
                 try:
+                    if self._gate is not None:
+                        self._gate.open(self.endpoint)
                     self._start_and_step(progress)
                     self._account.phase = "done"
                 except SessionError as error:
@@ -139,29 +143,25 @@ class Session:
     def _open(self, session: zenoh.Session) -> None:
         """Declare everything on `session`, and lay out what runs in this process."""
         keys = self._keys
-        self._by_ack = {keys.ack(name): self.plan.members[name] for name in self.plan.order}
-        self._acks = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
-        self._failures = Failures(wake=lambda: self._wake(session))
+        self._acks = Acks(session, keys, self.plan, self._run_id, self._drops)
+        self._failures = Failures(wake=self._wake)
         self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, list(self._observers.away.values()), self._fail)
         block, real_time, cdr = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME, zenoh.Encoding.APPLICATION_CDR
         self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
         self._status_publisher = session.declare_publisher(keys.status, encoding=cdr)
         self._energy_publishers = {b.bond.name: session.declare_publisher(keys.energy(b.bond.name), encoding=cdr) for b in self.plan.bonds}
+        self._lay_local(session)
         watch = Callback(self._observers.sample, indirect=False)
         self._entities: list[zenoh.Subscriber[None] | zenoh.Queryable[None] | ControlServer] = [
             session.declare_queryable(keys.status, Callback(self._answer_status)),
-            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._lost)),
-            ControlServer(session, keys, self.state, self._inlets, self._membership, self._drops),
+            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._came_or_went)),
+            ControlServer(session, keys, self.state, self._inlets, self._intake.relink, self._membership, self._drops),
             session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
             *(session.declare_subscriber(key, watch) for key in self._observers.away),
         ]
-        if self._grants is None:
-            sources = sorted({(inlet.device, inlet.device_port) for inlet in self.plan.inlets if not self.plan.members[inlet.device].follows_clock})
-            self._entities += [session.declare_subscriber(keys.output("device", *source), self._inlet_callback(*source)) for source in sources]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         self._fleet = Fleet()
         self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail)
-        self._lay_local(session)
 
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
@@ -169,13 +169,7 @@ class Session:
         wire = Wire(session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts())))
         self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
-        scripted = {n: device for n, device in devices.items() if self.plan.members[n].follows_clock}
-        self._scripted = ScriptedDevices(scripted)
-        self._loops = [
-            DeviceLoop(self.plan.members[n], self.plan, device, session, self._keys, self._drops, failed=self._fail)
-            for n, device in devices.items()
-            if n not in scripted
-        ]
+        self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
 
     def _start(self) -> None:
         """Start the hosts, wait until all participants are configured and every link has carried a value."""
@@ -184,11 +178,9 @@ class Session:
             if not host.startswith("remote/"):
                 self._fleet.start(host, self.endpoint, self.scenario.name)
         bonds = self._host.configure(self._directory)
-        self._scripted.open(self._directory)
-        for loop in self._loops:
-            loop.start(self._directory)
+        self._intake.open(self._directory)
         self._await_hosts(hosts)
-        self._check_steps({**bonds, **self._membership.bonds()})
+        check_bonds(self.plan, {**bonds, **self._membership.bonds()})
         self._await_links()
 
     def _is_needed(self, host: str) -> bool:
@@ -197,6 +189,7 @@ class Session:
 
     def _await_hosts(self, hosts: list[str]) -> None:
         limit_s = self.scenario.join_limit / 1e9
+        doors = ", ".join((self.endpoint, *(self._gate.endpoints if self._gate is not None else ())))
         deadline = monotonic() + limit_s
         told: list[str] = []
         while missing := self._membership.missing(hosts):
@@ -204,21 +197,10 @@ class Session:
             if self.state.ending:
                 raise SessionError(f"shut down while waiting for {', '.join(missing)} to join")
             if missing != told:
-                log.info("waiting for %s to join at %s", ", ".join(missing), self.endpoint)
+                log.info("waiting for %s to join at %s", ", ".join(missing), doors)
             told = missing
             if monotonic() > deadline:
-                raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {self.endpoint}")
-
-    def _check_steps(self, bonds: Mapping[str, Sequence[BondSide]]) -> None:
-        for index, planned in enumerate(self.plan.bonds):
-            bond = planned.bond
-            motion, force = (next(s for s in bonds[end.participant] if s.name == end.port) for end in (bond.motion, bond.force))
-            step_s = self.plan.members[bond.force.participant].period * self.plan.step_ns / 1e9
-            problem = stable_step_problem(bond, motion, force, step_s)
-            if problem and bond.check == "refuse":
-                raise ScenarioError(f"{problem} To run all the same, set 'check: warn' on the bond.", path=("bonds", index))
-            if problem:
-                log.warning("bond %s: %s", bond.name, problem)
+                raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {doors}")
 
     def _await_links(self) -> None:
         waiting = [name for name in self.plan.order if name in self._away]
@@ -226,11 +208,11 @@ class Session:
         while waiting or not self._host.linked() or not self._observers.linked():
             self._host.publish_initial()
             self._check()
-            sample = self._acks.try_recv()
-            if sample is None:
+            ready = self._acks.ready(waiting)
+            if ready is None:
                 sleep(0.005)
-            elif (accepted := self._accept(sample, waiting)) is not None:
-                waiting.remove(accepted[0].name)
+            else:
+                waiting.remove(ready)
         self._watchdog.wait_for(())
 
     def _loop(self, progress: Callable[[Progress], None] | None) -> None:
@@ -277,15 +259,15 @@ class Session:
                 return None
             return Permission(self._run_id, recorded.epoch, recorded.step, recorded.start_ns, recorded.horizon_ns, recorded.inlets)
         step, time_ns = self._clock.step, self._clock.time_ns
-        self._scripted.read(time_ns, step, self._inlets)
         horizon_ns = time_ns + self._clock.horizon(budget) * self.plan.step_ns
-        return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._inlets.sample(time_ns, monotonic_ns()))
+        return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._intake.enter(time_ns, step))
 
     def _step(self, grant: Permission) -> None:
         """Publish a grant, take part in it, and wait until everybody else has.
 
         The reports of the grant before are booked while the others are at work on this one.
         """
+        granted_ns = monotonic_ns()
         if self._away:
             self._grant_publisher.put(pack_permission(grant))
         self._settle()
@@ -297,11 +279,16 @@ class Session:
         self._host.run(grant, lambda member, report: self._reports.append((member, report, None)))
         self._watchdog.wait_for(waiting)
         while waiting:
-            accepted = self._accept(self._acks.recv(), waiting, grant, steps)
-            if accepted is not None:
+            accepted = self._acks.receive(waiting, grant, steps)
+            if accepted is None:
+                self._check()
+            else:
                 waiting.remove(accepted[0].name)
                 self._reports.append(accepted)
         self._watchdog.wait_for(())
+        self._account.acknowledged(granted_ns)
+        if self._clock.realtime:
+            self._settle()  # now rather than when the next sample of a device waits
         count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
         self._clock.advance(count)
         self.state.spend(count)
@@ -315,32 +302,6 @@ class Session:
             steps = {name: (end - 1) // period - (begin - 1) // period for name, period in periods.items()}
             self._schedules[key] = [name for name in self.plan.order if steps[name]], steps
         return self._schedules[key]
-
-    def _accept(
-        self, sample: zenoh.Sample, waiting: Sequence[str], grant: Permission | None = None, steps: Mapping[str, int] = _NO_STEPS
-    ) -> tuple[Member, Report, bytes] | None:
-        """Return a valid report on this grant, in which participants take `steps` (None: on being ready).
-
-        Raises what it reports as a failure; drops and counts anything else.
-        """
-        try:
-            member = self._by_ack.get(str(sample.key_expr))
-            if member is None:
-                self._check()
-                raise MessageError("belongs to no participant of this run")
-            payload = sample.payload.to_bytes()
-            count = steps.get(member.name, 0)
-            report = unpack_report(payload, count, count * len(member.bonds))
-            if report.run != self._run_id:
-                raise MessageError(f"belongs to run {report.run:x}, this is run {self._run_id:x}")
-            if report.error:
-                raise ParticipantError(member.name, report.step, report.error)
-            if member.name not in waiting or report.step != (-1 if grant is None else grant.step):
-                raise MessageError(f"reports on step {report.step}, for which nobody waits")
-        except MessageError as error:
-            self._drops.count(sample, error)
-            return None
-        return member, report, payload
 
     def _settle(self) -> None:
         """Book the reports that have come in, and publish the energy books when they are due."""
@@ -364,9 +325,9 @@ class Session:
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()
-        for loop in self._loops:
-            loop.close()
-        self._scripted.close()
+        if self._gate is not None:
+            self._gate.close()
+        self._intake.close()
         self._host.close()
         self._fleet.end()
         for entity in self._entities:
@@ -379,43 +340,36 @@ class Session:
         here = self.plan.members[participant].host == "hub"  # of another host only the grant is known
         self._failures.report(participant, max(self._clock.step, self._host.step) if here else self._clock.step, cause)
 
-    def _wake(self, session: zenoh.Session) -> None:
+    def _wake(self) -> None:
         """Make the step loop look at the failures: it may wait for acks, or be inside a participant of this process."""
-        session.put(self._keys.ack("hub"), b"")
+        self._acks.wake()
         self._interrupt()
 
     def _check(self) -> None:
         """Raise the first failure, if there is one: in the words of a participant, if they are here already."""
         if self._failures.first is None:
             return
-        while (sample := self._acks.try_recv()) is not None:
-            member = self._by_ack.get(str(sample.key_expr))
-            with contextlib.suppress(MessageError):
-                report = unpack_report(sample.payload.to_bytes(), 0, 0)
-                if member is not None and report.run == self._run_id and report.error:
-                    raise ParticipantError(member.name, report.step, report.error)
+        self._acks.raise_failure()
         self._failures.check()
 
-    def _lost(self, sample: zenoh.Sample) -> None:
+    def _came_or_went(self, sample: zenoh.Sample) -> None:
         """Take note that a liveliness token came or went. A lost engine ends the run; a lost device makes its arm hold."""
         name = str(sample.key_expr).rsplit("/", 1)[1]
         member = self.plan.members.get(name)
-        if sample.kind != zenoh.SampleKind.DELETE or member is None or not member.host.startswith("remote/"):
+        if member is None or not member.host.startswith("remote/"):
+            return
+        if sample.kind != zenoh.SampleKind.DELETE:
+            if member.role == "device":
+                self._intake.relink.repeat(name)
             return
         self._membership.lose(member.host)
         if member.role == "device":
-            log.warning("device '%s' is gone; it may join again", name)
+            self._intake.forget(name)
+            log.warning(
+                "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the network; a host that still runs joins again", name, name
+            )
         elif self._account.phase in ("starting", "running", "paused"):
             self._fail(name, "its host is gone")
-
-    def _inlet_callback(self, device: str, port: str) -> Callback[zenoh.Sample]:
-        def take(sample: zenoh.Sample) -> None:
-            try:
-                self._inlets.offer(device, port, sample.payload.to_bytes(), monotonic_ns())
-            except MessageError as error:
-                self._drops.count(sample, error)
-
-        return Callback(take, indirect=False)
 
     def _refused_elsewhere(self, sample: zenoh.Sample) -> None:
         """Count what another host had to drop; it has logged why."""

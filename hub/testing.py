@@ -19,10 +19,10 @@ from hub.endpoint import free_endpoint
 from hub.inputs import Inputs
 from hub.launch import in_one_host
 from hub.participant import BondPlan, Device, Outputs, Sample, Setup, Stepped, Value
-from hub.plan import make_plan
 from hub.session import Session
 from hub.summary import Summary
 from hub.wire import PortCodec
+from hub.wiring import make_plan
 from schemas.codec import encode
 from schemas.errors import MessageError, StateError, TrocarError
 from schemas.message import Message
@@ -297,26 +297,43 @@ def _check_step_length(one: _Rig, other: _Rig) -> None:
 def check_device(make: Callable[[], Device], *, inputs: Mapping[str, Value] | None = None, directory: Path | None = None) -> None:
     """Check that what `make` returns keeps the contract of a device.
 
-    A device of the wall clock is read for a fifth of a second. `inputs` are values to write to its input ports; the start
-    or neutral value where none is given. Raises AssertionError: the message says what the contract asks for.
+    A device of the wall clock is read for a fifth of a second, one that follows the clock for as much simulated time. `inputs` are values to write
+    to its input ports, before each read; the start or neutral value where none is given. Raises AssertionError: the message says what the contract
+    asks for.
     """
     with make() as device:
         _check_declarations(device)
+        wall = _in_wall_time(device.ports)
         device.close()  # before `open`
+    said = _said(make, inputs or {}, directory or Path.cwd())
+    if not wall:
+        again = _said(make, inputs or {}, directory or Path.cwd())
+        _require(said == again, "a device that follows the clock says the same when it is told the same, but two instances differ")
+
+
+def _said(make: Callable[[], Device], inputs: Mapping[str, Value], directory: Path) -> list[tuple[str, bytes]]:
+    """Return all that a device says, as port and bytes, after a look at each sample."""
     with make() as device:
         declared = device.ports
         codecs = {port.name: PortCodec(port) for port in declared}
-        device.open(directory or Path.cwd())
+        device.open(directory)
         _require(declared == device.ports, "open() does not change the ports")
-        for port in declared:
-            if port.causality == "input":
-                _write(device, codecs[port.name], inputs or {})
         stamps: dict[str, int] = {}
+        said: list[tuple[str, bytes]] = []
         for time_ns in _read_times(declared):
+            for port in declared:
+                if port.causality == "input":
+                    _write(device, codecs[port.name], inputs)
             for sample in device.read(time_ns):
                 _check_sample(sample, codecs, stamps)
+                said.append((sample.port, encode(sample.message)))
         device.close()
         device.close()  # and a third time at the end of `with`
+    return said
+
+
+def _in_wall_time(ports: tuple[Port, ...]) -> bool:
+    return any(port.clock == "wall" for port in ports)
 
 
 def _write(device: Device, codec: PortCodec, inputs: Mapping[str, Value]) -> None:
@@ -330,7 +347,7 @@ def _write(device: Device, codec: PortCodec, inputs: Mapping[str, Value]) -> Non
 
 
 def _read_times(ports: tuple[Port, ...]) -> Iterator[int]:
-    wall = any(port.clock == "wall" for port in ports)
+    wall = _in_wall_time(ports)
     start_ns = monotonic_ns()
     for i in range(_READS):
         if wall:

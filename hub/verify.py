@@ -96,10 +96,11 @@ class _Comparison:
 
 
 def _plan(recording: Recording) -> Plan:
-    """Return the recorded wiring; a participant that joined from elsewhere gets a process here."""
+    """Return the recorded wiring; a participant that joined from elsewhere gets a process here, and devices are left alone."""
     plan = Plan.model_validate_json(_attachment(recording, "plan.json"))
     members = {name: member.model_copy(update={"host": member.host.replace("/", "_")}) for name, member in plan.members.items()}
-    return plan.model_copy(update={"members": members})
+    links = tuple(link for link in plan.links if plan.members[link.target].role != "device")
+    return plan.model_copy(update={"members": members, "links": links, "outlets": ()})
 
 
 def _directory(recording: Recording) -> Path:

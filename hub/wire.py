@@ -6,8 +6,9 @@ import json
 import logging
 import struct
 import threading
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from time import monotonic_ns
+from typing import Any, NamedTuple
 
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
@@ -23,18 +24,21 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import VectorCodec, has_vector
 
-__all__ = ["Drops", "PortCodec", "PortPublisher", "PortReceiver", "Tag", "Wire", "open_session"]
+__all__ = ["Drops", "PortCodec", "PortPublisher", "PortReceiver", "Stamp", "Tag", "Wire", "open_session"]
 
 log = logging.getLogger(__name__)
 
 LEASE_MS = 10_000
 """A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
 
-_TAG = struct.Struct("<QIqqHH")
+_TAG = struct.Struct("<QIqqHHq")
+_STAMP = struct.Struct("<QQq")
 
 
-def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> zenoh.Session:
+def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = (), security: Mapping[str, Any] | None = None) -> zenoh.Session:
     """Open a Zenoh session that scouts for nobody: it listens and connects where it is told to.
+
+    `security`: Zenoh's settings of TLS and of access, as `hub.credentials` and `hub.access` make them.
 
     Raises ConnectError if an endpoint cannot be opened or reached.
     """
@@ -48,6 +52,7 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
         "connect/exit_on_failure": True,
         "transport/link/tx/lease": LEASE_MS,
         "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
+        **(security or {}),
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
@@ -59,17 +64,21 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
 
 
 class Tag:
-    """The attachment of every value: run, epoch, step in which it was computed, time it is valid at, index and count of an event batch."""
+    """The attachment of every value.
 
-    __slots__ = ("count", "epoch", "index", "run", "step", "time_ns")
+    Run, epoch, step in which it was computed, time it is valid at, index and count of an event batch, and when it was published (by the
+    monotonic clock of its host).
+    """
 
-    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int) -> None:
-        self.run, self.epoch, self.step, self.time_ns, self.index, self.count = run, epoch, step, time_ns, index, count
+    __slots__ = ("count", "epoch", "index", "run", "sent_ns", "step", "time_ns")
+
+    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int, sent_ns: int) -> None:
+        self.run, self.epoch, self.step, self.time_ns, self.index, self.count, self.sent_ns = run, epoch, step, time_ns, index, count, sent_ns
 
     @staticmethod
     def pack(run: int, epoch: int, step: int, time_ns: int, index: int = 0, count: int = 1) -> bytes:
-        """Return the bytes of a tag."""
-        return _TAG.pack(run, epoch, step, time_ns, index, count)
+        """Return the bytes of a tag of a value that is published now."""
+        return _TAG.pack(run, epoch, step, time_ns, index, count, monotonic_ns())
 
     @classmethod
     def of(cls, sample: zenoh.Sample) -> Tag:
@@ -78,6 +87,29 @@ class Tag:
         if len(raw) != _TAG.size:
             raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {_TAG.size}")
         return cls(*_TAG.unpack(raw))
+
+
+class Stamp(NamedTuple):
+    """The attachment of every sample of a device."""
+
+    admission: int
+    """The hub counts the hosts that it lets join; a device that joined anew begins to count its samples anew."""
+    sequence: int
+    """Counts the samples of one port."""
+    sent_ns: int
+    """When the device had it, by the clock of the device: the monotonic clock of its host, or simulated time."""
+
+    def pack(self) -> bytes:
+        """Return the bytes of a stamp."""
+        return _STAMP.pack(*self)
+
+    @classmethod
+    def of(cls, sample: zenoh.Sample) -> Stamp:
+        """Return the stamp of `sample`; raises MessageError if it has none."""
+        raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(raw) != _STAMP.size:
+            raise MessageError(f"attachment of {len(raw)} bytes, a device's sample has {_STAMP.size}")
+        return cls(*_STAMP.unpack(raw))
 
 
 class Drops:
@@ -136,6 +168,8 @@ class PortCodec:
 
     def accept(self, payload: bytes) -> Any:
         """Return the vector or message in `payload` written by anybody (joints in any order, frame left out); raises MessageError."""
+        if self.vector is not None and self.vector.fits(payload):
+            return self.vector.decode(payload)
         message = decode(self._model, payload)
         return self.vector.from_message(message) if self.vector is not None else message
 
@@ -203,29 +237,52 @@ class PortReceiver:
         self._subscriber.undeclare()
 
 
-class PortPublisher:
-    """Publishes the values of one output port; without a reader it costs one flag test."""
+class _Outgoing:
+    """A publisher that knows whether anybody listens, and tells when that changes."""
 
-    def __init__(
-        self, session: zenoh.Session, keys: Keys, key_role: str, participant: str, port: Port, run: int, *, always: bool, lanes: Sequence[LaneSender] = ()
-    ) -> None:
-        self.codec = PortCodec(port)
-        self._lanes = lanes
-        self._run = run
+    def __init__(self, session: zenoh.Session, key: str, choked: zenoh.CongestionControl, changed: Callable[[], None], *, always: bool) -> None:
         self._publisher = session.declare_publisher(
-            keys.output(key_role, participant, port.name),
-            encoding=zenoh.Encoding.APPLICATION_CDR,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.REAL_TIME,
-            express=True,
+            key, encoding=zenoh.Encoding.APPLICATION_CDR, congestion_control=choked, priority=zenoh.Priority.REAL_TIME, express=True
         )
-        self._wanted = always
+        self.wanted = always
+        self._changed = changed
         if not always:
             self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
             self._match(self._publisher.matching_status)
 
     def _match(self, status: Any) -> None:
-        self._wanted = bool(status.matching)
+        self.wanted = bool(status.matching)
+        self._changed()
+
+    def put(self, payload: bytes, tag: bytes) -> None:
+        self._publisher.put(payload, attachment=tag)
+
+    def close(self) -> None:
+        self._publisher.undeclare()
+
+
+class PortPublisher:
+    """Publishes the values of one output port; without a reader it costs a flag test.
+
+    Devices of the wall clock hear it under a key of their own, where a signal is dropped if the way to one of them is choked.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, keys: Keys, member: Member, port: Port, run: int, *, always: bool, feeds: bool, lanes: Sequence[LaneSender] = ()
+    ) -> None:
+        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock is connected."""
+        self.codec = PortCodec(port)
+        self._lanes = lanes
+        self._run = run
+        block, drop = zenoh.CongestionControl.BLOCK, zenoh.CongestionControl.DROP
+        self._ways: list[_Outgoing] = []
+        self._ways.append(_Outgoing(session, keys.output(member.key_role, member.name, port.name), block, self._look, always=always))
+        if feeds:
+            self._ways.append(_Outgoing(session, keys.feed(member.name, port.name), block if self.codec.is_event else drop, self._look, always=False))
+        self._look()
+
+    def _look(self) -> None:
+        self._wanted = [way for way in self._ways if way.wanted]
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
@@ -234,18 +291,23 @@ class PortPublisher:
         if not self._wanted:
             return
         if not self.codec.is_event:
-            self._publisher.put(self.codec.encode(value, time_ns), attachment=Tag.pack(self._run, 0, step, time_ns))
+            self._send(self.codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns))
             return
         if not value:
-            self._publisher.put(b"", attachment=Tag.pack(self._run, 0, step, time_ns, 0, 0))
+            self._send(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
-            self._publisher.put(encode(message), attachment=Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+            self._send(encode(message), Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+
+    def _send(self, payload: bytes, tag: bytes) -> None:
+        for way in self._wanted:
+            way.put(payload, tag)
 
     def close(self) -> None:
         """Stop publishing."""
         for lane in self._lanes:
             lane.close()
-        self._publisher.undeclare()
+        for way in self._ways:
+            way.close()
 
 
 class Wire:
@@ -267,12 +329,12 @@ class Wire:
         self._receivers: list[PortReceiver | LaneReceiver] = []
         self._cells: list[RemoteCell] = []
 
-    def publisher(self, member: Member, port: Port, readers: Sequence[str]) -> PortPublisher:
-        """Return a publisher of an output of a participant here; the hosts `readers` need every value."""
+    def publisher(self, member: Member, port: Port, readers: Sequence[str], *, feeds: bool) -> PortPublisher:
+        """Return a publisher of an output of a participant here; the hosts `readers` need every value, `feeds`: devices of the wall clock the newest."""
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
         always = len(fast) < len(readers) or (member.name, port.name) in self._watched
-        publisher = PortPublisher(self.session, self.keys, member.key_role, member.name, port, self.run, always=always, lanes=lanes)
+        publisher = PortPublisher(self.session, self.keys, member, port, self.run, always=always, feeds=feeds, lanes=lanes)
         self._publishers.append(publisher)
         return publisher
 

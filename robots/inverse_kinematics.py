@@ -13,19 +13,25 @@ from robots import rotation
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["approach"]
+__all__ = ["pursue"]
 
 _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the RCM makes of it."""
+_LITTLE = 1e-4
+"""The same for an arm of fewer than six joints, which cannot have both: position first. What orientation then costs of it is some nanometres."""
 _LEAST_DAMPING = 1e-12
 """Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still moves the tip by a micrometre."""
+_MET = 1e-15
+"""m; length of the weighted error at which a goal is met: some ten times the rounding error of the forward kinematics."""
+_CORRECTIONS = 4
+"""At most, per call; each squares the error, so that two do at the usual speeds."""
 
 
-def approach(chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector) -> Vector:
-    """Return joint positions, shape (n,), nearer to the goal than `q`, inside the joint ranges and at most `largest_move` away.
+def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector) -> Vector:
+    """Return joint positions, shape (n,), that meet the goal, or come nearer to it than `q` inside the joint ranges and `largest_move`.
 
-    One correction: near the goal it squares the error, so calling it at every step of a control loop follows a moving
-    goal (20 um a step: to some nanometres), and calling it again and again solves for one that stands.
+    For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach followed to where the weighted error is
+    least; a goal that is met moves nothing, not by rounding either. An arm of fewer than six joints meets the position and turns as well as it can.
 
     Args:
         chain: the kinematics.
@@ -34,14 +40,40 @@ def approach(chain: SerialChain, q: Vector, position: Vector, orientation: Vecto
         orientation: goal of the tip in the base frame, quaternion (x, y, z, w).
         largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays straight.
     """
-    frames = chain.frames(q)
-    tip = frames[-1]
+    found, length = q, _LENGTH if len(q) >= 6 else _LITTLE
+    for _ in range(_CORRECTIONS):
+        frames = chain.frames(found)
+        error = _error(frames[-1], position, orientation, length)
+        if error.dot(error) < _MET**2:
+            break
+        move = found + _correction(chain, found, frames, error, length) - q
+        share = float(np.abs(move / largest_move).max())
+        found = q + move / max(1.0, share)
+        if share >= 1.0:
+            break
+    return found
+
+
+def _error(tip: Vector, position: Vector, orientation: Vector, length: float) -> Vector:
+    """Return what is left to the goal from the pose `tip`, shape (4, 4): way, then turn as a rotation vector in metres, shape (6,)."""
     error = np.empty(6)
     error[:3] = position - tip[:3, 3]
-    error[3:] = _LENGTH * rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
+    error[3:] = length * rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
+    return error
+
+
+def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector, length: float) -> Vector:
+    """Return a move, shape (n,), that stays inside the joint ranges: joints that would leave theirs go to its end, and the others make the best of it."""
     jacobian = chain.jacobian(frames)
-    jacobian[3:] *= _LENGTH
+    jacobian[3:] *= length
     normal = jacobian.T @ jacobian
     normal.reshape(-1)[:: len(q) + 1] += 0.5 * error.dot(error) + _LEAST_DAMPING
-    move = np.minimum(np.maximum(q + np.linalg.solve(normal, jacobian.T @ error), chain.lower), chain.upper) - q
-    return q + move / max(1.0, float(np.abs(move / largest_move).max()))
+    gradient = jacobian.T @ error
+    least, most = chain.lower - q, chain.upper - q
+    move = np.linalg.solve(normal, gradient)
+    free = np.ones(len(q), dtype=bool)
+    while (outside := free & ((move < least) | (move > most))).any():
+        free &= ~outside
+        move[outside] = np.where(move < least, least, most)[outside]
+        move[free] = np.linalg.solve(normal[np.ix_(free, free)], gradient[free] - normal[np.ix_(free, ~free)] @ move[~free])
+    return np.minimum(np.maximum(q + move, chain.lower), chain.upper) - q

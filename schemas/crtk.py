@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from schemas.message import Bool, Message, String
-from schemas.ros import Header
+from schemas.ros import BoolMessage, Header, Pose, Quaternion, Twist, Vector3, Wrench
 
-__all__ = ["OperatingState", "StringStamped"]
+__all__ = ["CartesianImpedance", "CartesianImpedanceHalfPlaneGains", "CartesianState", "OperatingState", "StringStamped"]
 
 
 class OperatingState(Message):
@@ -26,3 +26,43 @@ class StringStamped(Message):
     ros_type: ClassVar[str] = "crtk_msgs/msg/StringStamped"
     header: Header = Header()
     string: String = ""
+
+
+class CartesianState(Message):
+    """Pose, twist and wrench of a tip in one frame, each stated or not."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianState"
+    header: Header = Header()
+    pose: Pose = Pose()
+    pose_is_valid: BoolMessage = BoolMessage()
+    twist: Twist = Twist()
+    twist_is_valid: BoolMessage = BoolMessage()
+    wrench: Wrench = Wrench()
+    wrench_is_valid: BoolMessage = BoolMessage()
+
+
+class CartesianImpedanceHalfPlaneGains(Message):
+    """Gains per axis on one side of a goal: N/m and N s/m of a displacement, N m/rad and N m s/rad of a rotation; a spring's are negative."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains"
+    p: Vector3 = Vector3()
+    d: Vector3 = Vector3()
+    bias: Vector3 = Vector3()
+    """What is added, N or N m."""
+    deadband: Vector3 = Vector3()
+    """Distance from the goal, m or rad, from which on `p` counts."""
+
+
+class CartesianImpedance(Message):
+    """Springs and dampers between a tip and a goal, along the axes of one orientation for forces and of another for torques."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedance"
+    header: Header = Header()
+    force_orientation: Quaternion = Quaternion()
+    force_position: Vector3 = Vector3()
+    torque_orientation: Quaternion = Quaternion()
+    """The goal of the rotation, too."""
+    position_positive: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
+    position_negative: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
+    orientation_positive: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
+    orientation_negative: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()

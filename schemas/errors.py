@@ -4,11 +4,13 @@ TrocarError
 ├── ScenarioError          the scenario cannot be run as written (exit code 2)
 │   └── MissingExtraError  a package that an optional part needs is not installed
 ├── MessageError           bytes or values that are not a valid message
+│   └── LateError          a message that comes after a newer one
 ├── SessionError           the running session ended before its time (exit code 1)
 │   ├── ParticipantError   a participant raised, died or stopped answering
 │   └── StateError         a participant cannot save or restore its state
 ├── RecordingError         a recording cannot be written, read or re-simulated
 ├── MotionError            an arm cannot be or go where it was asked to
+├── DeviceError            hardware, or the program that drives it, cannot be used now
 └── ConnectError           no hub, or not the hub that was asked for
 """
 
@@ -19,6 +21,8 @@ from collections.abc import Iterable
 
 __all__ = [
     "ConnectError",
+    "DeviceError",
+    "LateError",
     "MessageError",
     "MissingExtraError",
     "MotionError",
@@ -58,6 +62,10 @@ class MessageError(TrocarError):
     """Bytes or values that are not a valid message."""
 
 
+class LateError(MessageError):
+    """A message that comes after a newer one."""
+
+
 class SessionError(TrocarError):
     """The running session ended before its time."""
 
@@ -83,6 +91,10 @@ class RecordingError(TrocarError):
 
 class MotionError(TrocarError):
     """An arm cannot be or go where it was asked to; the message says why and what was allowed."""
+
+
+class DeviceError(TrocarError):
+    """Hardware, or the program that drives it, cannot be used now; the message says what to do."""
 
 
 class ConnectError(TrocarError):

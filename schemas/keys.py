@@ -25,6 +25,7 @@ class Keys:
 
     def __init__(self, session: str) -> None:
         """Take the session's name."""
+        self.session = session
         self.prefix = f"{ROOT}/{session}"
         self.grant = f"{self.prefix}/hub/grant"
         self.status = f"{self.prefix}/hub/status"
@@ -41,13 +42,29 @@ class Keys:
         """Key of an output port; `role` is `engine` for all that is stepped, else `device`."""
         return f"{self.prefix}/{role}/{participant}/out/{port}"
 
+    def feed(self, participant: str, port: str) -> str:
+        """Key on which the values of an output are for devices of the wall clock: one that does not keep up misses some, and holds nobody up."""
+        return f"{self.prefix}/engine/{participant}/feed/{port}"
+
     def refused(self, role: str, participant: str) -> str:
         """Key on which a host tells of messages that it had to drop, under the name of one of its participants."""
         return f"{self.prefix}/{role}/{participant}/refused"
 
+    def device_status(self, device: str) -> str:
+        """Key on which the host of a device tells of it; `*` for all."""
+        return f"{self.prefix}/device/{device}/status"
+
+    def link(self, device: str) -> str:
+        """Key on which the hub says what is to lie between it and a device."""
+        return f"{self.prefix}/hub/link/{device}"
+
     def control(self, verb: str) -> str:
         """Key of a control queryable."""
         return f"{self.prefix}/control/{verb}"
+
+    def join(self, host: str) -> str:
+        """Key on which the host `host` presents itself, of which nobody else may make use; `**` for all."""
+        return self.control(f"join/{host}")
 
     def alive(self, role: str, name: str) -> str:
         """Key of a liveliness token."""

@@ -16,6 +16,7 @@ from pydantic_core import CoreSchema, core_schema
 
 __all__ = [
     "Bool",
+    "Byte",
     "Bytes",
     "Float32Array",
     "Float64",
@@ -80,6 +81,7 @@ class RosType:
 
 Float64 = Annotated[float, Field(allow_inf_nan=False), RosType("float64")]
 Bool = Annotated[bool, RosType("bool")]
+Byte = Annotated[int, Field(ge=0, lt=2**7), RosType("byte")]  # ROS 2 has eight bits, of which rosbags takes the eighth for a sign
 String = Annotated[str, RosType("string")]
 UInt8 = Annotated[int, Field(ge=0, lt=2**8), RosType("uint8")]
 Int32 = Annotated[int, Field(ge=-(2**31), lt=2**31), RosType("int32")]

@@ -11,7 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int32, Int32Array, Message, String, StringArray, UInt8, UInt32, fixed_float64
+from schemas.message import (
+    Bool,
+    Byte,
+    Bytes,
+    Float32Array,
+    Float64,
+    Float64Array,
+    Int32,
+    Int32Array,
+    Message,
+    String,
+    StringArray,
+    UInt8,
+    UInt32,
+    fixed_float64,
+)
 
 __all__ = [
     "Accel",
@@ -19,6 +34,7 @@ __all__ = [
     "BoolMessage",
     "CameraInfo",
     "CompressedImage",
+    "DiagnosticStatus",
     "EmptyMessage",
     "Float64Message",
     "Float64MultiArray",
@@ -26,6 +42,7 @@ __all__ = [
     "Image",
     "JointState",
     "Joy",
+    "KeyValue",
     "MultiArrayDimension",
     "MultiArrayLayout",
     "Point",
@@ -290,3 +307,23 @@ class CameraInfo(Message):
     binning_x: UInt32 = 0
     binning_y: UInt32 = 0
     roi: RegionOfInterest = RegionOfInterest()
+
+
+class KeyValue(Message):
+    """One reading of a diagnosis."""
+
+    ros_type: ClassVar[str] = "diagnostic_msgs/msg/KeyValue"
+    key: String
+    value: String
+
+
+class DiagnosticStatus(Message):
+    """How a piece of hardware fares."""
+
+    ros_type: ClassVar[str] = "diagnostic_msgs/msg/DiagnosticStatus"
+    level: Byte = 0
+    """0 ok, 1 warning, 2 error, 3 stale."""
+    name: String
+    message: String
+    hardware_id: String = ""
+    values: list[KeyValue] = Field(default_factory=list[KeyValue])

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from schemas.keys import valid_name
+from schemas.link import LinkSpec
 from schemas.quantity import Duration
 
 __all__ = ["Bond", "Connection", "Endpoint", "Measure", "ParticipantSpec", "Scenario"]
@@ -48,14 +49,23 @@ class Endpoint(_Part):
 
 
 class ParticipantSpec(_Part):
-    """A participant: its kind, where it runs, how often it steps, and the parameters of its kind."""
+    """A participant: its kind, where it runs, how often it steps, what lies between it and the hub, and the parameters of its kind."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
     kind: str = Field(description="name of an installed engine, controller or device")
     host: Name = Field(default="hub", description="'hub', the name of a process to start here, or 'remote'")
-    period: Duration | None = Field(default=None, description="a multiple of the step; default: the step")
-    RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period")
+    period: Duration | None = Field(
+        default=None, description="a multiple of the step; default: the step. Of a device that lives in wall time: how often it is read; default: 1 ms"
+    )
+    link: LinkSpec | None = Field(default=None, description="of a device: the network that is put between it and the hub; default: none")
+    rate_limit: float = Field(
+        default=2000.0,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="of a device: messages per second that the hub takes from each of its ports, bursts aside",
+    )
+    RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period", "link", "rate_limit")
 
     @property
     def params(self) -> dict[str, Any]:
@@ -118,10 +128,12 @@ class Bond(_Part):
 class Measure(_Part):
     """A number for the summary, from the values of one output port: `participant.port` or `participant.port.field`."""
 
-    kind: Literal["peak-norm", "peak", "mean", "final", "drop", "time-above"] = Field(
-        description="drop: the largest fall after the peak; time-above: the longest time (s) at `level` or above; of several numbers the norm is taken"
+    kind: Literal["peak-norm", "peak", "least", "mean", "final", "drop", "swing", "time-above"] = Field(
+        description="drop: the largest fall after the peak; swing: from the least to the largest, of several numbers that of the one that varies most;"
+        " time-above: the longest time (s) at `level` or above; for all else of several numbers the norm is taken"
     )
     of: Endpoint
+    after: Duration = Field(default=0, ge=0, description="simulated time before which values do not count")
     level: float | None = Field(default=None, description="for time-above, in the unit of the port")
     unit: str = ""
     live: bool = Field(default=False, description="show the present value in the progress line")

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int64, Message, String, UInt32, UInt32Array, UInt64, UInt64Array
-from schemas.ros import Header
+from schemas.ros import Header, Vector3
 
-__all__ = ["Ack", "CouplingEnergy", "Grant", "InletSample", "ParticipantStatus", "SessionStatus", "SoftBodyState", "TissueGrasp"]
+__all__ = [
+    "Ack",
+    "ContactModel",
+    "ContactPlane",
+    "CouplingEnergy",
+    "DeviceStatus",
+    "Grant",
+    "InletSample",
+    "Latency",
+    "ParticipantStatus",
+    "SessionStatus",
+    "SoftBodyState",
+    "TissueGrasp",
+]
 
 
 class InletSample(Message):
@@ -65,6 +78,36 @@ class CouplingEnergy(Message):
     """`force_work_j - motion_work_j`: energy that the coupling created (positive) or lost."""
 
 
+class ContactPlane(Message):
+    """A surface near a hand, as flat: it pushes what is below it back along its normal.
+
+    With depth = distance + velocity age - normal . x of a hand at x, the force is normal max(0, stiffness depth - damping v_n), and friction across it.
+    """
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ContactPlane"
+    normal: Vector3
+    """Unit vector out of the body, towards where the hand is free."""
+    distance: Float64
+    """Of the surface from the frame's origin along the normal, m, at the stamp of the model."""
+    velocity: Float64 = 0.0
+    """Of the surface along its normal, m/s."""
+    stiffness: Annotated[Float64, Field(ge=0.0)]
+    """N/m."""
+    damping: Annotated[Float64, Field(ge=0.0)] = 0.0
+    """N s/m."""
+    friction: Annotated[Float64, Field(ge=0.0)] = 0.0
+    """Coefficient."""
+
+
+class ContactModel(Message):
+    """All that a haptic device needs to render contact until the next one comes; in `header.frame_id`, the device's base frame."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ContactModel"
+    header: Header
+    planes: Annotated[list[ContactPlane], Field(max_length=4)] = Field(default_factory=list[ContactPlane])
+    """None: the hand is free."""
+
+
 class SoftBodyState(Message):
     """The nodes of a soft body: x, y, z in metres, one after the other, in `header.frame_id`."""
 
@@ -101,6 +144,35 @@ class ParticipantStatus(Message):
     step: Int64
 
 
+class Latency(Message):
+    """How long the messages of one stream took on one part of their way, since the start of the session."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/Latency"
+    way: String
+    """`device to grant`: from when a device had a sample to the communication point at which it entered the simulation; `grant to state`: from a
+    grant to the acknowledgement of all its steps; `state to force`: from when a value was there to when it was written to a device."""
+    stream: String
+    """`device.port`, `source.port -> device.port`, or `all participants`."""
+    count: UInt64
+    p50_s: Float64
+    p99_s: Float64
+    largest_s: Float64
+
+
+class DeviceStatus(Message):
+    """What the host of a device tells of it, once a second."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/DeviceStatus"
+    device: String
+    offset_ns: Int64 = 0
+    """What is added to the monotonic clock of the device's host to have that of the hub."""
+    round_trip_ns: Int64 = -1
+    """Of the exchange that told the offset, which is right within half of it; -1: there was none yet, or the host is the hub's own."""
+    link: String = ""
+    """What lies between device and hub by the scenario, or by what was set since; empty: nothing."""
+    latencies: list[Latency] = Field(default_factory=list[Latency])
+
+
 class SessionStatus(Message):
     """What a session is doing now."""
 
@@ -116,3 +188,5 @@ class SessionStatus(Message):
     dropped_messages: UInt64
     detail: String = ""
     participants: list[ParticipantStatus] = Field(default_factory=list[ParticipantStatus])
+    devices: list[DeviceStatus] = Field(default_factory=list[DeviceStatus])
+    latencies: list[Latency] = Field(default_factory=list[Latency])

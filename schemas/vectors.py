@@ -39,6 +39,7 @@ _LAYOUTS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 """Per type: the blocks of numbers, each with the names of its elements (none: an array or a single number)."""
 
 _QUATERNION_TOLERANCE = 1e-3
+_NANOSEC = struct.Struct("<I")
 
 
 def has_vector(type_name: str) -> bool:
@@ -56,7 +57,7 @@ class VectorCodec:
         self.port = port
         self.model = message_type(port.type)
         self.fields: dict[str, slice] = {}
-        """Position of each block in the vector, by its full path and by its last word."""
+        """Position of each block in the vector, and of each number with a name, by its full path and by the block's last word: `position`, `position.z`."""
         self._blocks = list(self._layout())
         self.size: int = self._blocks[-1][2].stop
         self.neutral = np.zeros(self.size)
@@ -74,7 +75,9 @@ class VectorCodec:
             rows = tuple((path, names, len(names) or port.size) for path, names in _LAYOUTS[port.type])
         for path, names, count in rows:
             block = slice(at, at + count)
-            self.fields[path] = self.fields[path.rpartition(".")[2]] = block
+            for field in (path, path.rpartition(".")[2]):
+                self.fields[field] = block
+                self.fields |= {f"{field}.{name}": slice(i, i + 1) for i, name in enumerate(names, at)}
             yield path, names, block
             at += count
 
@@ -112,11 +115,16 @@ class VectorCodec:
         """
         if len(payload) != self._length:
             raise MessageError(f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}")
-        for start, stop, expected in self._fixed:
-            if payload[start:stop] != expected:
-                raise MessageError(f"port '{self.port.name}': frame, names or layout differ from what the port declares")
+        if not self.fits(payload):
+            raise MessageError(f"port '{self.port.name}': frame, names or layout differ from what the port declares")
         parts = [np.frombuffer(payload, np.float64, block.stop - block.start, offset) for offset, block in self._offsets]
         return self.checked(parts[0].copy() if len(parts) == 1 else np.concatenate(parts))
+
+    def fits(self, payload: bytes) -> bool:
+        """Say whether all bytes but the numbers and the stamp, which must be one, are as this codec writes them."""
+        if len(payload) != self._length or (self._has_stamp and not _NANOSEC.unpack_from(payload, 8)[0] < 10**9):
+            return False
+        return all(payload[start:stop] == expected for start, stop, expected in self._fixed)
 
     def checked(self, value: Vector) -> Vector:
         """Return `value` if it holds doubles, has the right shape, is finite and its quaternion (if any) is a unit quaternion."""

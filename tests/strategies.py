@@ -22,6 +22,7 @@ names = st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,8}", fullmatch=True)
 _SCALARS: dict[str, st.SearchStrategy[Any]] = {
     "float64": finite,
     "bool": st.booleans(),
+    "byte": st.integers(0, 2**7 - 1),
     "string": texts,
     "string[]": st.lists(texts, max_size=4),
     **{f"uint{bits}": st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64)},
@@ -44,6 +45,8 @@ def messages(model: type[Message]) -> st.SearchStrategy[Message]:
 
 
 def _field(model: type[Message], ros_type: str, name: str) -> st.SearchStrategy[Any]:
+    if ros_type == "float64" and any(getattr(mark, "ge", None) == 0.0 for mark in model.model_fields[name].metadata):
+        return finite.map(abs)
     if ros_type in _SCALARS:
         return _SCALARS[ros_type]
     annotation = model.model_fields[name].annotation

@@ -7,13 +7,17 @@ from typing import Any, cast
 
 import numpy as np
 
+from controllers.motion.axes import Mode
+from controllers.motion.cartesian_commands import CartesianCommands
 from controllers.motion.commands import Commands
 from controllers.motion.drives import Drives
-from controllers.motion.frames import Frames
+from controllers.motion.equipment import Equipment
+from controllers.motion.frames import BaseFrame, base_in_world
+from controllers.motion.gravity import KnownWeight
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import COMMANDS, GRIPPER_COMMANDS
+from controllers.motion.ports import CARTESIAN_COMMANDS, COMMANDS, EQUIPMENT_COMMANDS, EVENTS, GRIPPER_COMMANDS
 from controllers.motion.telemetry import Telemetry
 from hub.inputs import Inputs
 from robots.dvrk.setup_joints import CartArm
@@ -24,7 +28,11 @@ from schemas.vectors import Vector
 
 __all__ = ["Arm"]
 
-_ANY_TIME = ("trajectory_j/set_ratio", "use_gravity_compensation")
+_ANY_TIME = (
+    *("use_gravity_compensation", "body/set_cf_orientation_absolute", "set_base_frame"),
+    *(command for commands in EQUIPMENT_COMMANDS.values() for command in commands),
+    *("trajectory_j/set_ratio", "trajectory_j/set_ratio_v", "trajectory_j/set_ratio_a"),
+)
 """Commands that are heeded whatever the operating state."""
 _BARE = 2.0
 """What `control_mode` adds to position and effort without gravity compensation."""
@@ -33,26 +41,31 @@ _BARE = 2.0
 class Arm:
     """One arm. All that changes is in the arrays of `state`."""
 
-    def __init__(self, name: CartArm, params: MotionParams, frames: Frames, camera: Callable[[], Vector | None], period: float) -> None:
-        """Take the arm's name, what the scenario says, the base frames, what returns the ECM's tip in `ECM_base`, and the step (s)."""
+    def __init__(self, name: CartArm, params: MotionParams, camera: Callable[[], Vector | None], period: float) -> None:
+        """Take the arm's name, what the scenario says, what returns the ECM's tip in the world, shape (4, 4), and the step (s)."""
         arm = params.arms.driven[name]
-        self._name: CartArm = name
-        self._frames, self._camera, self._period = frames, camera, period
-        self._messages = Messages(name)
-        self._drives = Drives(arm, self._messages)
+        self._name, self._period = name, period
+        held = arm.equipment
+        self._messages = Messages(name, (*EVENTS, held[0]))
+        self._equipment = Equipment(*held, self._messages)
+        self._base = BaseFrame(name, params, camera)
+        self._drives = Drives(arm, self._messages, lambda: self._base.pose)
         self._telemetry = Telemetry(name, arm.chain)
-        self._commands = Commands(name, self._drives, frames, camera, period)
+        self._weight = KnownWeight(name, arm.chain, base_in_world(name, params))
+        self._commands = Commands(self._drives, period)
+        self._cartesian = CartesianCommands(name, self._drives, self._base, self._commands.ratio, period)
         self._lifecycle = Lifecycle(self._drives, self._messages, np.array(arm.home), params.power_time * 1e-9, homed=params.initial_state == "homed")
-        heeding = self._commands.handlers
+        heeding = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
         self._state_port = f"{name}/state_command"
-        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in COMMANDS if command != "state_command"]
+        commands = (*COMMANDS, *self._equipment.handlers)
+        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in commands if command != "state_command"]
         self._prefixes = [name]
         if (gripper := arm.gripper) is not None:
             self._prefixes.append(f"{name}/{gripper.name}")
-            commands = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
-            self._ports += [(command, f"{name}/{command}", heed) for command, heed in commands]
+            grasping = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
+            self._ports += [(command, f"{name}/{command}", heed) for command, heed in grasping]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
-        self.state = (self._started, *self._commands.state, self._lifecycle.flags, self._messages.state, *self._drives.state)
+        self.state = (self._started, *self._commands.state, *self._base.state, *self._lifecycle.arrays, self._messages.state, *self._drives.state)
         self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)]
         self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
         self.events = self._messages.outputs
@@ -85,7 +98,10 @@ class Arm:
         """Heed the commands that have arrived, and advance from `t` to `t + h` (ns)."""
         self._messages.begin(t + h)
         before = self._condition() if self._started[0] else None
-        self._started[0] = 1.0
+        if before is None:
+            self._started[0] = 1.0
+            self._messages.desired_state(self._lifecycle.desired_state)
+            self._equipment.tell()
         self._lifecycle.watch(self._period)
         heeded = self._heed(inputs)
         self._lifecycle.step(self._period)
@@ -97,10 +113,13 @@ class Arm:
 
     def publish(self) -> None:
         """Bring the states that are not published at every step up to date."""
-        joints, gripper = self._drives.joints, self._drives.gripper
-        self._telemetry.update(joints.measured, joints.commanded, float(self._commands.ratio[0]), self._frames.of(self._name, self._camera()))
-        if gripper is not None:
-            self._gripper_setpoint[:] = gripper.commanded
+        drives, commands = self._drives, self._commands
+        joints = drives.joints
+        self._telemetry.update(joints.measured, joints.commanded, self._base.pose, absolute=bool(drives.absolute[0]))
+        bears = joints.mode is not Mode.OFF and bool(commands.gravity_compensation[0])
+        self._telemetry.tell_settings(commands.ratio, bears * self._weight.effort(joints.position))
+        if drives.gripper is not None:
+            self._gripper_setpoint[:] = drives.gripper.commanded
 
     def restored(self) -> None:
         """Bring what is not in `state` up to it."""
@@ -123,20 +142,27 @@ class Arm:
             awaited |= self._lifecycle.command(cast("StringStamped", message))
         for command, port, heed in self._ports:
             for message in inputs.events(port):
-                done = self._heed_one(command, heed, message)
-                awaited |= done and "move_" in command
+                self._heed_one(command, heed, message)
+                awaited |= "move_" in command
         return awaited
 
-    def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> bool:
-        if command not in _ANY_TIME and (reason := self._lifecycle.not_ready()):
+    def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> None:
+        if reason := self._not_ready(command):
             self._messages.refuse(command, reason, ready=False)
-            return False
+            return
         try:
             heed(message)
         except MotionError as error:
             self._messages.refuse(command, str(error), ready=True)
             if "move_" in command and not self._drives.is_moving:
                 self._messages.goal_reached(reached=False)  # as the real controller does; a move under way goes on
-            return False
+            return
         self._messages.heeded(command)
-        return True
+        if command in CARTESIAN_COMMANDS:
+            self._drives.cartesian[0] = 1.0
+
+    def _not_ready(self, command: str) -> str:
+        """Return why the arm does not take `command` now; empty if it does."""
+        if command in _ANY_TIME:
+            return ""
+        return self._lifecycle.not_ready() or (self._cartesian.not_ready() if command in CARTESIAN_COMMANDS else "")

@@ -65,14 +65,20 @@ class Axes:
             self._moving[0] = 0.0
         return arrived
 
-    def follow(self, goal: Vector, h: float) -> None:
-        """Follow `goal`, shape (n,), inside the ranges."""
+    def follow(self, goal: Vector, h: float, velocity: Vector | None = None) -> None:
+        """Follow `goal`, shape (n,), inside the ranges, with the velocity that the sender states, if any."""
         self._hold_position()
         self._moving[0] = 0.0
-        self.setpoint.follow(goal, h)
+        self.setpoint.follow(goal, h, velocity)
 
-    def move(self, goal: Vector, ratio: float) -> None:
-        """Move to `goal`, shape (n,), inside the ranges."""
+    def drift(self, velocity: Vector) -> None:
+        """Go on with `velocity`, shape (n,), for as long as it is told again."""
+        self._hold_position()
+        self._moving[0] = 0.0
+        self.setpoint.drift(velocity)
+
+    def move(self, goal: Vector, ratio: Vector) -> None:
+        """Move to `goal`, shape (n,), inside the ranges, at the shares `ratio`, shape (2,), of velocity and acceleration."""
         self._hold_position()
         self._moving[0] = 1.0
         self.setpoint.move(goal, ratio)

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from controllers.motion.frames import Frames
+from controllers.motion.frames import CART_FRAME, base_in_world, reference_frame
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import arm_ports
+from controllers.motion.ports import arm_ports, setup_joint_ports
+from controllers.motion.setup_joints import SetupJoints, joint_names
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
 from schemas.errors import MissingExtraError, StateError
@@ -31,15 +32,22 @@ class MotionController(Stepped):
     def __init__(self, name: str, params: MotionParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._frames = Frames(params)
         self._arms: dict[str, Arm] = {}
+        self._setup_joints = SetupJoints(params)
+        self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
         self._outputs: dict[str, Any] = {}
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Per arm: CRTK's commands in, its states and events out; `drive/<arm>/...` and `sense/<arm>/...` towards the robot."""
-        period, frames = self.params.publish_period, self._frames.names
-        return tuple(port for name, arm in self.params.arms.driven.items() for port in arm_ports(name, arm, frames[name], period))
+        """Per arm: CRTK's commands in, its states and events out; `drive/<arm>/...` and `sense/<arm>/...` towards the robot.
+
+        On the cart also `SUJ/<arm>/...`, the setup joints that carry it.
+        """
+        params, period = self.params, self.params.publish_period
+        ports = [port for name, arm in params.arms.driven.items() for port in arm_ports(name, arm, reference_frame(name, params), period)]
+        if params.mounting == "cart":
+            ports += [port for name in params.arms.driven for port in setup_joint_ports(name, joint_names(name), CART_FRAME, period)]
+        return tuple(ports)
 
     def configure(self, setup: Setup) -> Outputs:
         """Put every arm where the parameters say."""
@@ -48,16 +56,17 @@ class MotionController(Stepped):
         from controllers.motion.arm import Arm
 
         period = setup.period_ns * 1e-9
-        self._arms = {name: Arm(name, self.params, self._frames, self._camera, period) for name in self.params.arms.driven}
+        self._setup_joints = SetupJoints(self.params)
+        self._arms = {name: Arm(name, self.params, self._camera, period) for name in self.params.arms.driven}
         for arm in self._arms.values():
             arm.publish()
             self._outputs |= arm.outputs
+        self._outputs |= self._setup_joints.outputs
         return self._outputs
 
     def _camera(self) -> Vector | None:
-        """Return the pose of the ECM's tip in `ECM_base`, shape (4, 4), if there is an ECM."""
-        ecm = self._arms.get("ECM")
-        return None if ecm is None else ecm.tip
+        """Return the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM."""
+        return None if self._camera_stand is None else self._camera_stand @ self._arms["ECM"].tip
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Heed commands and advance all setpoints by `h` nanoseconds."""
@@ -70,10 +79,12 @@ class MotionController(Stepped):
             if due:
                 arm.publish()
             self._outputs |= arm.events
+        self._setup_joints.step(t, h, inputs)
+        self._outputs |= self._setup_joints.outputs
         return self._outputs
 
     def _state(self) -> tuple[Vector, ...]:
-        return tuple(array for arm in self._arms.values() for array in arm.state)
+        return (*(array for arm in self._arms.values() for array in arm.state), *self._setup_joints.state)
 
     def state_hash(self) -> int:
         """Return the hash of what is measured and commanded, and of every arm's operating state."""

@@ -2,42 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 
 import numpy as np
 
 from controllers.motion.axes import Axes, Mode
+from controllers.motion.frames import turned
+from controllers.motion.impedance import Impedance
 from controllers.motion.messages import Messages
 from controllers.motion.params import EcmParams, PsmParams
 from controllers.motion.telemetry import body_to_spatial
 from robots.serial_chain import SerialChain
+from schemas.crtk import CartesianImpedance
 from schemas.vectors import Vector
 
 __all__ = ["Drives", "WrenchFrame"]
 
 
 class WrenchFrame(IntEnum):
-    """How a commanded wrench is meant: at the tip in the tip's frame, or at the base frame's origin in the base frame."""
+    """How a commanded wrench is meant.
+
+    At the tip along the tip's axes (or the reference's, see `Drives.absolute`), at the base frame's origin along the base frame's,
+    at the tip along the reference's, or as the impedance has it.
+    """
 
     NONE = 0
     BODY = 1
     SPATIAL = 2
+    REFERENCE = 3
+    IMPEDANCE = 4
 
 
 class Drives:
     """The joints of an arm, and its gripper if it has one."""
 
-    def __init__(self, arm: PsmParams | EcmParams, messages: Messages) -> None:
-        """Take the arm's parameters and where to tell what ends."""
-        self._messages = messages
+    def __init__(self, arm: PsmParams | EcmParams, messages: Messages, base: Callable[[], Vector]) -> None:
+        """Take the arm's parameters, where to tell what ends, and what returns the base frame in the reference, shape (4, 4)."""
+        self._messages, self._base = messages, base
         self.joints = Axes(arm.chain, np.array(arm.start))
         gripper = arm.gripper
         self.gripper = None if gripper is None else Axes(SerialChain(gripper.joints, np.eye(4)), np.array(gripper.start))
         self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
         """All that is driven: the arm's joints, then the gripper."""
-        self._wrench = np.zeros(7)
-        self._frame = self._wrench[6:]
-        self.state = (self._wrench, *(array for axes in self.groups for array in axes.state))
+        self._control = np.zeros(9)
+        self._wrench, self._frame, self.absolute, self.cartesian = np.split(self._control, [6, 7, 8])
+        """`absolute`: 1 where body wrenches are along the axes of the reference; `cartesian`: 1 while the arm is under Cartesian control."""
+        self._impedance = Impedance()
+        self.state = (self._control, self._impedance.state, *(array for axes in self.groups for array in axes.state))
 
     @property
     def is_moving(self) -> bool:
@@ -52,29 +64,40 @@ class Drives:
     def power(self, *, on: bool) -> None:
         """Switch all drives off, or on to hold what they hold."""
         self._give_up(*self.groups)
-        self._frame[0] = WrenchFrame.NONE
+        self._leave()
         for axes in self.groups:
             axes.power(on=on)
 
     def rest(self) -> None:
         """Brake and stay; a gripper that presses goes on pressing."""
         self._give_up(*self.groups)
-        self._frame[0] = WrenchFrame.NONE
+        self._leave()
         for axes in self.groups:
             if axes is self.joints or axes.mode is Mode.POSITION:
                 axes.hold()
 
-    def follow(self, axes: Axes, goal: Vector, h: float) -> None:
-        """Let `axes` follow `goal`, shape (n,); `h` is the step (s). Raises MotionError if it is out of range."""
+    def follow(self, axes: Axes, goal: Vector, h: float, velocity: Vector | None = None) -> None:
+        """Let `axes` follow `goal`, shape (n,), with the velocity that the sender states, if any; `h` is the step (s).
+
+        Raises MotionError if it is out of range.
+        """
         axes.chain.check(goal)
         self._take_over(axes)
-        axes.follow(goal, h)
+        axes.follow(goal, h, velocity)
 
-    def move(self, axes: Axes, goal: Vector, ratio: float) -> None:
-        """Let `axes` move to `goal`, shape (n,), at the share `ratio` of their limits. Raises MotionError if it is out of range."""
+    def drift(self, velocity: Vector) -> None:
+        """Let the arm go on with joint velocities, shape (n,), for as long as they are told again."""
+        self._take_over(self.joints)
+        self.joints.drift(velocity)
+
+    def move(self, axes: Axes, goal: Vector, ratio: Vector) -> None:
+        """Let `axes` move to `goal`, shape (n,), at the shares `ratio`, shape (2,), of velocity and acceleration.
+
+        Raises MotionError if it is out of range.
+        """
         axes.chain.check(goal)
         if axes is self.joints:
-            self._frame[0] = WrenchFrame.NONE
+            self._leave()
         axes.move(goal, ratio)
 
     def apply(self, axes: Axes, effort: Vector) -> None:
@@ -85,7 +108,14 @@ class Drives:
     def press(self, wrench: Vector, frame: WrenchFrame) -> None:
         """Apply `wrench`, shape (6,), with the arm from now on, wherever it goes."""
         self._take_over(self.joints)
-        self._wrench[:6], self._frame[0] = wrench, frame
+        self._wrench[:], self._frame[0] = wrench, frame
+        self._balance()
+
+    def resist(self, message: CartesianImpedance) -> None:
+        """Let the arm be held by springs and dampers. Raises MotionError if the message makes no sense."""
+        self._impedance.set(message)
+        self._take_over(self.joints)
+        self._frame[0] = WrenchFrame.IMPEDANCE
         self._balance()
 
     def step(self, h: float) -> None:
@@ -104,7 +134,11 @@ class Drives:
     def _take_over(self, axes: Axes) -> None:
         self._give_up(axes)
         if axes is self.joints:
-            self._frame[0] = WrenchFrame.NONE
+            self._leave()
+
+    def _leave(self) -> None:
+        """Let go of what the arm was last told in Cartesian space."""
+        self._frame[0], self.cartesian[0] = WrenchFrame.NONE, 0.0
 
     def _give_up(self, *groups: Axes) -> None:
         if any(axes.is_moving for axes in groups):
@@ -114,7 +148,20 @@ class Drives:
         """Apply the joint efforts J^T w, none over what its drive can do."""
         chain = self.joints.chain
         frames = chain.frames(self.joints.position)
-        jacobian = chain.jacobian(frames, frame="tip")
-        if self._frame[0] == WrenchFrame.SPATIAL:
-            jacobian = body_to_spatial(frames[-1]) @ jacobian
-        self.joints.apply(np.clip(jacobian.T @ self._wrench[:6], -chain.effort, chain.effort))
+        frame = self._frame[0]
+        if frame in (WrenchFrame.REFERENCE, WrenchFrame.IMPEDANCE) or (frame == WrenchFrame.BODY and self.absolute[0]):
+            jacobian = chain.jacobian(frames)
+            wrench = self._in_base(frames[-1], jacobian)
+        else:
+            jacobian, wrench = chain.jacobian(frames, frame="tip"), self._wrench
+            if frame == WrenchFrame.SPATIAL:
+                jacobian = body_to_spatial(frames[-1]) @ jacobian
+        self.joints.apply(np.clip(jacobian.T @ wrench, -chain.effort, chain.effort))
+
+    def _in_base(self, tip: Vector, jacobian: Vector) -> Vector:
+        """Return the wrench at the tip, shape (6,), from the axes of the reference in those of the base frame."""
+        base, n = self._base(), len(self.joints.chain.joints)
+        wrench = self._wrench
+        if self._frame[0] == WrenchFrame.IMPEDANCE:
+            wrench = self._impedance.wrench(base @ tip, turned(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n]))
+        return turned(base[:3, :3].T, wrench)

@@ -1,12 +1,12 @@
 """Poses as (4, 4) matrices and as ROS has them, and the frames in which the world outside speaks of an arm.
 
 On the real system (jhu-dvrk/sawIntuitiveResearchKit) a PSM is seen from the camera: its base frame there is inv(cart -> camera)
-(cart -> RCM), both through the setup joints. The ECM is seen from the cart.
+(cart -> RCM), both through the setup joints. The ECM is seen from the cart. Without setup joints a client says where an arm stands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 
 import numpy as np
 
@@ -15,12 +15,13 @@ from robots import rotation
 from robots.dvrk import setup_joints
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.setup_joints import CartArm
+from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["CAMERA_FRAME", "CART_FRAME", "Frames", "pose"]
+__all__ = ["CAMERA_FRAME", "CART_FRAME", "BaseFrame", "base_in_world", "pose", "reference_frame", "setup_positions", "turned"]
 
-CAMERA_FRAME, CART_FRAME = "ECM", "Cart"
-"""As the da Vinci's own interface and the dVRK call them in `header.frame_id`."""
+CAMERA_FRAME, CART_FRAME, _WORLD_FRAME = "ECM", "Cart", "world"
+"""The first two as the da Vinci's own interface and the dVRK call them in `header.frame_id`."""
 
 
 def pose(frame: Vector) -> Vector:
@@ -28,36 +29,62 @@ def pose(frame: Vector) -> Vector:
     return np.concatenate([frame[:3, 3], rotation.from_matrix(frame)])
 
 
-class Frames:
-    """Base frames of all arms in the frames that their Cartesian ports speak of."""
-
-    def __init__(self, params: MotionParams) -> None:
-        """Take the arms, where they stand and what the reference is."""
-        arms = params.arms.driven
-        self._bases: dict[CartArm, Vector] = {name: _base(name, params) for name in arms}
-        self._seen = params.reference == "camera" and "ECM" in arms
-        self.names: Mapping[CartArm, str] = {name: self._name(name) for name in arms}
-        """Per arm the `frame_id` of what is not `local/`."""
-
-    def _name(self, arm: CartArm) -> str:
-        if not self._seen:
-            return f"{arm}_base"
-        return CART_FRAME if arm == "ECM" else CAMERA_FRAME
-
-    def of(self, arm: CartArm, camera: Vector | None) -> Vector:
-        """Return the pose of the arm's base frame in its reference, shape (4, 4); `camera` is the ECM's tip in `ECM_base`."""
-        if not self._seen:
-            return np.eye(4)
-        if arm == "ECM" or camera is None:
-            return self._bases[arm]
-        return inverse_pose(self._bases["ECM"] @ camera) @ self._bases[arm]
+def turned(rotation_matrix: Vector, vector: Vector) -> Vector:
+    """Return a twist or wrench, shape (6,), with the axes of its two parts turned by a matrix of shape (3, 3)."""
+    return np.concatenate([rotation_matrix @ vector[:3], rotation_matrix @ vector[3:]])
 
 
-def _base(arm: CartArm, params: MotionParams) -> Vector:
-    """Return the pose of the arm's base frame in the world, shape (4, 4)."""
+def setup_positions(arm: CartArm, params: MotionParams) -> Vector:
+    """Return where the setup joints that carry `arm` are, shape (6,)."""
+    return np.array(getattr(params.setup_joints, arm) or setup_joints.SIMULATED[arm])
+
+
+def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
+    """Return the pose of the arm's base frame in the world, shape (4, 4), as the scenario has it."""
     if params.mounting == "cart":
-        return setup_joints.base_pose(arm, np.array(getattr(params.setup_joints, arm) or setup_joints.SIMULATED[arm]))
+        return setup_joints.base_pose(arm, setup_positions(arm, params))
     stands = params.arms.driven[arm]
     base = np.eye(4)
     base[:3, :3], base[:3, 3] = rotation.matrix(np.array(stands.orientation)), stands.position
     return base
+
+
+def reference_frame(arm: CartArm, params: MotionParams) -> str:
+    """Return the `frame_id` of the arm's Cartesian ports that are not `local/`."""
+    world = CART_FRAME if params.mounting == "cart" else _WORLD_FRAME
+    if params.reference == "world":
+        return world
+    if params.reference == "base" or "ECM" not in params.arms.driven:
+        return f"{arm}_base"
+    return CART_FRAME if arm == "ECM" else CAMERA_FRAME
+
+
+class BaseFrame:
+    """The base frame of one arm in the frame that its Cartesian ports speak of."""
+
+    def __init__(self, arm: CartArm, params: MotionParams, camera: Callable[[], Vector | None]) -> None:
+        """Take the arm, what the scenario says, and what returns the pose of the ECM's tip in the world, shape (4, 4)."""
+        self.reference, self.local = reference_frame(arm, params), f"{arm}_base"
+        """`frame_id` of ports that are not `local/`, and of those that are."""
+        self._camera, self._carried = camera, params.mounting == "cart"
+        self._world = base_in_world(arm, params)
+        self.state = (self._world,)
+
+    @property
+    def pose(self) -> Vector:
+        """The base frame in its reference, shape (4, 4)."""
+        if self.reference == self.local:
+            return np.eye(4)
+        camera = self._camera() if self.reference == CAMERA_FRAME else None
+        return self._world if camera is None else inverse_pose(camera) @ self._world
+
+    def place(self, base: Vector) -> None:
+        """Let the arm's base frame stand at `base`, shape (4, 4), in the world; the arm itself stays where it is."""
+        self._world[:] = base
+
+    def check_free(self) -> None:
+        """Raise MotionError where something else than a client says where the base frame is."""
+        if self._carried:
+            raise MotionError("the setup joints say where the arm stands (`setup_joints` of the scenario)")
+        if self.reference != _WORLD_FRAME:
+            raise MotionError(f"poses of the arm are in frame '{self.reference}'; `reference: world` of the motion controller leaves its base frame to clients")

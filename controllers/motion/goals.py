@@ -10,19 +10,21 @@ import numpy as np
 from robots import rotation
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
-from schemas.ros import JointState, PoseStamped, WrenchStamped
+from schemas.ros import JointState, Point, Pose, Quaternion, Twist, Vector3, Wrench
 from schemas.vectors import Vector
 
-__all__ = ["check_frame", "efforts", "joint_values", "tip_frame", "wrench"]
+__all__ = ["check_frame", "efforts", "frame", "joint_values", "rotation_matrix", "stated_velocity", "twist", "vector", "wrench"]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
+_MOST = 1e9
+"""In SI units. No force, velocity, gain or place is meant to be larger, and what is computed of such numbers stays finite."""
 
 
-def joint_values(chain: SerialChain, message: JointState, part: Literal["position", "effort"]) -> Vector:
-    """Return positions or efforts, shape (n,), in the order of the chain; a message that names its joints may have them in any."""
+def joint_values(chain: SerialChain, message: JointState, part: Literal["position", "velocity", "effort"]) -> Vector:
+    """Return positions, velocities or efforts, shape (n,), in the order of the chain; a message that names its joints may have them in any."""
     names = [joint.name for joint in chain.joints]
-    values: Vector = message.position if part == "position" else message.effort
+    values: Vector = getattr(message, part)
     if values.shape != (len(names),):
         raise MotionError(f"{values.size} values of {part}, expected {len(names)}: {', '.join(names)}")
     if message.name:
@@ -31,6 +33,11 @@ def joint_values(chain: SerialChain, message: JointState, part: Literal["positio
         values = values[[message.name.index(name) for name in names]]
     _check_finite(values, part)
     return values
+
+
+def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
+    """Return the velocities, shape (n,), with which a goal is to be passed; None where none are stated, or zeros alone."""
+    return joint_values(chain, message, "velocity") if message.velocity.any() else None
 
 
 def efforts(chain: SerialChain, message: JointState) -> Vector:
@@ -53,25 +60,39 @@ def check_frame(frame_id: str, *allowed: str) -> str:
     return frame_id or allowed[0]
 
 
-def tip_frame(message: PoseStamped) -> Vector:
-    """Return the pose as (4, 4) matrix in the frame of its message."""
-    p, q = message.pose.position, message.pose.orientation
-    position, quaternion = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
-    _check_finite(position, "position")
+def frame(pose: Pose) -> Vector:
+    """Return the pose as (4, 4) matrix."""
+    matrix = np.eye(4)
+    matrix[:3, 3], matrix[:3, :3] = vector(pose.position, "position"), rotation_matrix(pose.orientation)
+    return matrix
+
+
+def rotation_matrix(q: Quaternion) -> Vector:
+    """Return the orientation as (3, 3) matrix."""
+    quaternion = np.array([q.x, q.y, q.z, q.w])
     _check_finite(quaternion, "orientation")
     norm = hypot(*quaternion.tolist())
     if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
         raise MotionError(f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}")
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = rotation.matrix(quaternion / norm), position
-    return frame
+    return rotation.matrix(quaternion / norm)
 
 
-def wrench(message: WrenchStamped) -> Vector:
+def twist(message: Twist) -> Vector:
+    """Return velocity and angular velocity, shape (6,)."""
+    return np.concatenate([vector(message.linear, "twist"), vector(message.angular, "twist")])
+
+
+def wrench(message: Wrench) -> Vector:
     """Return force and torque, shape (6,)."""
-    f, m = message.wrench.force, message.wrench.torque
-    values = np.array([f.x, f.y, f.z, m.x, m.y, m.z])
-    _check_finite(values, "wrench")
+    return np.concatenate([vector(message.force, "wrench"), vector(message.torque, "wrench")])
+
+
+def vector(message: Point | Vector3, part: str) -> Vector:
+    """Return the vector, shape (3,); `part` names it where it is not finite, or too large to be meant."""
+    values = np.array([message.x, message.y, message.z])
+    _check_finite(values, part)
+    if (np.abs(values) > _MOST).any():
+        raise MotionError(f"{part} {values.tolist()}: allowed are numbers up to {_MOST:g}")
     return values
 
 

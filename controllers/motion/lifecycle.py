@@ -8,11 +8,17 @@ from controllers.motion.axes import Mode
 from controllers.motion.drives import Drives
 from controllers.motion.limits import GOAL_TOLERANCE, HOMING_TIMEOUT, TRACKING_TOLERANCE
 from controllers.motion.messages import Messages
-from controllers.motion.operating_state import State, refusal
+from controllers.motion.operating_state import Desired, Repeats, State, refusal
 from schemas.crtk import StringStamped
 from schemas.vectors import Vector
 
 __all__ = ["Lifecycle"]
+
+
+_DESIRED = {"enable": Desired.ENABLED, "disable": Desired.DISABLED, "home": Desired.HOMED}
+"""What commands ask for; a pause leaves it to be resumed."""
+_FULL = np.ones(2)
+"""Shares of velocity and acceleration with which an arm homes."""
 
 
 class Lifecycle:
@@ -24,9 +30,11 @@ class Lifecycle:
         self._home, self._power_time = home, power_time
         n = len(home)
         self._tolerance = np.array([*TRACKING_TOLERANCE, *TRACKING_TOLERANCE[-1:] * n][:n])
-        self.flags = np.zeros(5)
+        self.flags = np.zeros(6)
+        self._state, self._homed, self._powering, self._homing, self._late, self._desired = np.split(self.flags, 6)
+        self._repeats = Repeats()
+        self.arrays = (self.flags, self._repeats.state)
         """All that changes."""
-        self._state, self._homed, self._powering, self._homing, self._late = np.split(self.flags, 5)
         self._commands = {
             "enable": self._enable,
             "disable": self._disable,
@@ -36,7 +44,7 @@ class Lifecycle:
             "resume": self._resume,
         }
         if homed:
-            self._state[0], self._homed[0] = State.ENABLED, 1.0
+            self._state[0], self._homed[0], self._desired[0] = State.ENABLED, 1.0, Desired.HOMED
             drives.power(on=True)
 
     @property
@@ -52,7 +60,12 @@ class Lifecycle:
     @property
     def is_busy(self) -> bool:
         """Whether the arm powers, homes or moves."""
-        return bool(self._powering[0] or self._homing[0]) or self._drives.is_moving
+        return bool(self._powering[0] or (self._homing[0] and self.state is not State.PAUSED)) or self._drives.is_moving
+
+    @property
+    def desired_state(self) -> str:
+        """Where the arm was told to go: CRTK's `desired_state`."""
+        return self.state.name if self.state in (State.PAUSED, State.FAULT) else Desired(int(self._desired[0])).name
 
     def not_ready(self) -> str:
         """Return why the arm takes no motion commands; empty if it does."""
@@ -64,10 +77,14 @@ class Lifecycle:
 
     def command(self, message: StringStamped) -> bool:
         """Heed a `state_command`; return whether the state takes it."""
-        if reason := refusal(self.state, message.string):
+        if reason := refusal(self.state, message.string) or self._repeats.refusal(message):
             self._messages.warning(reason)
             return False
+        if message.string in _DESIRED:
+            self._desired[0] = _DESIRED[message.string]
         self._commands[message.string]()
+        if message.string != "unhome":
+            self._messages.desired_state(self.desired_state)
         self._messages.status(f"state_command {message.string}")
         return True
 
@@ -100,7 +117,7 @@ class Lifecycle:
             return
         self._homing[0], self._late[0] = 1.0, 0.0
         if self.state is State.ENABLED:
-            self._drives.move(self._drives.joints, self._home, 1.0)
+            self._drives.move(self._drives.joints, self._home, _FULL)
         else:
             self._enable()
 
@@ -114,18 +131,19 @@ class Lifecycle:
 
     def _pause(self) -> None:
         self._drives.rest()
-        self._homing[0] = 0.0
         self._state[0] = State.PAUSED
 
     def _resume(self) -> None:
         self._state[0] = State.ENABLED
+        if self._homing[0]:
+            self._drives.move(self._drives.joints, self._home, _FULL)
 
     def _finish_powering(self) -> None:
         self._powering[0], self._state[0] = 0.0, State.ENABLED
         self._drives.power(on=True)
         self._messages.status("enabled")
         if self._homing[0]:
-            self._drives.move(self._drives.joints, self._home, 1.0)
+            self._drives.move(self._drives.joints, self._home, _FULL)
 
     def _switch_off(self, state: State) -> None:
         self._powering[0] = self._homing[0] = 0.0
@@ -135,6 +153,7 @@ class Lifecycle:
     def _fault(self, reason: str) -> None:
         self._messages.error(f"FAULT: {reason}; send state_command disable, then enable")
         self._switch_off(State.FAULT)
+        self._messages.desired_state(self.desired_state)
 
     def _lost(self) -> str:
         """Return which joints are further from their setpoint than they may be; empty if none is."""

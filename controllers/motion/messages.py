@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from zlib import crc32
 
 import numpy as np
 
 from controllers.motion.operating_state import State
-from controllers.motion.ports import EVENTS
 from schemas.crtk import OperatingState
 from schemas.message import Message
 from schemas.ros import BoolMessage, Header, StringMessage, Time
@@ -15,7 +15,7 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 __all__ = ["Messages"]
 
 _STREAMS = (
-    *("servo_jp", "servo_jr", "servo_cp", "servo_jf", "body/servo_cf", "spatial/servo_cf"),
+    *("servo_jp", "servo_jr", "servo_cp", "servo_cr", "servo_cs", "servo_ci", "servo_jf", "body/servo_cf", "spatial/servo_cf"),
     *("jaw/servo_jp", "jaw/servo_jf", "hand/servo_jp", "hand/servo_jf"),
 )
 _REPEAT = 2.0
@@ -25,10 +25,10 @@ _REPEAT = 2.0
 class Messages:
     """The event outputs of one arm in the present step."""
 
-    def __init__(self, arm: str) -> None:
-        """Take the arm's name."""
+    def __init__(self, arm: str, events: Iterable[str]) -> None:
+        """Take the arm's name and those of its event ports."""
         self._arm = arm
-        self._ports = {name: f"{arm}/{name}" for name in EVENTS}
+        self._ports = {name: f"{arm}/{name}" for name in events}
         self.outputs: dict[str, tuple[Message, ...]] = dict.fromkeys(self._ports.values(), ())
         self._quiet = True
         self._now_ns = 0
@@ -46,6 +46,14 @@ class Messages:
         """Tell the operating state."""
         stamp = Time.from_ns(self._now_ns)
         self._put("operating_state", OperatingState(header=Header(stamp=stamp), state=state.name, is_homed=homed, is_busy=busy))
+
+    def desired_state(self, state: str) -> None:
+        """Tell where the arm was told to go."""
+        self._put("desired_state", StringMessage(data=state))
+
+    def equipment(self, event: str, name: str) -> None:
+        """Tell on `tool_type` or `endoscope_type` what the arm holds."""
+        self._put(event, StringMessage(data=name))
 
     def goal_reached(self, *, reached: bool) -> None:
         """Tell whether a move has arrived."""

@@ -7,10 +7,14 @@ followed: there `pause` is let through in DISABLED, and so is `home`, which then
 from __future__ import annotations
 
 from enum import IntEnum
+from zlib import crc32
 
+import numpy as np
+
+from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 
-__all__ = ["State", "refusal"]
+__all__ = ["Desired", "Repeats", "State", "refusal"]
 
 
 class State(IntEnum):
@@ -20,6 +24,14 @@ class State(IntEnum):
     ENABLED = 1
     PAUSED = 2
     FAULT = 3
+
+
+class Desired(IntEnum):
+    """Where an arm is told to go; what `desired_state` says unless the arm is paused or in fault."""
+
+    DISABLED = 0
+    ENABLED = 1
+    HOMED = 2
 
 
 _COMMANDS = {
@@ -38,3 +50,27 @@ def refusal(state: State, command: str) -> str | None:
     if command not in _COMMANDS[state]:
         return f"state_command '{command}' is refused in state {state.name}, which takes {', '.join(_COMMANDS[state])}"
     return None
+
+
+class Repeats:
+    """Finds state commands that come a second time: latched, they do so whenever a client's connection is made anew."""
+
+    _KEPT = 8
+    """How many commands are remembered; more clients than that do not command one arm."""
+
+    def __init__(self) -> None:
+        """Remember none."""
+        self.state = np.zeros((self._KEPT, 3))
+        """Stamps (s, ns) and checksums of the commands heeded last, the newest first."""
+
+    def refusal(self, message: StringStamped) -> str | None:
+        """Return why a command that was heeded before is not heeded again, else None, and remember it; one without a stamp is always new."""
+        stamp = message.header.stamp
+        if not (stamp.sec or stamp.nanosec):
+            return None
+        mark = np.array([stamp.sec, stamp.nanosec, crc32(message.string.encode())], np.float64)
+        if (self.state == mark).all(axis=1).any():
+            return f"state_command '{message.string}' of time {stamp.sec}.{stamp.nanosec:09d} s is refused: it was heeded before; a new one has a new stamp"
+        self.state[1:] = self.state[:-1].copy()
+        self.state[0] = mark
+        return None

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
+from controllers.motion.equipment import endoscope_type, tool_type
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.mounted import MountedEcm, MountedPsm
@@ -45,6 +46,11 @@ class PsmParams(MountedPsm):
         """Where the arm goes to be homed."""
         return psm.home(self.tool)
 
+    @property
+    def equipment(self) -> tuple[Literal["tool_type"], str]:
+        """What the arm holds: the event that tells it, and its name there."""
+        return "tool_type", tool_type(self.tool)
+
 
 class EcmParams(MountedEcm):
     """The endoscope camera manipulator: which endoscope it holds, and where it is until it is measured."""
@@ -58,6 +64,11 @@ class EcmParams(MountedEcm):
     def home(self) -> tuple[float, ...]:
         """Where the arm goes to be homed."""
         return ecm.HOME
+
+    @property
+    def equipment(self) -> tuple[Literal["endoscope_type"], str]:
+        """What the arm holds: the event that tells it, and its name there."""
+        return "endoscope_type", endoscope_type(self.endoscope)
 
 
 class Arms(Params):
@@ -98,10 +109,10 @@ class MotionParams(Params):
         default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
     )
     setup_joints: SetupJoints = SetupJoints()
-    reference: Literal["camera", "base"] = Field(
+    reference: Literal["camera", "base", "world"] = Field(
         default="camera",
         description="frame of measured_cp and of Cartesian commands: the camera view, as on the real system (the ECM itself: the cart; without an ECM: base),"
-        " or each arm's own base",
+        " each arm's own base, or the world, where set_base_frame says anew where a free arm's base is taken to stand",
     )
     initial_state: Literal["disabled", "homed"] = Field(default="disabled", description="operating state at time 0")
     power_time: Duration = Field(default=100_000_000, ge=0, description="from `enable` to ENABLED; the real arm takes 3 s")

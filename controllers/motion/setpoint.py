@@ -24,7 +24,7 @@ _LOOKS = 200
 _PASSING = 1e-9
 """rad and m by which rounding may carry a trajectory past a joint's range. What hides between two looks is clipped as it comes."""
 _ROWS = 8
-_SCALARS = 6
+_SCALARS = 8
 
 
 class Activity(IntEnum):
@@ -34,6 +34,7 @@ class Activity(IntEnum):
     FOLLOW = 1
     MOVE = 2
     BRAKE = 3
+    DRIFT = 4
 
 
 class Setpoint:
@@ -52,7 +53,8 @@ class Setpoint:
         self.position, self.velocity, self._acceleration_now, self.goal, self._arrival = rows[:5]
         self._origin = rows[5:]  # position, velocity and acceleration where the trajectory starts
         scalars = self.state[_ROWS * n :]
-        self._activity, self._elapsed, self._ratio, self._since, self._waiting, self._pending = (scalars[i : i + 1] for i in range(_SCALARS))
+        self._activity, self._elapsed, self._since, self._waiting, self._pending, self._stated = (scalars[i : i + 1] for i in range(6))
+        self._ratio = scalars[6:]  # of velocity, and of acceleration and jerk
         self._ruckig, self._trajectory = Ruckig(n), Trajectory(n)
 
     @property
@@ -71,26 +73,36 @@ class Setpoint:
         self.goal[:] = self.position
         self._rest()
 
-    def follow(self, goal: Vector, h: float) -> None:
+    def follow(self, goal: Vector, h: float, velocity: Vector | None = None) -> None:
         """Go to `goal`, shape (n,), inside the ranges, the newest of a stream or a single one; `h` is the step (s).
 
-        Of a stream the setpoint reaches each goal when the next is due, with the stream's own velocity, so it neither lags by more
-        than that nor stops in between.
+        Of a stream the setpoint reaches each goal when the next is due, in a straight line from the last one, so it neither lags by
+        more than that nor stops in between. Where the sender states the velocity at the goal, shape (n,), it gets there in a cubic.
         """
         streaming = self.activity is Activity.FOLLOW and self._since[0] <= STREAM_GAP
         interval = max(float(self._since[0]), h) if streaming else h
-        self._arrival[:] = _clip((goal - self.goal) / interval, -self._velocity, self._velocity) if streaming else 0.0
+        self._stated[0] = velocity is not None
+        if velocity is None and streaming:
+            velocity = (goal - self.goal) / interval
+        self._arrival[:] = 0.0 if velocity is None else _clip(velocity, -self._velocity, self._velocity)
         self.goal[:] = goal
         self._waiting[0], self._since[0], self._pending[0] = interval, 0.0, 0.0
         self._activity[0] = Activity.FOLLOW
 
-    def move(self, goal: Vector, ratio: float = 1.0) -> None:
+    def drift(self, velocity: Vector) -> None:
+        """Go on with `velocity`, shape (n,), for as long as it is told again within `STREAM_GAP`; else, and at a range's end, come to rest."""
+        self._arrival[:] = _clip(velocity, -self._velocity, self._velocity)
+        self._since[0], self._pending[0] = 0.0, 0.0
+        self._activity[0] = Activity.DRIFT
+
+    def move(self, goal: Vector, ratio: Vector) -> None:
         """Start a trajectory from the present state to rest at `goal`, shape (n,), inside the ranges.
 
-        `ratio` scales velocity, acceleration and jerk. If the setpoint is too fast to stay inside the ranges on the way, it brakes first.
+        `ratio`, shape (2,), scales the velocity, and the acceleration with the jerk. If the setpoint is too fast to stay inside the
+        ranges on the way, it brakes first.
         """
         self.goal[:] = goal
-        self._ratio[0] = ratio
+        self._ratio[:] = ratio
         self._origin[:] = self.position, self.velocity, self._acceleration_now
         if self._plan():
             self._activity[0], self._elapsed[0], self._pending[0] = Activity.MOVE, 0.0, 0.0
@@ -112,6 +124,10 @@ class Setpoint:
         if activity is Activity.FOLLOW:
             self._follow(h)
             return False
+        if activity is Activity.DRIFT and self._since[0] <= STREAM_GAP:
+            most_down, most_up = self._fastest(np.array([self.position - self._lower, self._upper - self.position]), h)
+            self._steer(self._arrival, most_down, most_up, h)
+            return False
         return self._slow_down(h)
 
     def restored(self) -> None:
@@ -125,10 +141,10 @@ class Setpoint:
 
     def _plan(self) -> bool:
         """Compute the trajectory from `_origin` to `goal`; return whether there is one that stays inside the ranges."""
-        request, ratio = InputParameter(self._n), float(self._ratio[0])
+        request, (faster, harder) = InputParameter(self._n), self._ratio.tolist()
         request.current_position, request.current_velocity, request.current_acceleration = self._origin
         request.target_position = self.goal
-        request.max_velocity, request.max_acceleration, request.max_jerk = (ratio * limit for limit in (self._velocity, self._acceleration, self._jerk))
+        request.max_velocity, request.max_acceleration, request.max_jerk = faster * self._velocity, harder * self._acceleration, harder * self._jerk
         try:
             result = self._ruckig.calculate(request, self._trajectory)
         except RuckigError:
@@ -160,7 +176,21 @@ class Setpoint:
         wait = max(float(self._waiting[0]), h)
         away = self.goal - self.position - wait * self._arrival  # from where a setpoint that is in time would be now
         most, most_down, most_up = self._fastest(np.array([np.abs(away), self.position - self._lower, self._upper - self.position]), h)
-        wanted = self._arrival + _clip(away / wait, -most, most)
+        faster = self._bend(wait, h) if self._stated[0] else away / wait
+        self._steer(self._arrival + _clip(faster, -most, most), most_down, most_up, h)
+        self._waiting[0] = max(wait - h, 0.0)
+        if not self._waiting[0]:
+            self._arrival[:] = self._stated[0] = 0.0
+
+    def _bend(self, wait: float, h: float) -> Vector:
+        """Return by how much the next step's velocity, shape (n,), is over that of arrival, on the cubic that arrives after `wait` seconds."""
+        mean = (self.goal - self.position) / wait
+        now, then = self.velocity - mean, self._arrival - mean  # the cubic less the straight line
+        share = h / wait
+        return mean + now - share * (2.0 * now + then) + share * share * (now + then) - self._arrival
+
+    def _steer(self, wanted: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
+        """Take a step with the velocity nearest to `wanted`, shape (n,), that the limits and the way left to either side allow."""
         room = h * self._most
         wanted = _clip(_clip(wanted, -self._velocity, self._velocity), self.velocity - room, self.velocity + room)
         self.velocity[:] = _clip(wanted, -most_down, most_up)
@@ -168,9 +198,6 @@ class Setpoint:
         self.position[:] = _clip(self.position, self._lower, self._upper)
         self._acceleration_now[:] = 0.0
         self._since[0] += h
-        self._waiting[0] = max(wait - h, 0.0)
-        if not self._waiting[0]:
-            self._arrival[:] = 0.0
 
     def _fastest(self, distance: Vector, h: float) -> Vector:
         """Return the largest velocity, shape (..., n), from which steps of `h` come to rest within `distance`, shape (..., n).
@@ -191,7 +218,7 @@ class Setpoint:
             return False
         if self._pending[0]:
             self._acceleration_now[:] = 0.0
-            self.move(self.goal.copy(), float(self._ratio[0]))
+            self.move(self.goal.copy(), self._ratio.copy())
             return False
         self.goal[:] = self.position
         self._rest()

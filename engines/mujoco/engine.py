@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 import numpy as np
 
 from engines.mujoco import opengl
-from engines.mujoco.params import MujocoParams
+from engines.mujoco.params import MujocoParams, PsmParams
 from engines.mujoco.ports import bond_sides, scene_ports
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
@@ -77,6 +77,7 @@ class MujocoEngine(Stepped):
 
         from engines.mujoco import holding, model
         from engines.mujoco.readings import Readings, place
+        from engines.mujoco.rigid_contact import RigidContact
         from engines.mujoco.servos import Servos
 
         mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)  # else MuJoCo writes MUJOCO_LOG.TXT where the user stands
@@ -91,7 +92,9 @@ class MujocoEngine(Stepped):
         self._readings = Readings(self._model, self._data, self.params.arms, self._servos)
         self._brakes = holding.Brakes(self._model, self._data, self.params)
         self._holding = holding.Holding(self._model, self._data, self.params, self.params.publish_period * 1e-9)
-        self._outputs.update({**self._readings.outputs, **self._holding.outputs})
+        psms = (arm for arm, params in self.params.arms.items() if isinstance(params, PsmParams))
+        self._rigid = RigidContact(self._model, self._data, psms)
+        self._outputs.update({**self._readings.outputs, **self._holding.outputs, **self._rigid.outputs})
         self._couple(setup)
         self._readings.refresh()
         self._holding.refresh()
@@ -128,6 +131,7 @@ class MujocoEngine(Stepped):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
         model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
+        add_rigid = self._rigid.add
         self._servos.begin(inputs)
         self._brakes.set(on="ECM" in self._servos.off)
         for touching in self._touching:
@@ -137,7 +141,9 @@ class MujocoEngine(Stepped):
                 for touching in self._renewed:
                     touching.renew(tau * 1e-9)
             step2(model, data)
+            add_rigid()
             step1(model, data)
+        self._rigid.end()
         for touching in self._touching:
             touching.end()
         self._readings.update()

@@ -68,6 +68,9 @@ def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[P
     if has_probe(params) or has_spheres(params):
         felt = "mean over the last step of the force through the bonds on the instrument, with its moment about the tip: what a haptic device feels"
         yield Port(name=f"{arm}/tip_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt)
+    if isinstance(params, PsmParams):
+        felt = "the same of rigid contacts: table, objects, cart, other arms; an object in the jaws pulls with its weight"
+        yield Port(name=f"{arm}/rigid_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt)
 
 
 def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:

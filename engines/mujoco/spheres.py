@@ -7,13 +7,11 @@ import numpy as np
 
 from engines.mujoco.effective_mass import effective_mass
 from engines.mujoco.model import CONTACT
+from engines.mujoco.moment import moment
 from hub.bond import MotionSide
 from hub.inputs import Inputs
-from schemas.vectors import Vector
 
 __all__ = ["Spheres"]
-
-_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class Spheres:
@@ -76,7 +74,7 @@ class Spheres:
     def _push(self, tau: float) -> None:
         self._force = self.motion.force(tau, self._position, self._velocity)
         self._forces[:] = self._force.reshape(-1, 3)
-        self._moments[:] = _cross(self._centres - self._masses.take(self._carriers, 0), self._forces)
+        self._moments[:] = moment(self._centres - self._masses.take(self._carriers, 0), self._forces)
         self._applied[self._bodies] = self._share @ self._loads
 
     def _book(self) -> None:
@@ -84,16 +82,11 @@ class Spheres:
         self._last[:] = self._position
 
     def _feel(self) -> None:
-        force, moment = self._forces.sum(axis=0), _cross(self._centres - self._tip, self._forces).sum(axis=0)
-        self._to_base.dot(force, self._tip_wrench[:3])
-        self._to_base.dot(moment, self._tip_wrench[3:])
+        self._to_base.dot(self._forces.sum(axis=0), self._tip_wrench[:3])
+        self._to_base.dot(moment(self._centres - self._tip, self._forces).sum(axis=0), self._tip_wrench[3:])
 
 
 def _sites(arm: str, model: mujoco.MjModel) -> list[int]:
     """Return the sites of the spheres in the order in which the instrument lists them, which is that of their sensors."""
     sensors = [model.sensor(i) for i in range(model.nsensor)]
     return [int(sensor.objid[0]) for sensor in sensors if sensor.name.startswith(f"{arm}/{CONTACT}/") and sensor.name.endswith("/position")]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a.take(_YZX, -1) * b.take(_ZXY, -1) - a.take(_ZXY, -1) * b.take(_YZX, -1)  # a quarter of the cost of np.cross

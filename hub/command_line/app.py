@@ -11,7 +11,7 @@ import typer
 from rich.logging import RichHandler
 from rich.text import Text
 
-from hub.command_line import hosting, looking, plugins, recordings, running
+from hub.command_line import certs, hosting, linking, looking, plugins, recordings, running
 from hub.command_line.display import console
 from schemas.errors import ScenarioError, TrocarError
 
@@ -36,12 +36,14 @@ for command in (
     recordings.recover,
     recordings.report,
     looking.ls,
+    linking.link,
     hosting.engine,
     hosting.device,
     looking.doctor,
     looking.schema,
 ):
     app.command()(command)
+app.add_typer(certs.app, name="certs")
 plugins.mount(app)
 
 

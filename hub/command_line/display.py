@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from types import TracebackType
 from typing import Any, Self
 
@@ -16,7 +16,7 @@ from rich.table import Table
 from hub.summary import Progress
 from schemas.scenario import Scenario
 
-__all__ = ["RunProgress", "console", "show", "table"]
+__all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]
 
 _UNITS = {"s": "s", "n": "N", "j": "J", "m": "m"}
 
@@ -37,6 +37,21 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
         typer.echo(json.dumps(result, indent=2, default=str))
         return
     console.print(table(_readable(name, value) for name, value in result.items() if value is not None and not isinstance(value, dict)))
+    if rows := list(latency_rows(result.get("latency", {}))):
+        console.print()
+        console.print(table(rows, *LATENCY_COLUMNS))
+
+
+LATENCY_COLUMNS = ("latency", "stream", "count", "p50", "p99", "largest")
+
+
+def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Iterator[tuple[object, ...]]:
+    """Yield the rows of a summary's latency; nothing where no device takes part."""
+    if latency.keys() <= {"grant to state"}:
+        return
+    for way, streams in latency.items():
+        for stream, row in streams.items():
+            yield way, stream, row["count"], *(f"{1e3 * row[name]:.3f} ms" for name in ("p50_s", "p99_s", "largest_s"))
 
 
 def _readable(name: str, value: Any) -> tuple[str, str]:

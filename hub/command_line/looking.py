@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
 from hub import doctor as doctor_module
-from hub.command_line.display import console, table
+from hub.command_line.display import LATENCY_COLUMNS, console, latency_rows, table
+from hub.command_line.hosting import Certificates
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
+from hub.latency import by_way
 from hub.launch import plan_of
 from hub.plan import Plan
 from hub.scenario_file import load
 from hub.scenario_schema import scenario_schema
+from schemas.trocar_msgs import SessionStatus
 
 __all__ = ["check", "doctor", "ls", "schema"]
 
@@ -51,19 +55,46 @@ def _print_plan(plan: Plan) -> None:
 def ls(
     *,
     connect: Annotated[list[str] | None, typer.Option(metavar="ENDPOINT", help="Where a hub listens; by default all of this machine's are asked.")] = None,
+    certs: Certificates = None,
     as_json: Json = False,
 ) -> None:
-    """List the sessions that are running, and their participants."""
+    """List the sessions that are running: participants, the clocks and links of devices, and how long things take."""
     from hub.endpoint import listening_endpoints
     from hub.live import live_sessions
 
-    sessions = live_sessions(connect or listening_endpoints())
+    sessions = live_sessions(connect or listening_endpoints(), certs)
     if as_json:
-        members = [{"session": s.session, "participants": [p.model_dump() for p in s.participants]} for s in sessions]
-        typer.echo(json.dumps(members, indent=2))
+        typer.echo(json.dumps([_session_row(status) for status in sessions], indent=2))
+        return
+    out = Console(highlight=False)
+    if not sessions:
+        out.print("no session is running")
         return
     rows = [(s.session, s.state, p.name, p.role, p.host, p.pid, p.step) for s in sessions for p in s.participants]
-    Console(highlight=False).print(table(rows, "session", "state", "name", "role", "host", "pid", "step") if rows else "no session is running")
+    out.print(table(rows, "session", "state", "name", "role", "host", "pid", "step"))
+    for columns, of_session in ((_DEVICE_COLUMNS, _device_rows), (LATENCY_COLUMNS, _latency_rows)):
+        if told := [(status.session, *row) for status in sessions for row in of_session(status)]:
+            out.print()
+            out.print(table(told, "session", *columns))
+
+
+_DEVICE_COLUMNS = ("device", "its clock to the hub's", "known within", "link")
+
+
+def _session_row(status: SessionStatus) -> dict[str, Any]:
+    shown = {"participants": status.participants, "devices": status.devices, "latency": status.latencies}
+    return {"session": status.session} | {name: [one.model_dump() for one in found] for name, found in shown.items()}
+
+
+def _device_rows(status: SessionStatus) -> Iterator[tuple[str, ...]]:
+    for device in status.devices:
+        known = device.round_trip_ns >= 0
+        offset = f"{device.offset_ns / 1e6:+.3f} ms" if known else "the same"
+        yield device.device, offset, f"{device.round_trip_ns / 2e6:.3f} ms" if known else "-", device.link or "-"
+
+
+def _latency_rows(status: SessionStatus) -> Iterator[tuple[object, ...]]:
+    return latency_rows(by_way(status.latencies))
 
 
 def doctor(*, as_json: Json = False) -> None:

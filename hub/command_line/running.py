@@ -8,7 +8,9 @@ from typing import Annotated, Literal
 import typer
 
 from hub.command_line.display import RunProgress, console, show
-from hub.command_line.scenarios import Json, Listen, Overrides, ScenarioName, locating
+from hub.command_line.hosting import Certificates
+from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
+from hub.endpoint import parted
 from hub.launch import launch
 from hub.scenario_file import load
 
@@ -27,14 +29,19 @@ def run(
     record: Annotated[Path | None, typer.Option(metavar="DIR", callback=_is_new, help="Record to a new rosbag2 directory.")] = None,
     overrides: Overrides = None,
     pace: Annotated[Literal["fast", "realtime"] | None, typer.Option(help="Instead of the scenario's own.")] = None,
-    listen: Listen = None,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENDPOINT", help="Where to listen beside loopback, such as tls/0.0.0.0:7447; or where on loopback. May be repeated."),
+    ] = None,
+    certs: Certificates = None,
     one_host: Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")] = False,
     as_json: Json = False,
 ) -> None:
     """Run a scenario."""
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
+    inside, outside = parted(listen or ())
     with locating(file.source):
-        session = launch(file, endpoint=listen, record=record, one_host=one_host)
+        session = launch(file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host)
         with RunProgress(session.scenario) as progress:
             summary = session.run(progress)
     show(summary.as_dict(), as_json=as_json)

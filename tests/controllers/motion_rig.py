@@ -8,8 +8,22 @@ from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
 from hub.inputs import Inputs
 from hub.participant import Setup
-from schemas.crtk import StringStamped
-from schemas.ros import EmptyMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
+from schemas.crtk import CartesianImpedance, CartesianImpedanceHalfPlaneGains, CartesianState, StringStamped
+from schemas.ros import (
+    BoolMessage,
+    EmptyMessage,
+    Float64Message,
+    Header,
+    JointState,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Twist,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
 
 H = 1_000_000
 HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
@@ -40,7 +54,7 @@ class Rig:
         events = {}
         for name, order in orders.items():
             port = name.replace("__", "/")
-            events[port if port.startswith(("PSM", "ECM")) else f"PSM1/{port}"] = order if isinstance(order, tuple) else (order,)
+            events[port if port.startswith(("PSM", "ECM", "SUJ")) else f"PSM1/{port}"] = order if isinstance(order, tuple) else (order,)
         self.heard = {}
         for _ in range(count):
             self.inputs._events = events
@@ -91,12 +105,43 @@ def jf(*values):
 def cp(pose, frame=""):
     x, y, z, *q = (float(value) for value in pose)
     orientation = Quaternion.model_construct(**dict(zip("xyzw", q, strict=True)))
-    return PoseStamped(header=Header(frame_id=frame), pose=Pose(position=Point(x=x, y=y, z=z), orientation=orientation))
+    return PoseStamped.model_construct(
+        header=Header(frame_id=frame), pose=Pose.model_construct(position=Point.model_construct(x=x, y=y, z=z), orientation=orientation)
+    )
+
+
+def two_vectors(values):
+    return (Vector3.model_construct(**dict(zip("xyz", map(float, part), strict=True))) for part in (values[:3], values[3:]))
 
 
 def cf(*values, frame=""):
-    force, torque = (Vector3(**dict(zip("xyz", map(float, part), strict=True))) for part in (values[:3], values[3:]))
-    return WrenchStamped(header=Header(frame_id=frame), wrench=Wrench(force=force, torque=torque))
+    force, torque = two_vectors(values)
+    return WrenchStamped.model_construct(header=Header(frame_id=frame), wrench=Wrench.model_construct(force=force, torque=torque))
+
+
+def cs(pose=None, twist=None, wrench=None, frame=""):
+    """A Cartesian state that states what is given."""
+    parts = {"header": Header(frame_id=frame)}
+    if pose is not None:
+        parts |= {"pose": cp(pose).pose, "pose_is_valid": BoolMessage(data=True)}
+    if twist is not None:
+        linear, angular = two_vectors(twist)
+        parts |= {"twist": Twist.model_construct(linear=linear, angular=angular), "twist_is_valid": BoolMessage(data=True)}
+    if wrench is not None:
+        parts |= {"wrench": cf(*wrench).wrench, "wrench_is_valid": BoolMessage(data=True)}
+    return CartesianState.model_construct(**(CartesianState().__dict__ | parts))
+
+
+def ci(pose, frame="", **gains):
+    """A Cartesian impedance about `pose`: gains by side and name, such as `position_positive={"p": (0, 0, -200)}`."""
+    goal = cp(pose).pose
+    sides = {
+        side: CartesianImpedanceHalfPlaneGains(**{name: Vector3(**dict(zip("xyz", map(float, v), strict=True))) for name, v in row.items()})
+        for side, row in gains.items()
+    }
+    at = Vector3.model_construct(x=goal.position.x, y=goal.position.y, z=goal.position.z)
+    parts = {"header": Header(frame_id=frame), "force_position": at, "force_orientation": goal.orientation, "torque_orientation": goal.orientation}
+    return CartesianImpedance.model_construct(**(CartesianImpedance().__dict__ | parts | sides))
 
 
 EMPTY = EmptyMessage()

@@ -13,7 +13,7 @@ from robots.dvrk import arms
 from schemas.crtk import StringStamped
 from schemas.errors import StateError
 from schemas.ros import BoolMessage, Float64Message, Header, JointState, Point, Pose, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
-from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, cp, jf, jp, ratio
+from tests.controllers.motion_rig import CART, EMPTY, HOME, H, Rig, cf, ci, cp, cs, jf, jp, ratio
 
 CHAIN = arms.chain("PSM1")
 GOAL = HOME + np.array([0.1, -0.1, 0.02, 0.2, 0.1, -0.1])
@@ -25,6 +25,9 @@ MOTIONS = {
     "servo_jr": jp(*[0.001] * 6),
     "servo_jf": jf(*[0.0] * 6),
     "servo_cp": cp([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], "PSM1_base"),
+    "servo_cr": cp([0.001, 0.0, 0.0, 0, 0, 0, 1]),
+    "servo_cs": cs([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], frame="PSM1_base"),
+    "servo_ci": ci([0.0, 0.0, -0.12, 0, 0, 0, 1]),
     "body__servo_cf": cf(*[0.0] * 6),
     "spatial__servo_cf": cf(*[0.0] * 6),
     "move_jp": jp(*GOAL),
@@ -56,6 +59,31 @@ def test_home_powers_then_homes():
     rig.until_idle()
     assert rig.states() == [("ENABLED", True, False)]
     assert np.allclose(rig.setpoint, HOME, atol=1e-12)
+
+
+def test_homing_that_is_paused_goes_on_when_it_is_resumed():
+    rig = Rig({"PSM1": {"instrument": "400006", "start": GOAL}}, initial_state="disabled").step().command("home").step(200)
+    assert rig.command("pause").states() == [("PAUSED", False, False)]
+    rig.step(100)
+    before = rig.setpoint
+    assert (rig.step(100).setpoint == before).all()
+    assert rig.command("resume").states() == [("ENABLED", False, True)]
+    assert rig.until_idle().states() == [("ENABLED", True, False)]
+    assert np.allclose(rig.setpoint, HOME, atol=1e-12)
+
+
+def test_a_stream_of_joints_may_state_its_velocity():
+    lag = {}
+    for stated in (False, True):
+        rig, errors = Rig().step(), []
+        for k in range(0, 1000, 10):
+            angle, spread = 2 * np.pi * 0.5 * (k + 10) * 1e-3, np.array([1, 1, 0.2, 1, 1, 1])
+            goal, velocity = HOME + 0.05 * (1 - np.cos(angle)) * spread, 0.05 * np.pi * np.sin(angle) * spread
+            before = rig.step(9, servo_jp=JointState(position=goal, velocity=velocity if stated else np.zeros(6))).setpoint
+            errors.append(np.abs((rig.step().setpoint - before) / 1e-3 - velocity).max())
+        lag[stated] = max(errors[20:])
+        assert not rig.said("error")
+    assert lag[True] < 0.2 * lag[False]
 
 
 def test_home_of_a_homed_arm_moves_nothing_but_is_answered():
@@ -174,7 +202,7 @@ def test_a_move_that_is_taken_over_by_another_goes_on_to_the_new_goal():
     assert (rig.setpoint == HOME).all()
 
 
-@pytest.mark.parametrize("command", ["hold", "free", "servo_jp", "servo_jf", "body__servo_cf"])
+@pytest.mark.parametrize("command", [name for name in MOTIONS if not name.startswith(("jaw", "move"))])
 def test_a_move_that_is_taken_over_by_something_else_is_given_up(command):
     rig = Rig().step().step(200, move_jp=jp(*GOAL)).step(1, **{command: MOTIONS[command]})
     assert rig.said("goal_reached") == [False]
@@ -283,6 +311,30 @@ EVERY = [
             (raw_pose((0.3, 0.0, 0.3), TOP_DOWN), "allowed are"),
         ]
     ),
+    ("servo_cr", raw_pose((0.0, 0.0, NAN), (0.0, 0.0, 0.0, 1.0)), "every number must be finite"),
+    ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
+    ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "PSM2_base"), "frame 'PSM2_base', allowed are PSM1_base"),
+    ("servo_cr", raw_pose((0.0, 0.0, -0.5), (0.0, 0.0, 0.0, 1.0)), "pose cannot be reached: joint insertion at"),
+    ("servo_jp", JointState.model_construct(name=[], position=HOME, velocity=np.array([0.1]), effort=np.zeros(0)), "1 values of velocity, expected 6"),
+    ("servo_jp", JointState.model_construct(name=[], position=HOME, velocity=np.full(6, NAN), effort=np.zeros(0)), "every number must be finite"),
+    ("body__servo_cf", cf(1e308, 0, 1e308, 0, -1e308, 0), "allowed are numbers up to 1e+09"),
+    ("servo_cs", cs(twist=[1e300] * 6), "allowed are numbers up to 1e+09"),
+    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], position_positive={"p": (1e300, 0, 0)}), "allowed are numbers up to 1e+09"),
+    ("servo_ci", ci([0.0, NAN, -0.12, 0, 0, 0, 1]), "every number must be finite"),
+    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 0]), "norm 0, allowed is 1 within 0.001"),
+    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], "world"), "frame 'world', allowed are PSM1_base"),
+    *(
+        ("servo_cs", bad, reason)
+        for bad, reason in [
+            (cs([NAN, 0.0, -0.1, *TOP_DOWN]), "position [nan, 0.0, -0.1]: every number must be finite"),
+            (cs([0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 0.5]), "norm 0.5, allowed is 1 within 0.001"),
+            (cs([0.0, 0.0, -0.5, *TOP_DOWN]), "pose cannot be reached: joint insertion at"),
+            (cs(twist=[0.0, NAN, 0.0, 0.0, 0.0, 0.0]), "every number must be finite"),
+            (cs(wrench=[0.0] * 6, frame="world"), "frame 'world', allowed are PSM1_base"),
+            (cs([0.0, 0.0, -0.1, *TOP_DOWN], wrench=[0.0] * 6), "a wrench beside a pose or a twist, allowed is one or the other"),
+            (cs(twist=[0.0] * 6, wrench=[0.0] * 6), "a wrench beside a pose or a twist, allowed is one or the other"),
+        ]
+    ),
     *(
         (command, bad, reason)
         for command, size in (("servo_jf", 6), ("jaw__servo_jf", 1))
@@ -303,7 +355,11 @@ EVERY = [
             (jp(2.0), "joint jaw at 2 rad, allowed are -0.698132 .. 1.39626"),
         ]
     ),
-    *(("trajectory_j__set_ratio", Float64Message.model_construct(data=bad), "allowed are over 0 to 1") for bad in (NAN, -1.0, 1.1, np.inf)),
+    *(
+        (f"trajectory_j__set_ratio{which}", Float64Message.model_construct(data=bad), "allowed are over 0 to 1")
+        for bad in (NAN, -1.0, 1.1, np.inf)
+        for which in ("", "_v", "_a")
+    ),
 ]
 
 
@@ -319,7 +375,7 @@ def test_bad_input_is_refused_with_the_reason_and_changes_nothing(command, bad, 
     assert len(rig.said("error")) == 1
     assert rig.said("error")[0].startswith(f"PSM1: {command.replace('__', '/')} refused: ")
     assert reason in rig.said("error")[0]
-    assert not rig.states()
+    assert rig.states() == ([("ENABLED", True, False)] if "move" in command else [])
     for mine, others in zip(rig.motion._arms["PSM1"]._drives.state, twin.motion._arms["PSM1"]._drives.state, strict=True):
         assert (mine == others).all()
 
@@ -341,10 +397,20 @@ def test_a_refused_stream_is_told_the_same_once_in_two_seconds():
     assert told[1].endswith("(2000 times)")
 
 
-def test_a_ratio_is_told_and_slows_moves():
-    rig = Rig().step().step(10, trajectory_j__set_ratio=ratio(0.5))
-    assert rig.outputs["PSM1/trajectory_j/ratio"] == [0.5]
-    quick, slow = Rig().step().step(300, move_jp=jp(*GOAL)), rig.step(300, move_jp=jp(*GOAL))
+@pytest.mark.parametrize(
+    ("orders", "told"),
+    [
+        ({"set_ratio": 0.5}, [0.5, 0.5, 0.5]),
+        ({"set_ratio_v": 0.25}, [0.0, 0.25, 1.0]),
+        ({"set_ratio_a": 0.25}, [0.0, 1.0, 0.25]),
+        ({"set_ratio_v": 0.3, "set_ratio_a": 0.3}, [0.3, 0.3, 0.3]),
+    ],
+)
+def test_ratios_are_told_and_slow_moves(orders, told):
+    rig = Rig().step().step(10, **{f"trajectory_j__{name}": ratio(value) for name, value in orders.items()})
+    assert [float(rig.outputs[f"PSM1/trajectory_j/{name}"][0]) for name in ("ratio", "ratio_v", "ratio_a")] == told
+    goal = GOAL + np.array([0.9, 0, 0, 0, 0, 0])
+    quick, slow = Rig().step().step(600, move_jp=jp(*goal)), rig.step(600, move_jp=jp(*goal))
     assert slow.setpoint[0] < quick.setpoint[0]
 
 
@@ -363,9 +429,12 @@ def test_the_tip_is_seen_from_the_camera_through_the_setup_joints(arm):
     assert np.allclose(rotation.matrix(measured[3:]), expected["R"], atol=1e-8)
     local = arms.chain(arm, "400006" if arm != "ECM" else None).forward(np.array([0, 0, 0.12, 0, 0, 0])[: 4 if arm == "ECM" else 6])
     assert np.allclose(rig.outputs[f"{arm}/local/measured_cp"][:3], local[:3, 3], atol=1e-12)
+    base = rig.outputs[f"SUJ/{arm}/measured_cp"]
+    assert np.allclose(base[:3] + rotation.matrix(base[3:]) @ local[:3, 3], measured[:3], atol=1e-12)
     frames = {port.name: port.frame for port in rig.motion.ports}
     assert frames[f"{arm}/measured_cp"] == ("Cart" if arm == "ECM" else "ECM")
     assert frames[f"{arm}/local/measured_cp"] == f"{arm}_base"
+    assert frames[f"SUJ/{arm}/measured_cp"] == frames[f"{arm}/measured_cp"]
 
 
 def test_with_the_frame_of_the_view_the_tip_is_seen_a_quarter_turned_about_the_line_of_sight():

@@ -17,7 +17,7 @@ from robots.dvrk.setup_joints import SIMULATED
 from schemas.crtk import StringStamped
 from schemas.ports import Port
 from schemas.ros import BoolMessage
-from tests.controllers.motion_rig import EMPTY, HOME, H, cp, jf, jp
+from tests.controllers.motion_rig import EMPTY, HOME, H, ci, cp, jf, jp
 
 pytest.importorskip("mujoco")
 
@@ -135,6 +135,25 @@ def test_an_arm_that_is_free_is_held_against_gravity_gives_way_to_a_push_and_sta
     bench.step(500)
     assert np.linalg.norm(bench.tip(arm) - held) < 1e-4
     assert np.linalg.norm(held - there) > 0.01
+    assert not bench.complaints
+
+
+def test_a_tip_is_held_by_the_springs_of_an_impedance_and_comes_back():
+    bench, k = Bench(), 400.0
+    bench.step(200)
+    here = bench.told["PSM1/local/measured_cp"].copy()
+    sides = {f"position_{side}": {"p": (-k, -k, -k), "d": (-8, -8, -8)} for side in ("positive", "negative")}
+    sides |= {f"orientation_{side}": {"p": (-0.3, -0.3, -0.3), "d": (-0.005, -0.005, -0.005)} for side in ("positive", "negative")}
+    bench.step(1000, servo_ci=ci(here, **sides))
+    rest = bench.tip("PSM1")
+    bench.push("PSM1/wrist_yaw", [4.0, 0.0, 0.0])
+    bench.step(1000)
+    pushed = bench.tip("PSM1") - rest
+    bench.push("PSM1/wrist_yaw", [0.0, 0.0, 0.0])
+    bench.step(1000)
+    assert np.linalg.norm(rest - here[:3]) < 2e-3  # the springs of the arm against those of the impedance
+    assert 0.6 * 4.0 / k < pushed[0] < 1.1 * 4.0 / k  # dry friction bears the rest
+    assert np.linalg.norm(bench.tip("PSM1") - rest) < 0.4 * pushed[0]
     assert not bench.complaints
 
 

@@ -10,6 +10,7 @@ from robots.dvrk import arms
 H = 1e-3
 CHAIN = arms.chain("PSM1")
 START = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
+FULL = np.ones(2)
 
 
 def setpoint(at=START):
@@ -29,7 +30,7 @@ def run(made, steps):
 
 def test_a_move_ends_exactly_at_its_goal_and_keeps_to_the_limits_of_trajectories():
     made, goal = setpoint(), np.array([0.4, -0.3, 0.2, 1.0, -0.5, 0.7])
-    made.move(goal)
+    made.move(goal, FULL)
     q, v = run(made, 3000)
     assert made.activity is Activity.HOLD
     assert (q[-1] == goal).all()
@@ -41,13 +42,52 @@ def test_a_move_ends_exactly_at_its_goal_and_keeps_to_the_limits_of_trajectories
     assert np.isclose(np.abs(a).max(axis=0) / CHAIN.acceleration, 1.0, rtol=0.02).any()  # time-optimal: some joint is at its limit
 
 
-def test_a_ratio_slows_a_move_down():
+@pytest.mark.parametrize("ratios", [(0.25, 0.25), (0.25, 1.0), (1.0, 0.25)])
+def test_ratios_slow_a_move_down(ratios):
     made, slow = setpoint(), setpoint()
-    goal = START + np.array([0.3, 0, 0, 0, 0, 0])
-    made.move(goal)
-    slow.move(goal, 0.25)
-    assert np.abs(run(slow, 4000)[1]).max() < 0.6 * np.abs(run(made, 4000)[1]).max()
-    assert (slow.position == goal).all()
+    goal = START + np.array([0.8, 0, 0, 0, 0, 0])
+    made.move(goal, FULL)
+    slow.move(goal, np.array(ratios))
+    q, v = run(slow, 6000)
+    assert np.abs(v).max() < 0.7 * np.abs(run(made, 6000)[1]).max()
+    assert (q[-1] == goal).all()
+    assert (np.abs(v) <= ratios[0] * CHAIN.velocity * (1 + 1e-9)).all()
+    assert (np.abs(np.diff(v, axis=0)) / H <= ratios[1] * CHAIN.acceleration * (1 + 1e-6)).all()
+    assert (np.abs(np.diff(v, 2, axis=0)) / H**2 <= ratios[1] * CHAIN.jerk * (1 + 1e-4)).all()
+
+
+def test_a_stream_that_states_its_velocity_is_followed_without_lag():
+    made, period = setpoint(), 10
+    for k in range(0, 2000, period):
+        angle = 2 * np.pi * 0.25 * (k + period) * H  # where it is to be when the next goal comes
+        goal = START + 0.05 * np.sin(angle) * np.array([1, 1, 0.4, 1, 1, 1])
+        velocity = 0.05 * np.pi / 2 * np.cos(angle) * np.array([1, 1, 0.4, 1, 1, 1])
+        made.follow(goal, H, velocity)
+        _, v = run(made, period)
+        if k > 200:
+            assert np.abs(made.position - goal).max() < 1e-9
+            assert np.abs(np.diff(v, axis=0)).max() < 2e-3  # it does not stutter
+
+
+def test_a_velocity_is_kept_while_it_is_told_and_then_given_up():
+    made, velocity = setpoint(), np.array([0.2, 0, 0.01, 0, 0, -0.3])
+    for _ in range(10):
+        made.drift(velocity)
+        _, v = run(made, 50)
+    assert np.allclose(v[-1], velocity, rtol=1e-12)
+    run(made, 101)
+    _, v = run(made, 200)
+    assert made.activity is Activity.HOLD
+    assert not v[-1].any()
+
+
+def test_a_velocity_stops_at_the_end_of_a_range_and_leaves_the_other_joints_alone():
+    made, velocity = setpoint(), np.array([0.1, 0, 0.2, 0, 0, 0])
+    for _ in range(1000):
+        made.drift(velocity)
+        made.step(H)
+    assert made.position[2] == pytest.approx(CHAIN.upper[2], abs=1e-6)
+    assert made.velocity[0] == pytest.approx(0.1)
 
 
 def test_a_stream_at_the_step_is_followed_without_lag():
@@ -87,7 +127,7 @@ def test_a_move_from_full_speed_towards_a_limit_brakes_first():
     made.follow(START + np.array([1.588, 0, 0, 0, 0, 0]), H)
     run(made, 930)
     assert made.velocity[0] > 1.5
-    made.move(START)
+    made.move(START, FULL)
     assert made.activity is Activity.BRAKE
     assert made.is_moving
     q, _ = run(made, 5000)
@@ -108,7 +148,7 @@ def test_nothing_ever_jumps(start, orders):
         if order == "follow":
             made.follow(goal, H)
         elif order in ("move", "slow"):
-            made.move(goal, 1.0 if order == "move" else 0.3)
+            made.move(goal, FULL if order == "move" else 0.3 * FULL)
         elif order == "brake":
             made.brake()
         q0, v0 = made.position.copy(), made.velocity.copy()
@@ -126,9 +166,9 @@ def test_nothing_ever_jumps(start, orders):
 @given(goals, goals, st.integers(1, 400), st.sampled_from(["follow", "move", "brake"]))
 def test_a_saved_state_goes_on_with_the_same_bits(goal, other, steps, order):
     made, again = setpoint(), setpoint()
-    made.move(goal)
+    made.move(goal, FULL)
     run(made, steps)
-    {"follow": lambda: made.follow(other, H), "move": lambda: made.move(other), "brake": made.brake}[order]()
+    {"follow": lambda: made.follow(other, H), "move": lambda: made.move(other, FULL), "brake": made.brake}[order]()
     run(made, 20)
     again.state[:] = made.state
     again.restored()
@@ -138,7 +178,7 @@ def test_a_saved_state_goes_on_with_the_same_bits(goal, other, steps, order):
 @pytest.mark.parametrize("activity", ["follow", "move"])
 def test_a_goal_where_the_joints_are_moves_nothing(activity):
     made = setpoint()
-    made.follow(START, H) if activity == "follow" else made.move(START)
+    made.follow(START, H) if activity == "follow" else made.move(START, FULL)
     q, v = run(made, 5)
     assert np.allclose(q, START, atol=1e-15)
     assert not v.any()

@@ -3,7 +3,7 @@ import socket
 import pytest
 
 from hub import endpoint
-from hub.endpoint import require_loopback
+from hub.endpoint import is_loopback, require_loopback
 from schemas.errors import ConnectError, ScenarioError
 
 
@@ -32,6 +32,33 @@ def test_listeners_are_found(taken, monkeypatch):
         assert endpoint.listening_endpoints() == [f"tcp/127.0.0.1:{taken}"]
 
 
+def test_a_gate_is_not_taken_for_a_hub(monkeypatch):
+    with socket.create_server(("0.0.0.0", 0)) as gate:
+        monkeypatch.setattr(endpoint, "PORTS", [gate.getsockname()[1]])
+        assert endpoint.listening_endpoints() == []
+
+
+def test_the_hub_stays_on_loopback_beside_its_gate(taken):
+    inside, outside = endpoint.parted(["tls/0.0.0.0:7447"])
+    assert outside == ["tls/0.0.0.0:7447"]
+    assert is_loopback(inside)
+    assert endpoint.address(inside)[1] != 7447
+    assert endpoint.parted(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == ("tcp/127.0.0.1:5", ["tls/0.0.0.0:6", "tls/[::]:6"])
+    with pytest.raises(ScenarioError, match="once on loopback"):
+        endpoint.parted(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
+
+
+@pytest.mark.parametrize(("where", "parts"), [("tls/hub.example:7447", ("hub.example", 7447)), ("tcp/[::1]:80", ("::1", 80))])
+def test_an_endpoint_has_a_host_and_a_port(where: str, parts: tuple[str, int]) -> None:
+    assert endpoint.address(where) == parts
+
+
+@pytest.mark.parametrize("where", ["hub.example:7447", "tls/hub.example", "tls/:7447", "tls/hub.example:port"])
+def test_what_is_no_endpoint_is_refused_with_an_example(where: str) -> None:
+    with pytest.raises(ScenarioError, match="write tls/HOST:PORT"):
+        endpoint.address(where)
+
+
 @pytest.mark.parametrize("where", ["tcp/127.0.0.1:7447", "tcp/localhost:0", "tcp/[::1]:7447"])
 def test_a_hub_may_listen_on_loopback(where: str) -> None:
     assert require_loopback(where) == where
@@ -39,5 +66,5 @@ def test_a_hub_may_listen_on_loopback(where: str) -> None:
 
 @pytest.mark.parametrize("where", ["tcp/0.0.0.0:7447", "tcp/192.168.1.2:7447", "tcp/[::]:7447", "udp/127.0.0.1:7447", "tcp/hub:7447", "nonsense"])
 def test_a_hub_does_not_listen_elsewhere(where: str) -> None:
-    with pytest.raises(ScenarioError, match="loopback only"):
+    with pytest.raises(ScenarioError, match="a hub listens on loopback"):
         require_loopback(where)

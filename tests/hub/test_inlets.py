@@ -5,18 +5,19 @@ from hypothesis import strategies as st
 
 from hub import inlets as module
 from hub.inlets import Inlets
+from hub.wire import Stamp
 from schemas.codec import decode, encode
-from schemas.errors import MessageError
+from schemas.errors import LateError, MessageError
 from schemas.ros import Float64Message, Float64MultiArray, Joy
 from tests.hub.parts import Part, Stylus, into, out, plan_of
 
 FLOAT, JOY = Float64Message.ros_type, Joy.ros_type
 
 
-def inlets(clock="wall", age=0):
+def inlets(clock="wall", age=0, host="hub"):
     stylus = Stylus("stylus", out("value", type=FLOAT, clock=clock, max_age_ns=age), out("button", type=JOY, variability="event", clock=clock), out("unused"))
     engine = Part("engine", into("value", type=FLOAT), into("button", type=JOY, variability="event"), into("knob", size=2, start=(1.0, 2.0)))
-    return Inlets(plan_of(stylus, engine, connections=["stylus.value -> engine.value", "stylus.button -> engine.button"]))
+    return Inlets(plan_of(stylus, engine, connections=["stylus.value -> engine.value", "stylus.button -> engine.button"], specs={"stylus": {"host": host}}))
 
 
 def number(value):
@@ -116,3 +117,27 @@ def test_an_input_that_nothing_feeds_can_be_set():
     assert box.sample(0, 10**18) == []
     with pytest.raises(MessageError, match=r"'engine.value' cannot be set"):
         box.settable("engine", "value")
+
+
+def test_what_comes_late_or_twice_is_refused():
+    box = inlets(host="remote")
+
+    def offer(sequence, *, admission=1, value=0.0):
+        box.offer("stylus", "value", number(value), 10**9, Stamp(admission, sequence, 10**9 - 3_000_000))
+
+    offer(1, value=1.0)
+    offer(3, value=3.0)
+    for old in (3, 2):
+        with pytest.raises(LateError, match=f"sample {old} of 'stylus.value' comes late: 3 was here before it"):
+            offer(old)
+    offer(1, admission=2, value=7.0)  # the device has joined anew
+    with pytest.raises(LateError):
+        offer(4)
+    assert entering(box.sample(0, 10**9 + 2_000_000)) == [("value", 7.0)]
+    assert box.latencies.messages() == []  # as long as the clock of its host is not known
+    box.offsets_ns["stylus"] = 1_000_000
+    offer(2, admission=2)
+    box.sample(0, 10**9 + 2_000_000)
+    (latency,) = box.latencies.messages()
+    assert (latency.stream, latency.count) == ("stylus.value", 1)
+    assert latency.p50_s == pytest.approx(0.004, rel=0.02)

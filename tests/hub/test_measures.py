@@ -10,7 +10,7 @@ from tests.hub.parts import Part, out, plan_of
 from tests.strategies import vectors
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
-KINDS = ("peak", "peak-norm", "mean", "final", "drop")
+KINDS = ("peak", "peak-norm", "least", "mean", "final", "drop", "swing")
 
 
 def measures(of, part):
@@ -23,10 +23,12 @@ def measures(of, part):
 def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
     found = measures("a.out.force", Part("a", out(type=WRENCH)))
     for value in values:
-        found.take("a", "out", value)
+        found.take("a", "out", value, 0)
     norms = [np.linalg.norm(value[:3]) for value in values]
     drop = max(norms) - min(norms[np.argmax(norms) :])
-    assert found.results() == pytest.approx({"peak": max(norms), "peak_norm": max(norms), "mean": np.mean(norms), "final": norms[-1], "drop": drop})
+    swing = np.ptp([value[:3] for value in values], axis=0).max()
+    expected = {"peak": max(norms), "peak_norm": max(norms), "least": min(norms), "mean": np.mean(norms), "final": norms[-1], "drop": drop, "swing": swing}
+    assert found.results() == pytest.approx(expected)
     assert found.live() == {"final": (pytest.approx(norms[-1]), "N")}
 
 
@@ -34,9 +36,10 @@ def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
 def test_a_single_number_keeps_its_sign_unless_the_norm_is_asked_for(values):
     found = measures("a.out", Part("a", out()))
     for value in values:
-        found.take("a", "out", value)
+        found.take("a", "out", value, 0)
     numbers = np.concatenate(values)
-    expected = {"peak": numbers.max(), "peak_norm": np.abs(numbers).max(), "mean": numbers.mean(), "final": numbers[-1]}
+    expected = {"peak": numbers.max(), "peak_norm": np.abs(numbers).max(), "least": numbers.min(), "mean": numbers.mean(), "final": numbers[-1]}
+    expected |= {"swing": np.ptp(numbers)}
     expected["drop"] = numbers.max() - numbers[numbers.argmax() :].min()
     assert found.results() == pytest.approx(expected)
 
@@ -47,8 +50,17 @@ def test_the_time_above_a_level_is_that_of_the_longest_stretch():
     scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
     found = Measures(scenario, plan_of(part, measure=measure))
     for value in (0.6, 0.6, 0.4, 0.5, 0.6, 0.7, 0.1):
-        found.take("a", "out", np.array([value]))
+        found.take("a", "out", np.array([value]), 0)
     assert found.results() == {"held_s": pytest.approx(0.012)}
+
+
+def test_values_before_a_time_do_not_count():
+    measure = {"late": {"kind": "peak", "of": "a.out", "after": "2 s"}, "never": {"kind": "mean", "of": "a.out", "after": "9 s"}}
+    scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
+    found = Measures(scenario, plan_of(Part("a", out()), measure=measure))
+    for second, value in enumerate((5.0, 4.0, 3.0, 1.0, 2.0)):
+        found.take("a", "out", np.array([value]), second * 10**9)
+    assert found.results() == {"late": 3.0, "never": None}
 
 
 @pytest.mark.parametrize("measure", [{"kind": "time-above"}, {"kind": "peak", "level": 1.0}])

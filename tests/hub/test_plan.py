@@ -159,11 +159,12 @@ def test_an_order_names_stepped_participants():
 
 def test_devices():
     age, tighter = 50_000_000, 20_000_000
-    stylus = Stylus("stylus", out("pose", type=POSE, max_age_ns=age), into("force", type=POSE))
+    stylus = Stylus("stylus", out("pose", type=POSE, max_age_ns=age, clock="wall"), into("force", type=POSE))
     engine = Part("a", into(type=POSE, max_age_ns=tighter), into("other", type=POSE), out(type=POSE))
     plan = plan_of(stylus, engine, connections=["stylus.pose -> a.in", "stylus.pose -> a.other", "a.out -> stylus.force"])
     assert [(inlet.target_port, inlet.max_age_ns) for inlet in plan.inlets] == [("in", tighter), ("other", age)]
     assert [(outlet.source, outlet.device_port) for outlet in plan.outlets] == [("a", "force")]
+    assert plan.links == plan.meetings() == ()
     assert plan.order == ("a",)
     with pytest.raises(ScenarioError, match="a device cannot feed a device"):
         plan_of(stylus, connections=["stylus.pose -> stylus.force"])
@@ -228,7 +229,11 @@ def test_the_force_side_takes_whole_steps_of_the_motion_side():
 
 @pytest.mark.parametrize(
     ("of", "message"),
-    [("c.out", "unknown participant 'c'"), ("a.in", "no output 'in' to measure"), ("a.out.force", r"'a.out' has no field 'force'. Known: angular, linear")],
+    [
+        ("c.out", "unknown participant 'c'"),
+        ("a.in", "no output 'in' to measure"),
+        ("a.out.force", r"'a.out' has no field 'force'. Known: angular, angular.x, .*, linear, linear.x"),
+    ],
 )
 def test_measures_are_of_outputs(of, message):
     part = Part("a", out(type="geometry_msgs/msg/TwistStamped"), into(start=(0.0,)))
@@ -240,3 +245,38 @@ def test_measures_are_of_outputs(of, message):
 def test_a_plan_survives_json():
     plan = plan_of(motion(), force(), Stylus("s", out()), Part("c", into()), connections=["s.out -> c.in"], bonds=[{"motion": "a.tip", "force": "b.tip"}])
     assert Plan.model_validate_json(plan.model_dump_json()) == plan
+
+
+def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
+    stylus, scripted = Stylus("stylus", out("pose", type=POSE), into("force", type=POSE)), Stylus("scripted", out("pose", type=POSE))
+    plan = plan_of(stylus, scripted, Part("a", into(type=POSE), out(type=POSE)), connections=["stylus.pose -> a.in", "a.out -> stylus.force"])
+    assert plan.outlets == ()
+    assert [(link.source, link.target, link.fresh) for link in plan.links] == [("a", "stylus", False)]
+    assert [member.name for member in plan.meetings()] == ["stylus"]
+    assert plan.order == ("a",)
+
+
+def test_nothing_is_extrapolated_for_a_device():
+    stylus, engine = Stylus("stylus", out("pose", type=POSE), into("force", size=3)), Part("a", out(size=3))
+    with pytest.raises(ScenarioError, match="'stylus' is a device, which is written what is there"):
+        plan_of(stylus, engine, connections=[{"source": "a.out", "target": "stylus.force", "extrapolation": "linear"}])
+
+
+def test_a_device_in_wall_time_is_read_at_a_rate_of_its_own():
+    stylus = Stylus("stylus", out("pose", type=POSE, clock="wall"))
+    assert plan_of(stylus).members["stylus"].read_ns == 1_000_000
+    member = plan_of(stylus, specs={"stylus": {"period": "1.5 ms"}}).members["stylus"]
+    assert (member.period, member.read_ns) == (1, 1_500_000)
+    with pytest.raises(ScenarioError, match=r"period 0.01 ms: a device is read every 0.1 ms at most"):
+        plan_of(stylus, specs={"stylus": {"period": "0.01 ms"}})
+    with pytest.raises(ScenarioError, match=r"period 1.5 ms is no multiple of the step 1 ms"):
+        plan_of(Stylus("stylus", out("pose", type=POSE)), specs={"stylus": {"period": "1.5 ms"}})
+
+
+def test_a_link_is_for_devices():
+    link = {"preset": "100 ms", "loss": 0.01}
+    device = plan_of(Stylus("s", out("pose", type=POSE)), specs={"s": {"link": link}})
+    assert device.members["s"].link.delay_ns == 100_000_000
+    assert [member.name for member in device.meetings()] == ["s"]
+    with pytest.raises(ScenarioError, match=r"a link lies between a device and the hub, but 'a' is a engine"):
+        plan_of(Part("a", out()), specs={"a": {"link": link}})

@@ -17,7 +17,7 @@ import numpy as np
 from hub.bond import ForceSide, MotionSide
 from hub.participant import Device, Params, Sample, Stepped, state_hash
 from schemas.ports import BondSide, Port
-from schemas.ros import Header, Joy, Point, Pose, PoseStamped, StringMessage, Time
+from schemas.ros import Float64MultiArray, Header, Joy, Point, Pose, PoseStamped, StringMessage, Time
 
 SIZE = 3
 POSE, JOY, TEXT = PoseStamped.ros_type, Joy.ros_type, StringMessage.ros_type
@@ -86,6 +86,18 @@ class Chain(Bare):
 
     def state_hash(self):
         return self.digest
+
+
+class Loud(Bare):
+    """Gives 32 KiB in each step."""
+
+    ports = (Port(name="out", causality="output", size=4096),)
+
+    def configure(self, setup):
+        return {"out": np.zeros(4096)}
+
+    def step(self, t, h, inputs):
+        return {"out": np.zeros(4096)}
 
 
 class Talker(Chain):
@@ -211,6 +223,7 @@ class Player(Device):
         return (
             Port(name="hand", causality="output", type=POSE, frame="stylus_base", clock=clock, max_age_ns=age),
             Port(name="buttons", causality="output", type=JOY, variability="event", clock=clock),
+            Port(name="noise", causality="input", size=4096),
         )
 
     def open(self, directory):
@@ -231,6 +244,34 @@ class Player(Device):
             made.append((ms, Sample("buttons", joy)))
             self.next["buttons"] += 2
         return [sample for _, sample in sorted(made, key=lambda row: row[0])]
+
+    def close(self):
+        pass
+
+
+class Hand(Device):
+    """Lives in simulated time and says what it was told, folded: `numbers` in `a`, and how many words in `b`; what is said last was told first."""
+
+    ports = (
+        Port(name="numbers", causality="input", size=SIZE),
+        Port(name="words", causality="input", type=TEXT, variability="event"),
+        Port(name="out", causality="output", size=SIZE, max_age_ns=20_000_000),
+        Port(name="unused", causality="output", type=TEXT, variability="event"),
+    )
+
+    def open(self, directory):
+        self.told, self.heard = np.zeros(SIZE), 0
+
+    def write(self, port, value):
+        if port == "words":
+            assert value.data == f"word {self.heard}"
+            self.heard += 1
+        else:
+            self.told = (0.5 * self.told + value) % 1.0
+
+    def read(self, t):
+        said = self.told + np.array([0.0, t * 1e-9, 1e-3 * self.heard])
+        return [Sample("out", Float64MultiArray(data=said)), Sample("unused", StringMessage(data=f"{t}"))]
 
     def close(self):
         pass

@@ -140,8 +140,14 @@ def test_every_model_has_its_own_ros_type() -> None:
 
 
 def test_crtk_types_are_those_that_crtk_publishes() -> None:
-    """collaborative-robotics/crtk_msgs, msg/OperatingState.msg and msg/StringStamped.msg."""
+    """collaborative-robotics/crtk_msgs, msg/CartesianImpedance.msg and the others."""
+    sides = [f"{part}_{side}" for part in ("position", "orientation") for side in ("positive", "negative")]
+    parts = [("geometry_msgs/Pose", "pose"), ("geometry_msgs/Twist", "twist"), ("geometry_msgs/Wrench", "wrench")]
     published = {
+        "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "".join(f"geometry_msgs/Vector3 {name}\n" for name in ("p", "d", "bias", "deadband")),
+        "crtk_msgs/msg/CartesianImpedance": "std_msgs/Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3 force_position\n"
+        "geometry_msgs/Quaternion torque_orientation\n" + "".join(f"crtk_msgs/CartesianImpedanceHalfPlaneGains {side}\n" for side in sides),
+        "crtk_msgs/msg/CartesianState": "std_msgs/Header header\n" + "".join(f"{type_} {name}\nstd_msgs/Bool {name}_is_valid\n" for type_, name in parts),
         "crtk_msgs/msg/OperatingState": "std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n",
         "crtk_msgs/msg/StringStamped": "std_msgs/Header header\nstring string\n",
     }

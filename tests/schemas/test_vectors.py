@@ -130,6 +130,7 @@ def test_bytes_of_another_frame_are_refused() -> None:
 def test_fields_by_name() -> None:
     codec = VectorCodec(POSE)
     assert codec.fields["pose.position"] == codec.fields["position"] == slice(0, 3)
+    assert codec.fields["pose.orientation.w"] == codec.fields["orientation.w"] == slice(6, 7)
     assert VectorCodec(JOINTS).fields["effort"] == slice(3, 6)
 
 

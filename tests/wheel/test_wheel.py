@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.devices.standins import build as standins
+from tests.hub.authorities import free_port
+
 ROOT = Path(__file__).resolve().parents[2]
 CLEAN = {key: value for key, value in os.environ.items() if key not in {"PYTHONPATH", "PYTHONSAFEPATH", "VIRTUAL_ENV"}}
 
@@ -48,6 +51,11 @@ def base(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return install(f"{wheel}[all]", tmp_path_factory.mktemp("full") / "venv")
+
+
+@pytest.fixture(scope="session")
+def device_host(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return install(f"{wheel}[touch]", tmp_path_factory.mktemp("device_host") / "venv")
 
 
 @pytest.fixture
@@ -95,3 +103,36 @@ def test_with_all_extras_a_stray_module_in_the_working_directory_is_not_imported
     summary = json.loads(succeed(full / "trocar", "run", "palpation", "--set", "duration=20 ms", "--record", "recording", "--json", cwd=stray))
     assert summary["steps"] == 20
     succeed(full / "trocar", "verify", "recording", cwd=stray)
+
+
+def test_a_device_host_pulls_no_simulator(device_host, tmp_path):
+    names = succeed(device_host / "python", "-c", "import importlib.metadata as m; print(*(d.name for d in m.distributions()))", cwd=tmp_path).split()
+    assert "trocar" in names
+    assert not {"mujoco", "manifold3d", "pybullet", "pybullet-arm64", "fmpy", "ruckig", "matplotlib", "pyopenxr", "pygame-ce", "cryptography"} & {*names}
+
+
+@pytest.mark.skipif(not standins.USABLE, reason=standins.WHY_NOT)
+def test_a_device_host_joins_a_simulation_with_nothing_but_its_extra_and_its_certificate(full, device_host, tmp_path):
+    library = standins.compile_library("hd.c", tmp_path / "libHD.so")
+    certificates, carried, endpoint = tmp_path / "certs", tmp_path / "carried", f"tls/127.0.0.1:{free_port()}"
+    succeed(full / "trocar", "certs", "init", "127.0.0.1", "--dir", certificates, cwd=tmp_path)
+    succeed(full / "trocar", "certs", "issue", "stylus", "--dir", certificates, cwd=tmp_path)
+    carried.mkdir()
+    (certificates / "stylus.pem").rename(carried / "stylus.pem")
+    changes = {"kind": "touch", "host": "remote", "library": library, "styluses": "{right: {}}"}
+    overrides = [word for name, value in changes.items() for word in ("--set", f"participants.stylus.{name}={value}")]
+    run = [full / "trocar", "run", "table", *overrides, "--set", "duration=3 s", "--pace", "realtime", "--listen", endpoint, "--certs", certificates, "--json"]
+    with subprocess.Popen(run, cwd=tmp_path, env=CLEAN, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as hub:
+        joined: list[subprocess.Popen[str]] = []
+        try:
+            for line in hub.stderr:
+                if "waiting for" in line and not joined:
+                    join = [device_host / "trocar", "device", "stylus", "--connect", endpoint, "--certs", carried]
+                    joined.append(subprocess.Popen(join, cwd=tmp_path, env=CLEAN, stderr=subprocess.PIPE, text=True))
+            summary = json.loads(hub.stdout.read())
+        finally:
+            hub.kill()
+            for host in joined:
+                host.terminate()
+                told = host.communicate()[1]
+    assert summary["latency"]["device to grant"]["stylus.right/pose"]["count"] > 100, told

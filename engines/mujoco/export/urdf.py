@@ -19,6 +19,7 @@ from engines.mujoco.export.assets import FOLDER, file_of, numbers
 from engines.mujoco.model.names import FINGERS
 from robots import rotation
 from robots.dvrk.rolling_needle_driver import PADS, ROLLER
+from schemas.errors import ScenarioError
 from schemas.vectors import Vector
 
 __all__ = ["urdf"]
@@ -97,7 +98,7 @@ def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
         case mujoco.mjtGeom.mjGEOM_CAPSULE | mujoco.mjtGeom.mjGEOM_CYLINDER:  # URDF knows no capsule: its cylinder, without the caps
             SubElement(geometry, "cylinder", radius=repr(float(size[0])), length=repr(2.0 * float(size[1])))
         case _:
-            raise NotImplementedError(f"a shape of kind {kind} has no form in URDF")
+            raise ScenarioError(f"a shape of kind {kind} has no form in URDF")
 
 
 def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:

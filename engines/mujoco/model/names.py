@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["CONTACT", "FINGERS", "finger", "first_sensor", "probe_body", "sphere_site"]
+__all__ = ["CONTACT", "FINGERS", "finger", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
 
 FINGERS = ("jaw_left", "jaw_right")
 """Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right one towards -y."""
@@ -14,6 +14,11 @@ CONTACT = "contact"
 def probe_body(arm: str) -> str:
     """Return the name of the body whose origin and centre of mass is the centre of a palpation probe."""
     return f"{arm}/wrist_yaw"
+
+
+def instrument_body(arm: str) -> str:
+    """Return the name of the body that carries the shaft of a PSM's instrument, and on it all the rest."""
+    return f"{arm}/roll"
 
 
 def sphere_site(arm: str, sphere: str) -> str:

@@ -1,0 +1,123 @@
+"""CRTK's commands to the tip of one arm: from a message to what its drives are to do.
+
+Whatever is wrong with a command raises MotionError before anything has changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from controllers.motion import goals
+from controllers.motion.drives import Drives, WrenchFrame
+from controllers.motion.frames import BaseFrame, turned
+from robots.dvrk.cannula import Cannula
+from robots.dvrk.cart import inverse_pose
+from robots.dvrk.inverse import inverse as inverse_kinematics
+from robots.dvrk.setup_joints import CartArm
+from schemas.crtk import CartesianImpedance, CartesianState
+from schemas.errors import MotionError
+from schemas.ros import BoolMessage, PoseStamped, WrenchStamped
+from schemas.vectors import Vector
+
+__all__ = ["CartesianCommands"]
+
+_SINGULAR = 1e-6
+"""Singular values of the Jacobian below this share of the largest move no joint, as for the wrench that is told (`telemetry`)."""
+
+
+class CartesianCommands:
+    """What carries out the Cartesian commands of one arm, by their names, in `handlers`."""
+
+    def __init__(self, arm: CartArm, drives: Drives, base: BaseFrame, ratio: Vector, period: float) -> None:
+        """Take the arm, its drives, its base frame, the shares that moves use (shape (2,), read as it is then), and the controller's step (s)."""
+        self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
+        self._joints, self._chain = drives.joints, drives.joints.chain
+        self._cannula = Cannula.of(self._chain)
+        self.handlers: Mapping[str, Callable[[Any], None]] = {
+            "body/set_cf_orientation_absolute": self._set_cf_orientation_absolute,
+            "set_base_frame": self._set_base_frame,
+            "servo_cp": self._servo_cp,
+            "servo_cr": self._servo_cr,
+            "servo_cs": self._servo_cs,
+            "servo_ci": self._servo_ci,
+            "body/servo_cf": self._body_servo_cf,
+            "spatial/servo_cf": self._spatial_servo_cf,
+            "move_cp": self._move_cp,
+        }
+
+    def not_ready(self) -> str:
+        """Return why the arm takes no Cartesian commands; empty if it does."""
+        return "" if self._drives.cartesian[0] else self._cannula.not_past(self._joints.position)
+
+    def _set_cf_orientation_absolute(self, message: BoolMessage) -> None:
+        self._drives.absolute[0] = message.data
+
+    def _set_base_frame(self, message: PoseStamped) -> None:
+        self._base.check_free()
+        goals.check_frame(message.header.frame_id, self._base.reference)
+        self._base.place(goals.frame(message.pose))
+
+    def _servo_cp(self, message: PoseStamped) -> None:
+        self._drives.follow(self._joints, self._solve(message), self._period)
+
+    def _servo_cr(self, message: PoseStamped) -> None:
+        step = goals.frame(message.pose)
+        axes = self._from(message.header.frame_id)[:3, :3]
+        goal = self._chain.forward(self._joints.newest_goal)
+        goal[:3, 3] += axes @ step[:3, 3]
+        goal[:3, :3] = axes @ step[:3, :3] @ axes.T @ goal[:3, :3]
+        self._drives.follow(self._joints, self._inverse(goal), self._period)
+
+    def _servo_cs(self, message: CartesianState) -> None:
+        posed, moved, pushed = message.pose_is_valid.data, message.twist_is_valid.data, message.wrench_is_valid.data
+        frame = self._from(message.header.frame_id)
+        if pushed and (posed or moved):
+            raise MotionError("a wrench beside a pose or a twist, allowed is one or the other: the drives apply efforts or hold positions")
+        velocity = self._joint_velocity(turned(frame[:3, :3], goals.twist(message.twist))) if moved else None
+        if posed:
+            self._drives.follow(self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity)
+        elif velocity is not None:
+            self._drives.drift(velocity)
+        else:
+            wrench = goals.wrench(message.wrench) if pushed else np.zeros(6)
+            self._drives.press(turned(self._base.pose[:3, :3] @ frame[:3, :3], wrench), WrenchFrame.REFERENCE)
+
+    def _servo_ci(self, message: CartesianImpedance) -> None:
+        goals.check_frame(message.header.frame_id, self._base.reference)
+        self._drives.resist(message)
+
+    def _body_servo_cf(self, message: WrenchStamped) -> None:
+        goals.check_frame(message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip")
+        self._drives.press(goals.wrench(message.wrench), WrenchFrame.BODY)
+
+    def _spatial_servo_cf(self, message: WrenchStamped) -> None:
+        goals.check_frame(message.header.frame_id, self._base.local)
+        self._drives.press(goals.wrench(message.wrench), WrenchFrame.SPATIAL)
+
+    def _move_cp(self, message: PoseStamped) -> None:
+        self._drives.move(self._joints, self._solve(message), self._ratio)
+
+    def _solve(self, message: PoseStamped) -> Vector:
+        """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame."""
+        frame = self._from(message.header.frame_id)
+        return self._inverse(frame @ goals.frame(message.pose))
+
+    def _from(self, frame_id: str) -> Vector:
+        """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4); by default the reference."""
+        named = goals.check_frame(frame_id, self._base.reference, self._base.local)
+        return np.eye(4) if named == self._base.local else inverse_pose(self._base.pose)
+
+    def _inverse(self, tip: Vector) -> Vector:
+        """Return the joint positions, shape (n,), nearest to the setpoint, of a pose in the arm's base frame, shape (4, 4)."""
+        goal = inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
+        self._cannula.check(goal, self._joints.position)
+        return goal
+
+    def _joint_velocity(self, twist: Vector) -> Vector:
+        """Return the joint velocities, shape (n,), of a twist of the tip in the base frame: slower as a whole where a joint is at its limit."""
+        jacobian = self._chain.jacobian(self._chain.frames(self._joints.setpoint.position))
+        velocity = np.linalg.pinv(jacobian, rcond=_SINGULAR) @ twist
+        return velocity / max(1.0, float((np.abs(velocity) / self._chain.velocity).max()))

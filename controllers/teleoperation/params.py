@@ -1,0 +1,94 @@
+"""What a scenario may say about a hand that leads an instrument. SI units, radians, quaternions (x, y, z, w)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from controllers.teleoperation.contact_model import ForceParams, PlanesParams
+from hub.participant import Params
+from robots.dvrk import ecm, psm
+from robots.dvrk.instruments import Instrument, instrument
+from robots.dvrk.parameters import ArmName, InstrumentName, MountedPositions, UnitQuaternion, check_start, home
+from robots.serial_chain import SerialChain
+from schemas.quantity import Angle, Duration
+
+__all__ = ["Buttons", "TeleoperationParams"]
+
+_FOLDED = (0.0,) * 6
+"""The fingers of a hand, if the arm holds one, which no teleoperation moves."""
+
+
+def _orientation(data: dict[str, Any]) -> str:
+    return "follow" if data.get("law") == "velocity" else "hold"
+
+
+class Buttons(Params):
+    """Which button of the hand does what, counted from 0."""
+
+    clutch: int = Field(default=0, ge=0, description="frees the hand while it is pressed or, with `engage: held`, leads the arm only while it is pressed")
+    jaw: int = Field(default=1, ge=0, description="closes the jaw while it is pressed, unless a `gripper` is connected")
+
+
+class TeleoperationParams(Params):
+    """How a hand leads an arm."""
+
+    arm: ArmName = "PSM1"
+    instrument: InstrumentName = Field(default="palpation-probe", description="what the arm holds: name or number, such as 400006")
+    start: MountedPositions = Field(default_factory=home, description=f"the command until measured_js is there: {', '.join(psm.JOINT_NAMES)}")
+    jaw: Angle = Field(default=0.0, description="opening of the jaw until jaw/measured_js is there")
+    law: Literal["pose", "velocity"] = Field(
+        default="pose", description="the tip goes the way of the hand, scaled; or the hand's twist in its own frame is the tip's in its own"
+    )
+    scale: float = Field(default=0.2, gt=0.0, le=1.0, description="metres of the tip per metre of the hand; also an input, to be changed while it runs")
+    orientation: Literal["hold", "follow"] = Field(
+        default_factory=_orientation,  # pyright: ignore[reportArgumentType]  # validated like any value
+        description="whether the tip keeps its orientation or turns with the hand; default: hold with `law: pose`, follow with `law: velocity`",
+        validate_default=True,
+    )
+    view: Literal["base", "camera"] = Field(
+        default="base",
+        description="what the hand's frame is registered to: the arm's base frame, or the picture of the camera in whose frame `base_in_view` is, so that"
+        " right, up and away on the desk (x away, y left, z up) are right, up and away in the picture",
+    )
+    registration: UnitQuaternion = Field(
+        default=(0.0, 0.0, 0.0, 1.0), description="orientation of the master's frame in the arm's base frame or, with `view: camera`, in the desk's"
+    )
+    endoscope: ecm.Endoscope = Field(default="straight", description="with `view: camera`: as the ECM has it")
+    tip_frame: ecm.TipFrame = Field(default="kinematic", description="with `view: camera`: as the ECM in whose frame `base_in_view` is has it")
+    engage: Literal["released", "held"] = Field(
+        default="released", description="the arm follows unless the clutch button is pressed, or only while it is held: dead-man and clutch in one"
+    )
+    buttons: Buttons = Buttons()
+    align: Literal["relative", "gate"] = Field(
+        default="relative", description="the tip turns from where it is, or follows only once the hand is turned as the tip is and is seen to be held"
+    )
+    force: ForceParams = Field(default=ForceParams(), description="what the hand feels, by `contact`")
+    planes: PlanesParams = ()
+    contact_period: Duration = Field(default=0, ge=0, description="of `contact`, a multiple of the period; 0: at every step")
+    max_age: Duration = Field(default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer")
+
+    @cached_property
+    def tool(self) -> Instrument:
+        """The instrument's numbers."""
+        return instrument(self.instrument)
+
+    @cached_property
+    def chain(self) -> SerialChain:
+        """The arm's kinematics, from `<arm>_base` to the tip."""
+        return psm.chain(self.tool)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        check_start(self.chain, self.start, self.tool, self.jaw, _FOLDED)
+        if self.law == "velocity" and self.orientation == "hold":
+            raise ValueError("'law: velocity' turns the tip with the hand; leave out 'orientation: hold', or take 'law: pose'")
+        if self.law == "velocity" and len(self.chain.joints) < 6:
+            raise ValueError(
+                f"'law: velocity' inverts the Jacobian, but with '{self.instrument}' the arm has {len(self.chain.joints)} joints; take 'law: pose'"
+            )
+        if self.align == "gate" and self.orientation == "hold":
+            raise ValueError("'align: gate' compares orientations, which 'orientation: hold' leaves apart; set 'orientation: follow'")
+        return self

@@ -1,0 +1,48 @@
+"""The hand's frame in the arm's: what right, up and away on the desk are for the instrument.
+
+Three frames: the *desk*, in which a device tells where the hand is (REP 103 as the user sits before it: x away, y left, z up); the *camera*, the
+ECM's tip frame, in which `base_in_view` is told; and the *view*, the frame of the picture as the surgeon sees it: x left, y up, z ahead
+(docs/decisions/0013). With `view: camera`
+
+    R_base<-hand = R_camera<-base^T  R_camera<-view  R_view<-desk  R_desk<-hand,
+
+so that a motion to the right on the desk is one to the right in the picture; on the real system both consoles' and arms' base frames are set to the
+same effect (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are told in the camera's frame).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controllers.teleoperation.params import TeleoperationParams
+from robots import rotation
+from robots.dvrk import ecm
+from schemas.vectors import Vector
+
+__all__ = ["View"]
+
+_DESK_IN_VIEW = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+"""Away (x) on the desk is ahead (z) in the view, left (y) is left (x), up (z) is up (y)."""
+
+
+class View:
+    """Turns the hand's frame into the arm's base frame."""
+
+    def __init__(self, params: TeleoperationParams) -> None:
+        """Take what the hand's frame is registered to."""
+        self._registration = np.array(params.registration)
+        self._hand_in_camera: Vector | None = None
+        if params.view == "camera":
+            camera, view = (ecm.tip(params.endoscope, frame)[:3, :3] for frame in (params.tip_frame, "view"))  # both in the roll link
+            self._hand_in_camera = rotation.product(rotation.from_matrix(camera.T @ view @ _DESK_IN_VIEW), self._registration)
+
+    def hand_in_base(self, base_in_view: Vector) -> Vector:
+        """Return the orientation of the hand's frame in the arm's base frame, quaternion (x, y, z, w).
+
+        Args:
+            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; not looked at unless `view: camera`.
+        """
+        if self._hand_in_camera is None:
+            return self._registration
+        orientation = rotation.product(rotation.conjugate(base_in_view[3:]), self._hand_in_camera)
+        return orientation / np.linalg.norm(orientation)

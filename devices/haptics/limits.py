@@ -1,0 +1,72 @@
+"""The limits of a force on a hand, in SI units: what the chain in `devices.haptics.safety` holds, and what a device bears."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+__all__ = ["TOUCH", "DeviceLimits", "Limits"]
+
+_SHARE_OF_NOMINAL = 0.6
+"""Of a device's nominal maximum force that is used: the nominal force is a peak that the motors hold in the best posture only, and not for long."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLimits:
+    """What a device bears, as its maker states it (HDAPI: HD_NOMINAL_MAX_FORCE, _STIFFNESS, _DAMPING in SI units)."""
+
+    force: float
+    """N."""
+    stiffness: float
+    """N/m."""
+    damping: float
+    """N s/m."""
+
+    @property
+    def usable_force(self) -> float:
+        """The largest force (N) that is asked of the device."""
+        return _SHARE_OF_NOMINAL * self.force
+
+
+TOUCH = DeviceLimits(force=3.3, stiffness=400.0, damping=4.0)
+"""A 3D Systems Touch (CHAI3D at 7c76b1f2, extras/hdPhantom and src/devices/CPhantomDevices.cpp)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one stylus is held to. The defaults are the widest allowed, for a device that states no limits of its own.
+
+    The defaults come from drivers in use: 2 N is the clamp of sawSensablePhantom, waiting for less than 0.2 N is CHAI3D's; 400 N/m never
+    oscillated in a simulated hand, 700 N/m did; the times are ours (docs/decisions/0022).
+    """
+
+    force: float = 2.0
+    """Norm of the force, N."""
+    stiffness: float = 400.0
+    """Of all planes that are touched together, in the stiffest direction, N/m."""
+    damping: float = 4.0
+    """The same, N s/m."""
+    slew: float = 0.1
+    """By how much a force may grow or turn in one tick, N. It may fall at once."""
+    speed: float = 1.0
+    """A hand that is faster gets no force until the dead-man is let go, m/s."""
+    hold: float = 0.1
+    """Silence of the simulation up to which its last contact model counts in full, s."""
+    decay: float = 0.02
+    """Time constant of the force's decay after that, s."""
+    silence: float = 0.13
+    """Silence after which there is no force, s. A hub that dies has 150 ms until then, of which its last model and a busy device host may use up 20."""
+    ramp: float = 1.0
+    """Time in which the force comes in after it was off, s."""
+    calm_force: float = 0.2
+    """The force comes in only after less than this was due ..., N."""
+    calm_ticks: int = 4
+    """... for this number of ticks."""
+
+    def bounded(self, device: DeviceLimits) -> Limits:
+        """Return these limits, nowhere above what `device` bears."""
+        return replace(
+            self,
+            force=min(self.force, device.usable_force),
+            stiffness=min(self.stiffness, device.stiffness),
+            damping=min(self.damping, device.damping),
+        )

@@ -1,0 +1,93 @@
+"""The haptic loop of one stylus: newest contact model in, a force that is safe out, at every tick of the device.
+
+Plain floats and one clock, so that it fits into a servo callback: no numpy, no pydantic, no lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot, inf
+
+from devices.haptics.contact import Plane, checked
+from devices.haptics.limits import Limits
+from devices.haptics.passivity import Passivity
+from devices.haptics.rendering import Renderer
+from devices.haptics.safety import Condition, SafetyChain
+from devices.vendor_axes import Vector3
+
+__all__ = ["HapticLoop"]
+
+_READ_BEFORE = 0.01
+"""A model may have arrived (s) after the tick's time was read, as another thread takes it; one from farther in the future has no true time."""
+
+
+class HapticLoop:
+    """Renders the newest contact model and passes the force through the safety chain. All vectors in the device's base frame."""
+
+    def __init__(self, limits: Limits, *, passivity: bool = False) -> None:
+        """Start without contact and without force; `passivity` adds the observer and controller of `devices.haptics.passivity`."""
+        self._limits = limits
+        self._renderer = Renderer(limits.stiffness, limits.damping)
+        self._chain = SafetyChain(limits)
+        self._passivity = Passivity(limits.damping) if passivity else None
+        self._planes: tuple[Plane, ...] = ()
+        self._appeared = False
+        self._stamp_ns = 0
+        self._arrived = -inf
+        self._now = -inf
+
+    @property
+    def force(self) -> Vector3:
+        """The force (N) of the last tick."""
+        return self._chain.force
+
+    @property
+    def condition(self) -> Condition:
+        """Why that force was on or off."""
+        return self._chain.condition
+
+    def receive(self, planes: Sequence[Plane], stamp_ns: int, arrived: float) -> bool:
+        """Take a contact model with the stamp `stamp_ns` that arrived here at `arrived` (s, the clock of `tick`); say whether it is used.
+
+        Refused, as if it had never come: planes that are none, and a stamp not newer than the newest. After a silence in which the force went to zero any
+        stamp is a new beginning: another session starts at 0 again.
+        """
+        if stamp_ns <= self._stamp_ns and arrived - self._arrived <= self._limits.silence:
+            return False
+        valid = checked(planes)
+        if valid is None or not abs(arrived) < inf:
+            return False
+        self._appeared = bool(valid) and (self._appeared or not self._planes)
+        self._planes, self._stamp_ns, self._arrived = valid, stamp_ns, arrived
+        return True
+
+    def tick(self, now: float, position: Vector3, velocity: Vector3, *, permitted: bool) -> Vector3:
+        """Return the force (N) on the hand from now, in s of a clock that only goes forward, until the next tick.
+
+        `position` (m) and `velocity` (m/s) are the hand's. `permitted`: the dead-man is held, the device calibrated and well.
+        """
+        dt = now - self._now if self._now > -inf else 0.0
+        self._now = now
+        age = now - self._arrived
+        if -_READ_BEFORE < age < 0.0:
+            age = 0.0
+        wanted = self._renderer.force(self._planes, age, position, velocity)
+        if self._appeared:  # perhaps under a hand that has taken up an instrument which presses already
+            self._appeared = False
+            self._chain.soften(hypot(*wanted))
+        if self._passivity is not None:
+            wanted = self._passivity.correct(wanted, position, velocity, dt)
+        given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt)
+        if self._passivity is not None:
+            self._passivity.gave(given)
+        if self._chain.condition is Condition.INVALID:
+            self._renderer.reset()
+        return given
+
+    def reset(self) -> None:
+        """Take the force away: what a device does in its last frame, and when it was lost. The contact model has to come anew."""
+        self._chain.reset()
+        self._renderer.reset()
+        if self._passivity is not None:
+            self._passivity.reset()
+        self._planes, self._appeared, self._stamp_ns, self._arrived, self._now = (), False, 0, -inf, -inf

@@ -1,0 +1,48 @@
+"""The ports of one stylus, the same for every haptic device, so that one may stand for the other in a scenario."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from devices.vendor_axes import Vector3
+from hub.participant import Sample
+from schemas.ports import Port
+from schemas.ros import Header, Joy, PoseStamped, Time, TwistStamped, Wrench, WrenchStamped
+from schemas.ros import Vector3 as Vector3Message
+from schemas.trocar_msgs import ContactModel
+
+__all__ = ["StylusPorts", "force_sample", "stylus_ports"]
+
+
+class StylusPorts(NamedTuple):
+    """Beside these a stylus has `<stylus>/diagnostics`, which `devices.diagnosis` declares."""
+
+    pose: Port
+    twist: Port
+    buttons: Port
+    force: Port
+    contact: Port
+
+
+def stylus_ports(participant: str, stylus: str, *, clock: Literal["simulated", "wall"], max_age_ns: int) -> StylusPorts:
+    """Return the ports of a stylus; all vectors are along the axes of `<participant>_<stylus>_base` (x ahead, y left, z up)."""
+    frame = f"{participant}_{stylus}_base"
+
+    def output(name: str, kind: str, description: str, max_age_ns: int = 0, variability: Literal["signal", "event"] = "signal") -> Port:
+        name = f"{stylus}/{name}"
+        return Port(name=name, causality="output", type=kind, variability=variability, frame=frame, max_age_ns=max_age_ns, clock=clock, description=description)
+
+    return StylusPorts(
+        output("pose", PoseStamped.ros_type, "of the tip; z out of the point, x to the right when it points away from the user", max_age_ns),
+        output("twist", TwistStamped.ros_type, "of the tip", max_age_ns),
+        output("buttons", Joy.ros_type, "each press and release", variability="event"),
+        output("force", WrenchStamped.ros_type, "that the hand is given"),
+        Port(name=f"{stylus}/contact", causality="input", type=ContactModel.ros_type, frame=frame, clock="simulated", description="what the hand is to feel"),
+    )
+
+
+def force_sample(port: Port, time_ns: int, force: Vector3) -> Sample:
+    """Return the force (N) that a hand is given, in the port's frame at `time_ns` of the port's clock."""
+    x, y, z = force
+    header = Header(stamp=Time.from_ns(time_ns), frame_id=port.frame)
+    return Sample(port.name, WrenchStamped(header=header, wrench=Wrench(force=Vector3Message(x=x, y=y, z=z))))

@@ -1,0 +1,160 @@
+"""A headset as a device: what its runtime knows of the head, in the axes of REP 103, and a diagnosis when that is nothing.
+
+The libraries differ in where a head comes from; ports, frames, rate, retries and messages are the same and stand here.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from pydantic import Field
+
+from devices.diagnosis import Diagnosis, Level
+from devices.pace import Pace
+from devices.samples import pose_sample, twist_sample
+from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
+from hub.participant import Device, Params, Sample
+from robots import rotation
+from schemas.errors import DeviceError
+from schemas.ports import Port
+from schemas.quantity import Duration
+
+__all__ = ["HeadState", "Headset", "HeadsetParams", "NoHead", "Runtime"]
+
+
+class HeadsetParams(Params):
+    """What any headset is told."""
+
+    rate: float = Field(default=250.0, gt=0.0, le=1000.0, description="samples per second at most; a head's own motion stays far below 100 Hz")
+    max_age: Duration = Field(default=100_000_000, gt=0, description="a pose or twist that is older is marked stale")
+
+
+@dataclass(frozen=True, slots=True)
+class HeadState:
+    """Pose and velocity of a head as its runtime has them: vendors' axes (x right, y up, z towards the user), m, m/s, rad/s, of the base frame."""
+
+    time: float
+    """When this was so, s of the runtime's clock: states of one time are one sample."""
+    position: Vector3
+    orientation: Quaternion
+    linear: Vector3 | None
+    """None where the runtime does not know it: then it is how far the head has come since the state before, over the time between."""
+    angular: Vector3 | None
+
+
+@dataclass(frozen=True, slots=True)
+class NoHead:
+    """Why the runtime, though it answers, knows no head: nobody wears it, it sleeps, it is not tracked."""
+
+    level: Level
+    message: str
+
+
+class Runtime(Protocol):
+    """A runtime that has been connected to."""
+
+    @property
+    def hardware(self) -> str:
+        """Model and serial number."""
+        ...
+
+    def locate(self) -> HeadState | NoHead:
+        """Return where the head is now. Raises DeviceError where the runtime or the headset is gone."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the runtime."""
+        ...
+
+
+class Headset(Device):
+    """Publishes `pose` and `twist` of a head in `<participant>_base`, and `diagnostics`.
+
+    The head's own frame has x ahead, y to the left and z up. The twist is the velocity of that frame's origin and its angular velocity, both
+    along the axes of the base frame. Runtimes are connected to and asked in the thread that reads, as some demand.
+    """
+
+    def __init__(self, name: str, params: HeadsetParams) -> None:
+        """Take the participant's name and its parameters."""
+        super().__init__(name, params)
+        self._rate, self._max_age_ns = params.rate, params.max_age
+        self._diagnosis = Diagnosis(name)
+        self._pose, self._twist = (
+            Port(name=port, causality="output", type=type_, frame=f"{name}_base", max_age_ns=params.max_age, clock="wall", description=text)
+            for port, type_, text in (
+                ("pose", "geometry_msgs/msg/PoseStamped", "of the head: x ahead, y to the left, z up"),
+                ("twist", "geometry_msgs/msg/TwistStamped", "of the head, along the axes of the base frame"),
+            )
+        )
+        self._runtime: Runtime | None = None
+        self._newest: HeadState | None = None
+        self._newest_ns = 0
+        self._pace = Pace(self._rate)
+
+    @abstractmethod
+    def connect(self) -> Runtime:
+        """Connect to the runtime. Raises DeviceError where there is none."""
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """`pose`, `twist` and `diagnostics`."""
+        return self._pose, self._twist, self._diagnosis.port
+
+    def open(self, directory: Path) -> None:  # noqa: ARG002
+        """Begin anew; the runtime is connected to by the first `read`."""
+        self._diagnosis = Diagnosis(self.name)
+        self._pace = Pace(self._rate)
+
+    def read(self, t: int) -> list[Sample]:
+        """Return pose and twist if they are known and due, and a diagnosis whenever that changes."""
+        if not self._pace.due(t):
+            return []
+        try:
+            if self._runtime is None:
+                self._runtime = self.connect()
+            return self._located(t, self._runtime)
+        except DeviceError as error:
+            self.close()
+            self._pace.failed(t)
+            return self._diagnosis.tell(Level.ERROR, f"{error}; it is looked for again every second")
+
+    def _located(self, t: int, runtime: Runtime) -> list[Sample]:
+        state, before = runtime.locate(), self._newest
+        if isinstance(state, NoHead):
+            self._newest = None
+            return self._diagnosis.tell(state.level, state.message, runtime.hardware)
+        if before is not None and state.time == before.time:
+            still = t - self._newest_ns > self._max_age_ns
+            return self._diagnosis.tell(Level.STALE, "the runtime gives no new poses; look at its own software", runtime.hardware) if still else []
+        self._newest, self._newest_ns = state, t
+        try:
+            samples = [pose_sample(self._pose, t, vector(*state.position), quaternion(*state.orientation))]
+            linear, angular = _velocities(before, state)
+            if linear is not None and angular is not None:
+                samples.append(twist_sample(self._twist, t, vector(*linear), vector(*angular)))
+        except ValueError as error:  # what is not finite, too
+            self._newest = None
+            return self._diagnosis.tell(Level.ERROR, f"the runtime gives no pose: {error}; look at its own software", runtime.hardware)
+        return [*self._diagnosis.tell(Level.OK, "the head is tracked", runtime.hardware), *samples]
+
+    def close(self) -> None:
+        """Let go of the runtime."""
+        if self._runtime is not None:
+            self._runtime.close()
+        self._runtime = None
+        self._newest = None
+
+
+def _velocities(before: HeadState | None, now: HeadState) -> tuple[Vector3 | None, Vector3 | None]:
+    """Return velocity and angular velocity in the vendors' axes; None where neither the runtime nor two poses tell."""
+    if before is None or (now.linear is not None and now.angular is not None):
+        return now.linear, now.angular
+    dt = now.time - before.time
+    vx, vy, vz = ((np.array(now.position) - before.position) / dt).tolist()
+    turn = rotation.product(np.array(now.orientation), rotation.conjugate(np.array(before.orientation)))
+    wx, wy, wz = (rotation.log(turn) / dt).tolist()
+    return now.linear or (vx, vy, vz), now.angular or (wx, wy, wz)

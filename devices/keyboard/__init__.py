@@ -1,0 +1,1 @@
+"""A stylus for people who have none: moved by keys or a gamepad."""

@@ -1,0 +1,33 @@
+"""Which key does what."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from devices.keyboard.virtual_stylus import NOTHING, Wish
+
+__all__ = ["KEYS", "wish_of"]
+
+KEYS: dict[str, tuple[str, Wish]] = {
+    "w": ("ahead", Wish(linear=(1.0, 0.0, 0.0))),
+    "s": ("back", Wish(linear=(-1.0, 0.0, 0.0))),
+    "a": ("left", Wish(linear=(0.0, 1.0, 0.0))),
+    "d": ("right", Wish(linear=(0.0, -1.0, 0.0))),
+    "r": ("up", Wish(linear=(0.0, 0.0, 1.0))),
+    "f": ("down", Wish(linear=(0.0, 0.0, -1.0))),
+    "up": ("point up", Wish(angular=(1.0, 0.0, 0.0))),
+    "down": ("point down", Wish(angular=(-1.0, 0.0, 0.0))),
+    "left": ("point left", Wish(angular=(0.0, -1.0, 0.0))),
+    "right": ("point right", Wish(angular=(0.0, 1.0, 0.0))),
+    "q": ("roll left", Wish(angular=(0.0, 0.0, -1.0))),
+    "e": ("roll right", Wish(angular=(0.0, 0.0, 1.0))),
+    "space": ("button 0, the dead-man", Wish(dead_man=True)),
+    "c": ("button 1, and close the gripper", Wish(gripper=-1.0, jaw=True)),
+    "v": ("open the gripper", Wish(gripper=1.0)),
+}
+"""By the key's name in pygame: what it does in words, and what it asks for."""
+
+
+def wish_of(pressed: Collection[str]) -> Wish:
+    """Return what the keys that are held down ask for."""
+    return sum((wish for key, (_, wish) in KEYS.items() if key in pressed), NOTHING)

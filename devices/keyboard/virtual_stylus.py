@@ -1,0 +1,92 @@
+"""A stylus that exists in numbers only: it moves as fast as keys and sticks ask, and stays where they left it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from devices.vendor_axes import Quaternion, Vector3
+from robots import rotation
+from schemas.vectors import Vector
+
+__all__ = ["NOTHING", "VirtualStylus", "Wish"]
+
+_LEVEL = rotation.from_matrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
+"""Pointing level away from the user: its z ahead, its x to the right, its y down; in axes of REP 103."""
+_GRIPPER_SPEED = 1.0
+"""1/s; ours: from open to closed takes as long as a hand takes without hurry."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is asked for: shares of the speeds, each from -1 to 1."""
+
+    linear: Vector3 = (0.0, 0.0, 0.0)
+    """Ahead, left, up."""
+    angular: Vector3 = (0.0, 0.0, 0.0)
+    """About the stylus' own axes: x (the point goes up), y (it goes right), z (a screw that goes in)."""
+    gripper: float = 0.0
+    """1 opens, -1 closes."""
+    dead_man: bool = False
+    jaw: bool = False
+
+    def __add__(self, other: Wish) -> Wish:
+        """Return what two sources ask for together."""
+        return Wish(
+            _sum(self.linear, other.linear),
+            _sum(self.angular, other.angular),
+            self.gripper + other.gripper,
+            self.dead_man or other.dead_man,
+            self.jaw or other.jaw,
+        )
+
+
+NOTHING = Wish()
+
+
+def _sum(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _limited(share: Vector3, speed: float) -> Vector:
+    """Return the velocity, shape (3,), of at most `speed` in any direction."""
+    wish = np.array(share)
+    return wish * (speed / max(1.0, float(np.linalg.norm(wish))))
+
+
+class VirtualStylus:
+    """Pose and twist in its base frame (x ahead, y left, z up), and how far its gripper is open."""
+
+    def __init__(self, speed: float, turn_speed: float, stands_for: Literal["stylus", "head"] = "stylus") -> None:
+        """Take the largest velocity (m/s) and angular velocity (rad/s), and whose axes its own frame is to have: a head's are x ahead, y left, z up."""
+        self._speed, self._turn_speed = speed, turn_speed
+        self._axes = np.array([0.0, 0.0, 0.0, 1.0]) if stands_for == "stylus" else rotation.conjugate(_LEVEL)
+        self._position, self._orientation = np.zeros(3), _LEVEL
+        self._linear, self._angular = np.zeros(3), np.zeros(3)
+        self.gripper = 1.0
+        """From 0, closed, to 1, open."""
+
+    def advance(self, wish: Wish, dt: float) -> None:
+        """Move for `dt` seconds as `wish` says."""
+        own = _limited(wish.angular, self._turn_speed)
+        self._linear, self._angular = _limited(wish.linear, self._speed), rotation.matrix(self._orientation) @ own
+        self._position = self._position + dt * self._linear
+        turned = rotation.product(self._orientation, rotation.exp(dt * own))
+        self._orientation = turned / np.linalg.norm(turned)
+        self.gripper = min(max(self.gripper + dt * _GRIPPER_SPEED * min(max(wish.gripper, -1.0), 1.0), 0.0), 1.0)
+
+    @property
+    def pose(self) -> tuple[Vector3, Quaternion]:
+        """Position (m) and quaternion (x, y, z, w)."""
+        x, y, z = self._position.tolist()
+        qx, qy, qz, qw = rotation.product(self._orientation, self._axes).tolist()
+        return (x, y, z), (qx, qy, qz, qw)
+
+    @property
+    def twist(self) -> tuple[Vector3, Vector3]:
+        """Velocity (m/s) and angular velocity (rad/s), both along the axes of the base frame."""
+        vx, vy, vz = self._linear.tolist()
+        wx, wy, wz = self._angular.tolist()
+        return (vx, vy, vz), (wx, wy, wz)

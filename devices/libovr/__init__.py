@@ -1,0 +1,1 @@
+"""Headsets of Oculus through LibOVR."""

@@ -1,0 +1,85 @@
+"""The servo callback: a thousand times a second, the frames of all styluses of this host."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import threading
+from time import perf_counter
+
+from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, FORCE_OUTPUT, PRIORITY_MAX, SCHEDULER_HERTZ, SERVO_CALLBACK, Hdapi, errors
+from devices.openhaptics.stylus import Phase, Stylus
+
+__all__ = ["Servo"]
+
+_LAST_FRAME_S = 0.1
+
+
+class Servo:
+    """All styluses of this host behind one callback: HDAPI has one scheduler thread, and a frame makes its device the current one."""
+
+    def __init__(self, hd: Hdapi, styluses: list[Stylus]) -> None:
+        """Take the styluses that were opened."""
+        self._hd, self._styluses = hd, styluses
+        self._by_handle = {stylus.handle: [stylus] for stylus in styluses}
+        self._ending, self._ended = False, threading.Event()
+        self._callback = SERVO_CALLBACK(self._call)
+        self._schedule = 0
+        self._known = False
+        self.failure = ""
+        """What the callback raised."""
+
+    def start(self) -> None:
+        """Schedule the callback and start the scheduler, which takes its priority from this thread."""
+        self._hd.hdSetSchedulerRate(SCHEDULER_HERTZ)
+        self._schedule = self._hd.hdScheduleAsynchronous(self._callback, None, PRIORITY_MAX)
+        self._hd.hdStartScheduler()
+
+    def stop(self) -> None:
+        """Give the hands a last frame without force, and the devices back; nothing if it was not started."""
+        hd = self._hd
+        self._ending = True
+        if not self._schedule:
+            return
+        self._ended.wait(_LAST_FRAME_S)
+        hd.hdStopScheduler()
+        hd.hdUnschedule(self._schedule)
+        for stylus in self._styluses:
+            hd.hdMakeCurrentDevice(stylus.handle)
+            hd.hdDisable(FORCE_OUTPUT)
+            hd.hdDisableDevice(stylus.handle)  # crashes with FireWire devices (sawSensablePhantom): so it is the last that this process does
+
+    def tick(self, now: float) -> int:
+        """Do the frames of all devices at `now` (s); return what HDAPI wants to know: whether to go on."""
+        try:
+            if self._ending:
+                self._release(now)
+                self._ended.set()
+                return CALLBACK_DONE
+            for stylus in self._styluses:
+                stylus.frame(now)
+            for code, handle in errors(self._hd):
+                for stylus in self._by_handle.get(handle, self._styluses):
+                    stylus.note(code, now)
+            for stylus in self._styluses:
+                stylus.tell(now)
+                self._ending = self._ending or stylus.phase.is_lost
+        except BaseException as error:  # noqa: BLE001 - what leaves a callback of ctypes is lost, and the force would stay
+            self.failure = f"{type(error).__name__}: {error}"
+            for stylus in self._styluses:
+                stylus.phase = Phase.FAULT
+            self._release(now)  # those that have had their frame of this tick get theirs at the next one
+            self._ending = True
+        return CALLBACK_CONTINUE
+
+    def _call(self, _: object) -> int:
+        if not self._known:
+            ctypes.pythonapi.PyGILState_Ensure()  # never released: else Python makes and unmakes its state of this thread at every tick
+            self._known = True
+        return self.tick(perf_counter())
+
+    def _release(self, now: float) -> None:
+        for stylus in self._styluses:
+            with contextlib.suppress(Exception):  # one that fails here must not keep the others from their last frame
+                stylus.release()
+                stylus.tell(now)

@@ -1,0 +1,170 @@
+"""What a servo process and the device that started it tell each other: records of doubles in shared memory that no process can hold up.
+
+Each way is a ring with one writer and one reader. A slot carries its number and a checksum over number and content, so a record that is being overwritten is
+recognised, on any processor, and a writer that dies half-way leaves the slots before intact: neither side ever waits. The memory has no name that could
+outlive its users: on Linux the reading process inherits the file, on Windows it goes with the last handle.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+import sys
+import uuid
+from collections.abc import Sequence
+from typing import NamedTuple
+from zlib import crc32
+
+from devices.haptics.contact import Plane
+from devices.vendor_axes import Vector3
+
+__all__ = ["STYLUS_BYTES", "RingReader", "RingWriter", "State", "attach", "create", "device_ends", "model_doubles", "planes_in", "ring_size", "servo_ends"]
+
+_HEAD = struct.Struct("<QI4x")
+_COUNTER = 8
+
+MODEL_SLOTS, STATE_SLOTS = 2, 64
+"""Of models the newest counts. Of states none should be missed by a reader that stands still for some hundredths of a second: buttons are in them."""
+MOST_PLANES = 4
+MODEL_DOUBLES = 3 + MOST_PLANES * len(Plane._fields)
+"""Of a contact model: arrival (s of time.perf_counter), stamp (ns), number of planes, and their numbers."""
+STATE_DOUBLES = 6 + 3 + 9 + 3 + 3 + 3
+
+
+def model_doubles(planes: Sequence[Plane], stamp_ns: int, arrived: float) -> list[float]:
+    """Return a contact model of at most four planes as numbers."""
+    numbers = [arrived, float(stamp_ns), float(len(planes))]
+    for plane in planes:
+        numbers.extend(plane)
+    return numbers + [0.0] * (MODEL_DOUBLES - len(numbers))
+
+
+def planes_in(record: Sequence[float]) -> list[Plane]:
+    """Return the planes that `model_doubles` was given."""
+    width = len(Plane._fields)
+    return [Plane(*record[3 + width * i : 3 + width * (i + 1)]) for i in range(int(record[2]))]
+
+
+class State(NamedTuple):
+    """One tick of a stylus, base frame, SI units."""
+
+    time: float
+    """When the tick began, s of time.perf_counter, which all processes of a machine share."""
+    phase: int
+    """A `devices.openhaptics.stylus.Phase`."""
+    code: int
+    """Of HDAPI: the error that goes with the phase, the calibration style while that is what is missing, or 0."""
+    buttons: int
+    """Bit 0 is the first."""
+    permitted: int
+    """1 if the dead-man is held."""
+    cause: int
+    """Why the force is on or off: index into the members of devices.haptics.safety.Condition."""
+    position: Vector3
+    """Of the tip, m."""
+    rotation: tuple[float, ...]
+    """Of the stylus' own frame, nine numbers, row after row."""
+    linear: Vector3
+    """Velocity of the tip, m/s."""
+    angular: Vector3
+    """rad/s."""
+    force: Vector3
+    """On the hand, N."""
+
+    @classmethod
+    def of(cls, record: tuple[float, ...]) -> State:
+        """Return the state in a record of the ring: its fields one after the other."""
+        phase, code, buttons, permitted, cause = map(int, record[1:6])
+        position, linear, angular, force = ((record[i], record[i + 1], record[i + 2]) for i in (6, 18, 21, 24))
+        return cls(record[0], phase, code, buttons, permitted, cause, position, record[9:18], linear, angular, force)
+
+
+def ring_size(slots: int, doubles: int) -> int:
+    """Return the bytes that a ring takes."""
+    return _COUNTER + slots * (_HEAD.size + 8 * doubles)
+
+
+class _Ring:
+    def __init__(self, memory: memoryview, slots: int, doubles: int) -> None:
+        """Use `memory`, `ring_size` bytes that start at a multiple of 8."""
+        self._slots = slots
+        self._record = struct.Struct(f"<{doubles}d")
+        self._size = _HEAD.size + self._record.size
+        self._newest = memory[:_COUNTER].cast("Q")
+        self._memory = memory[_COUNTER : _COUNTER + slots * self._size]
+
+
+class RingWriter(_Ring):
+    """The writing end."""
+
+    def write(self, record: Sequence[float]) -> None:
+        """Add a record."""
+        number = self._newest[0] + 1
+        content = self._record.pack(*record)
+        at = number % self._slots * self._size
+        self._memory[at : at + self._size] = _HEAD.pack(number, crc32(content, number & 0xFFFFFFFF)) + content
+        self._newest[0] = number
+
+
+class RingReader(_Ring):
+    """The reading end."""
+
+    _seen = 0
+
+    def read(self) -> list[tuple[float, ...]]:
+        """Return the records that were written since the last call, oldest first, without those that are overwritten by now."""
+        newest = self._newest[0]
+        if newest == self._seen:
+            return []
+        first = max(self._seen + 1, newest - self._slots + 1)
+        found = [record for number in range(first, newest + 1) if (record := self._intact(number)) is not None]
+        self._seen = newest
+        return found
+
+    def _intact(self, number: int) -> tuple[float, ...] | None:
+        at = number % self._slots * self._size
+        slot = bytes(self._memory[at : at + self._size])
+        content = slot[_HEAD.size :]
+        if _HEAD.unpack_from(slot) != (number, crc32(content, number & 0xFFFFFFFF)):
+            return None
+        return self._record.unpack(content)
+
+
+STYLUS_BYTES = ring_size(MODEL_SLOTS, MODEL_DOUBLES) + ring_size(STATE_SLOTS, STATE_DOUBLES)
+"""What one stylus takes of the shared memory."""
+
+
+def servo_ends(memory: memoryview, index: int) -> tuple[RingReader, RingWriter]:
+    """Return where the servo process reads the contact models of stylus `index`, and where it writes its states."""
+    models, states = _parts(memory, index)
+    return RingReader(models, MODEL_SLOTS, MODEL_DOUBLES), RingWriter(states, STATE_SLOTS, STATE_DOUBLES)
+
+
+def device_ends(memory: memoryview, index: int) -> tuple[RingWriter, RingReader]:
+    """Return the other ends: where the device writes contact models, and where it reads states."""
+    models, states = _parts(memory, index)
+    return RingWriter(models, MODEL_SLOTS, MODEL_DOUBLES), RingReader(states, STATE_SLOTS, STATE_DOUBLES)
+
+
+def _parts(memory: memoryview, index: int) -> tuple[memoryview, memoryview]:
+    stylus = memory[index * STYLUS_BYTES : (index + 1) * STYLUS_BYTES]
+    split = ring_size(MODEL_SLOTS, MODEL_DOUBLES)
+    return stylus[:split], stylus[split:]
+
+
+def create(size: int) -> tuple[mmap.mmap, int | str]:
+    """Return new shared memory, and what `attach` needs in a process that inherits it: a file descriptor, which is to be closed, or on Windows a name."""
+    if sys.platform == "win32":
+        name = f"trocar-{uuid.uuid4()}"
+        return mmap.mmap(-1, size, tagname=name), name
+    file = os.memfd_create("trocar-styluses")
+    os.truncate(file, size)
+    return mmap.mmap(file, size), file
+
+
+def attach(handle: int | str, size: int) -> mmap.mmap:
+    """Return the memory that another process created."""
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size, tagname=str(handle))
+    return mmap.mmap(int(handle), size)

@@ -1,0 +1,41 @@
+"""What a scenario says of the haptic styluses of one host."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, StringConstraints
+
+from devices.haptics.params import SafetyParams
+from devices.openhaptics.stylus import Spec
+from hub.participant import Params
+from schemas.quantity import Duration, Length
+
+__all__ = ["StylusParams", "TouchParams"]
+
+_DEAD_MAN = "what is to be held for force: the index of a button, the safety switch of the stylus, or the stylus itself (out of its inkwell)"
+
+
+class StylusParams(Params):
+    """One stylus."""
+
+    device: Annotated[str | None, Field(min_length=1, description="its name in the vendor's setup program; default: the default device")] = None
+    dead_man: Annotated[Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch", "inkwell"], Field(description=_DEAD_MAN)] = 0
+    tip_offset: Annotated[Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")] = 0.039
+    """The default is that of sawSensablePhantom (mtsSensableHD.cpp)."""
+    safety: SafetyParams = SafetyParams()
+
+    def spec(self, name: str) -> Spec:
+        """Return what the servo process is told."""
+        return Spec(name, self.device, self.dead_man, self.tip_offset)
+
+
+class TouchParams(Params):
+    """The styluses of one host: one process of one host may use OpenHaptics."""
+
+    library: Annotated[Path | None, Field(description="libHD.so or hd.dll, relative to the scenario; default: where the vendor's installers put it")] = None
+    styluses: Annotated[
+        dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], StylusParams], Field(min_length=1, description="by name: right, left")
+    ]
+    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = 100_000_000

@@ -1,0 +1,60 @@
+"""A second servo process, which finds out whether styluses that were lost can be had again. It gives no force."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from devices.openhaptics.exchange import State
+from devices.openhaptics.hdapi import Code
+from devices.openhaptics.process import ServoProcess
+from devices.openhaptics.stylus import Phase
+
+__all__ = ["Finding", "Probe", "absence"]
+
+_LOOKING, _ENDING = 10.0, 1.0
+"""How long the process may look for the styluses, and then take to end, s."""
+
+
+class Finding(NamedTuple):
+    """How a stylus fares."""
+
+    phase: Phase
+    code: int
+
+
+class Probe:
+    """One try."""
+
+    def __init__(self, process: ServoProcess, now: float) -> None:
+        """Take a process that was started at `now` (s)."""
+        self._process, self._until = process, now + _LOOKING
+        self._found: dict[str, Finding] = {}
+
+    def poll(self, now: float) -> dict[str, Finding | None] | None:
+        """Return what was found of each stylus, once all is known, or time is up, and the process has let go of them; before that None."""
+        process = self._process
+        for message in process.said():
+            if "absent" in message:
+                self._found[message["stylus"]] = absence(message["absent"])
+        for name, ring in process.states.items():
+            for state in map(State.of, ring.read()):
+                if state.phase != Phase.SETTLING:
+                    self._found[name] = Finding(Phase(state.phase), state.code)
+        if self._found.keys() == process.states.keys() or now > self._until:
+            process.end()
+            self._until = min(self._until, now)
+        if now > self._until + _ENDING:
+            process.kill()
+        if process.is_alive:
+            return None
+        process.close()
+        return {name: self._found.get(name) for name in process.names}
+
+    def close(self) -> None:
+        """End the try."""
+        self._process.close()
+
+
+def absence(code: int) -> Finding:
+    """Return what it means that a stylus could not be opened, with this error."""
+    return Finding(Phase.BUSY if Code.is_busy(code) else Phase.ABSENT, code)

@@ -1,0 +1,116 @@
+"""A servo process as the device sees it: started, told, listened to, ended. Nothing here waits for it but `close`."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from devices.haptics.limits import Limits
+from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, create, device_ends
+from devices.openhaptics.stylus import Spec
+
+__all__ = ["ServoProcess"]
+
+_ENVIRONMENT: dict[str, str] = {} if sys.platform == "win32" else {"GTDD_HOME": "/usr/share/3DSystems"}
+"""The Linux driver wants to be told where it keeps configuration and calibration of its devices (TouchDriver 2019.2.15)."""
+_PATIENCE_S = 1.0
+
+
+class ServoProcess:
+    """A process with the devices of `specs`, from its start on."""
+
+    def __init__(self, library: Path, specs: Sequence[Spec]) -> None:
+        """Start it; raises OSError if the system has no process left."""
+        self.names = tuple(spec.name for spec in specs)
+        size = STYLUS_BYTES * len(specs)
+        shared, handle = create(size)
+        ends = [device_ends(memoryview(shared), index) for index in range(len(specs))]
+        self.models: dict[str, RingWriter] = {name: models for name, (models, _) in zip(self.names, ends, strict=True)}
+        self.states: dict[str, RingReader] = {name: states for name, (_, states) in zip(self.names, ends, strict=True)}
+        inherited = (handle,) if isinstance(handle, int) else ()
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "devices.openhaptics.servo"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                pass_fds=inherited,
+                process_group=0,  # Ctrl-C is for this process, which then ends that one
+                env={**_ENVIRONMENT, **os.environ},
+                creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
+            )
+        finally:
+            for file in inherited:
+                os.close(file)
+        self._said: SimpleQueue[dict[str, Any]] = SimpleQueue()
+        self._listener = threading.Thread(target=self._listen, name="servo process", daemon=True)
+        self._listener.start()
+        self._send({"library": str(library), "memory": handle, "styluses": [asdict(spec) for spec in specs]})
+
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        return self._process.poll() is None
+
+    def said(self, timeout_s: float = 0.0) -> list[dict[str, Any]]:
+        """Return what it has said since the last call; wait up to `timeout_s` for something."""
+        found: list[dict[str, Any]] = []
+        with contextlib.suppress(Empty):
+            if timeout_s:
+                found.append(self._said.get(timeout=timeout_s))
+            while True:
+                found.append(self._said.get_nowait())
+        return found
+
+    def allow(self, stylus: str, limits: Limits, *, passivity: bool) -> None:
+        """Let force be given to the hand at `stylus`."""
+        self._send({"stylus": stylus, "limits": asdict(limits), "passivity": passivity})
+
+    def end(self) -> None:
+        """Tell it to give a last frame without force and to end."""
+        with contextlib.suppress(OSError):
+            assert self._process.stdin
+            self._process.stdin.close()
+
+    def kill(self) -> None:
+        """End it, whatever it does. The force ends with it only as far as the driver sees to that."""
+        self._process.kill()
+
+    def close(self) -> None:
+        """End it and wait until it is gone."""
+        self.end()
+        try:
+            self._process.wait(_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            self._process.wait()
+        self._listener.join()
+
+    def _send(self, message: dict[str, Any]) -> None:
+        assert self._process.stdin
+        if self._process.stdin.closed:  # it was told to end
+            return
+        with contextlib.suppress(OSError):  # it is gone: `is_alive` says so
+            self._process.stdin.write(json.dumps(message) + "\n")
+            self._process.stdin.flush()
+
+    def _listen(self) -> None:
+        assert self._process.stdout
+        with self._process.stdout as lines:
+            for line in lines:
+                self._said.put(json.loads(line))
+        self._said.put({"ended": True})

@@ -1,0 +1,121 @@
+"""The servo process: it holds HDAPI and the servo callback, and nothing else. `devices.openhaptics.process` starts it.
+
+One line of JSON on its standard input says what to open; a second one, per stylus, within which limits force may be given. The end of
+the input is the end of the process: it comes when the device closes it, and when the device dies. Then the hand is given one last frame, without force.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from ctypes import c_double
+from pathlib import Path
+from typing import Any, NoReturn
+
+from devices.haptics.limits import Limits
+from devices.openhaptics.callback import Servo
+from devices.openhaptics.exchange import STYLUS_BYTES, attach, servo_ends
+from devices.openhaptics.hdapi import INVALID_HANDLE, Get, Hdapi, errors, load
+from devices.openhaptics.stylus import Spec, Stylus
+from schemas.errors import DeviceError
+
+__all__ = ["main"]
+
+_FIFO_PRIORITY = 20
+"""Above all that is not real-time, below the kernel's interrupt threads (50)."""
+_HIGH_PRIORITY_CLASS = 0x80
+
+Say = Callable[[Mapping[str, Any]], None]
+
+
+def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say) -> Iterator[tuple[str, Stylus]]:
+    """Open the devices; tell of each what it is and bears, or why it cannot be had."""
+    for index, values in enumerate(config["styluses"]):
+        spec = Spec(**values)
+        models, states = servo_ends(memory, index)
+        handle = hd.hdInitDevice(None if spec.device is None else spec.device.encode())
+        code = next((code for code, _ in errors(hd)), 0)
+        if handle == INVALID_HANDLE:
+            say({"stylus": spec.name, "absent": code})
+            continue
+        stylus = Stylus(hd, handle, spec, models, states)
+        model, serial = ((hd.hdGetString(what) or b"").decode(errors="replace") for what in (Get.MODEL, Get.SERIAL_NUMBER))
+        limits = {"force": _number(hd, Get.MAX_FORCE), "stiffness": 1e3 * _number(hd, Get.MAX_STIFFNESS), "damping": 1e3 * _number(hd, Get.MAX_DAMPING)}
+        errors(hd)
+        say({"stylus": spec.name, "hardware": f"{model} {serial}".strip(), "limits": limits})
+        yield spec.name, stylus
+
+
+def _number(hd: Hdapi, what: int) -> float:
+    value = c_double()
+    hd.hdGetDoublev(what, value)
+    return value.value
+
+
+def _raise_priority() -> str:
+    """Let this process come first, where the system allows it; return what was reached."""
+    if sys.platform == "win32":
+        kernel = ctypes.windll.kernel32
+        kernel.GetCurrentProcess.restype = ctypes.c_void_p
+        kernel.SetPriorityClass.argtypes = (ctypes.c_void_p, ctypes.c_uint)
+        return "high" if kernel.SetPriorityClass(kernel.GetCurrentProcess(), _HIGH_PRIORITY_CLASS) else "normal"
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY))
+        return "real-time"
+    return "normal"
+
+
+def _voice() -> Say:
+    """Return what writes a message to the device; the standard output is a library's to write to, and goes where errors go."""
+    stream = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+
+    def say(message: Mapping[str, Any]) -> None:
+        stream.write(json.dumps(message) + "\n")
+
+    return say
+
+
+def _terminate(_signal: int, _frame: object) -> NoReturn:
+    sys.exit()
+
+
+def main() -> NoReturn:
+    """Serve until the input ends."""
+    signal.signal(signal.SIGTERM, _terminate)
+    say = _voice()
+    config = json.loads(sys.stdin.readline())
+    memory = memoryview(attach(config["memory"], STYLUS_BYTES * len(config["styluses"])))
+    try:
+        hd = load(Path(config["library"]))
+    except DeviceError as error:
+        say({"failed": str(error)})
+        sys.exit(1)
+    say({"loaded": True})
+    styluses = dict(_opened(hd, config, memory, say))
+    servo = Servo(hd, list(styluses.values()))
+    try:
+        if styluses:
+            say({"priority": _raise_priority()})
+            gc.collect()
+            gc.freeze()
+            gc.disable()
+            servo.start()
+        for line in sys.stdin:
+            order = json.loads(line)
+            styluses[order["stylus"]].allow(Limits(**order["limits"]), passivity=order["passivity"])
+    finally:
+        servo.stop()
+        if servo.failure:
+            say({"failed": servo.failure})
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,207 @@
+"""One stylus inside the servo callback: its frames, calibration, errors and force. Runs a thousand times a second: plain floats, one clock."""
+
+from __future__ import annotations
+
+from ctypes import c_double, c_int, c_ubyte
+from dataclasses import dataclass
+from enum import IntEnum
+from math import inf
+
+from devices.haptics.contact import ZERO
+from devices.haptics.limits import Limits
+from devices.haptics.loop import HapticLoop
+from devices.haptics.safety import Condition
+from devices.openhaptics.exchange import RingReader, RingWriter, planes_in
+from devices.openhaptics.hdapi import FORCE_OUTPUT, PLACEHOLDER_MM, Calibration, Code, Get, Hdapi, Style, errors
+from devices.openhaptics.motion import Tip
+from devices.vendor_axes import Vector3
+
+__all__ = ["Phase", "Spec", "Stylus"]
+
+_CLEAN_FRAMES = 3
+"""The scheduler starts before the first frame of a device exists (hopezzzz/3dtouch, touch_hd.py)."""
+_WARNING = 1.0
+"""Time without a warning of the device after which force may come back, s."""
+
+
+class Phase(IntEnum):
+    """How a stylus fares."""
+
+    ABSENT = 0
+    """It could not be opened."""
+    SETTLING = 1
+    """It has given no frames yet, or no valid ones."""
+    UNCALIBRATED = 2
+    READY = 3
+    WARNED = 4
+    """It has a pose, and no force: HDAPI complained within the last second."""
+    BUSY = 5
+    """Another program has it."""
+    FAULT = 6
+    """It, or the servo callback, has failed."""
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether this process will not get the stylus any more: a new one has to try."""
+        return self in _LOST
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether the stylus is where its states say."""
+        return self in _POSED
+
+
+_LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
+_POSED = {Phase.READY, Phase.WARNED}
+_READY, _SETTLING, _CALIBRATED = Phase.READY, Phase.SETTLING, Calibration.OK.value
+"""As plain names: Python 3.11 looks a member of an enumeration up in a quarter of a microsecond."""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What the servo process is told of a stylus."""
+
+    name: str
+    device: str | None
+    """Name of the device in the vendor's configuration; None: the default device."""
+    dead_man: int | str
+    """Index of a button, `safety-switch`, or `inkwell`: held while the stylus is out of it."""
+    tip_offset: float
+    """From the centre of the gimbal to the tip, m."""
+
+
+class Stylus:
+    """A device of HDAPI that was opened. Its methods are for the servo callback, but for `allow`."""
+
+    def __init__(self, hd: Hdapi, handle: int, spec: Spec, models: RingReader, states: RingWriter) -> None:
+        """Start without force; there is none before `allow`."""
+        self.handle = handle
+        self.phase = Phase.SETTLING
+        self._hd, self._spec, self._models, self._states = hd, spec, models, states
+        self._tip = Tip(spec.tip_offset)
+        self._loop: HapticLoop | None = None
+        self._code = self._style = 0
+        self._calibrated = False
+        self._clean = self._pretending = 0
+        self._permitted = False
+        self._warned = -inf
+        self._transform, self._velocity, self._force = (c_double * 16)(), (c_double * 3)(), (c_double * 3)()
+        self._joints = (c_double * 3)()
+        self._buttons, self._switch, self._styles = c_int(), c_ubyte(), c_int()
+
+    def allow(self, limits: Limits, *, passivity: bool) -> None:
+        """Let force be given, within `limits`."""
+        self._loop = HapticLoop(limits, passivity=passivity)
+
+    def frame(self, now: float) -> None:
+        """Do one frame, which begins at `now` (s of time.perf_counter)."""
+        hd = self._hd
+        hd.hdBeginFrame(self.handle)
+        hd.hdGetDoublev(Get.TRANSFORM, self._transform)
+        hd.hdGetDoublev(Get.VELOCITY, self._velocity)
+        hd.hdGetIntegerv(Get.BUTTONS, self._buttons)
+        self._permitted = self._dead_man()
+        moved = self._tip.move(self._transform[:], self._velocity[:], now)
+        self._look()
+        self._judge(now, valid=moved)
+        self._send(self._render(now))
+
+    def note(self, code: int, now: float) -> None:
+        """Take note of an error that HDAPI has on its stack after the frame at `now`.
+
+        Only a fault of the device (0x3xx) ends its use. Any other takes the force away, and lets it come back: a warning is meant so (0x2xx), and after a
+        complaint about the frame nobody knows what force was sent.
+        """
+        self._code = code
+        if Code.is_busy(code):
+            self.phase = Phase.BUSY
+        elif Code.is_fault(code):
+            self.phase = Phase.FAULT
+        else:
+            self._warned = now
+
+    def tell(self, now: float) -> None:
+        """Write the state of the frame at `now`."""
+        tip, loop = self._tip, self._loop
+        force, cause = (loop.force, _CAUSES[loop.condition]) if loop is not None else (ZERO, _OFF)
+        head = (now, self.phase, self._code, self._buttons.value, self._permitted, cause)
+        self._states.write((*head, *tip.position, *tip.rotation, *tip.linear, *tip.angular, *force))
+
+    def release(self) -> None:
+        """Do one frame without force: the last."""
+        self._hd.hdBeginFrame(self.handle)
+        if self._loop is not None:
+            self._loop.reset()
+        self._send(ZERO)
+
+    def _dead_man(self) -> bool:
+        dead_man = self._spec.dead_man
+        if isinstance(dead_man, int):
+            return bool(self._buttons.value >> dead_man & 1)
+        held = dead_man == "safety-switch"
+        self._hd.hdGetBooleanv(Get.SAFETY_SWITCH if held else Get.INKWELL_SWITCH, self._switch)
+        return bool(self._switch.value) is held
+
+    def _look(self) -> None:
+        """Look at the calibration, and update it where that can be done. Force output is on only while it stands."""
+        hd = self._hd
+        calibration = hd.hdCheckCalibration()
+        if (calibration == _CALIBRATED) is not self._calibrated:
+            self._calibrated = not self._calibrated
+            (hd.hdEnable if self._calibrated else hd.hdDisable)(FORCE_OUTPUT)
+        if self._calibrated:
+            return
+        self._style = self._style or self._best_style()
+        in_place = self._style != Style.ENCODER_RESET or self._buttons.value  # where a person has to put it, the person says so
+        if calibration == Calibration.NEEDS_UPDATE and in_place:
+            hd.hdUpdateCalibration(self._style)
+        errors(hd)  # of an update that the device did not want now
+
+    def _best_style(self) -> int:
+        self._hd.hdGetIntegerv(Get.CALIBRATION_STYLE, self._styles)
+        return next((style for style in Style if self._styles.value & style), 0)
+
+    def _judge(self, now: float, *, valid: bool) -> None:
+        phase = self.phase
+        if phase.is_lost:
+            return
+        pretends = self._pretends()
+        self._pretending = self._pretending + 1 if pretends else 0
+        self._clean = self._clean + 1 if valid and not pretends else 0
+        if self._pretending >= _CLEAN_FRAMES:
+            self.phase, self._code = Phase.BUSY, 0
+        elif self._clean < _CLEAN_FRAMES:
+            self.phase = _SETTLING
+        elif not self._calibrated:
+            self.phase, self._code = Phase.UNCALIBRATED, self._style
+        elif now - self._warned < _WARNING:
+            self.phase = Phase.WARNED
+        elif phase is not _READY:
+            self.phase, self._code = _READY, 0
+
+    def _pretends(self) -> bool:
+        """Say whether this is what a process is shown that does not own the device."""
+        if tuple(self._transform[12:15]) != PLACEHOLDER_MM:
+            return False
+        self._hd.hdGetDoublev(Get.JOINT_ANGLES, self._joints)
+        return not any(self._joints)
+
+    def _render(self, now: float) -> Vector3:
+        """Return the force (N) on the hand."""
+        loop = self._loop
+        if loop is None:
+            return ZERO
+        for record in self._models.read():
+            loop.receive(planes_in(record), int(record[1]), record[0])
+        return loop.tick(now, self._tip.position, self._tip.linear, permitted=self._permitted and self.phase is _READY)
+
+    def _send(self, force: Vector3) -> None:
+        """Set the force (N, base frame) and end the frame."""
+        fx, fy, fz = force
+        self._force[:] = (-fy, fz, -fx)  # the axes of HDAPI: x right, y up, z towards the user
+        self._hd.hdSetDoublev(Get.FORCE, self._force)
+        self._hd.hdEndFrame(self.handle)
+
+
+_CAUSES = {condition: i for i, condition in enumerate(Condition)}
+_OFF = _CAUSES[Condition.OFF]

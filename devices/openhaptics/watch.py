@@ -1,0 +1,199 @@
+"""Keeps a servo process running with every stylus that can be had, and looks for those that cannot.
+
+All styluses of a host are in one process. When one of them is lost, the process is replaced by one with the others: HDAPI recovers in a new process only.
+Whether a lost one is back is found out by a second process beside the first, so that nobody who works loses force for it; it is
+taken in when no other hand holds its dead-man.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from devices.openhaptics.exchange import State
+from devices.openhaptics.probe import Finding, Probe, absence
+from devices.openhaptics.process import ServoProcess
+from devices.openhaptics.stylus import Phase, Spec
+from schemas.errors import DeviceError
+
+__all__ = ["Lost", "Watch"]
+
+log = logging.getLogger(__name__)
+
+_FIRST_RETRY, _LAST_RETRY = 0.25, 4.0
+"""After this time (s) a lost stylus is tried again; each time twice as long ..."""
+_LASTING = 10.0
+"""... until it was had for this long."""
+_LOADING, _OPENING, _SILENCE = 20.0, 10.0, 1.0
+"""How long a process may take (s) to load the library, until its first frame, and between frames."""
+_ENDING = 1.0
+
+_NO_PRIORITY = (
+    "the servo process has no real-time priority, so the force may falter while the machine is busy: allow it with the line "
+    "'@users - rtprio 20' in /etc/security/limits.conf, and log in again"
+)
+
+
+@dataclass
+class Lost:
+    """Why a stylus cannot be had."""
+
+    phase: Phase
+    code: int
+    cause: str
+    retry: float
+    """When it is tried again, s of time.perf_counter."""
+    found: bool = False
+    """It can be had again, and waits to be taken in."""
+
+
+class Watch:
+    """The servo processes of one device. All methods are for one thread."""
+
+    def __init__(self, library: Path, specs: Mapping[str, Spec], opened: Callable[[ServoProcess, dict[str, Any]], None]) -> None:
+        """`opened` is told of every stylus that was opened: by which process, and what that said of it."""
+        self._library, self._specs, self._opened = library, dict(specs), opened
+        self.lost: dict[str, Lost] = {}
+        self._process: ServoProcess | None = None
+        self._probe: Probe | None = None
+        self._started = self._heard = 0.0
+        self._ending: float | None = None
+        self._has_ticked = False
+        self._held = dict.fromkeys(specs, False)
+        self._delays = dict.fromkeys(specs, _FIRST_RETRY)
+        self._warned = False
+
+    @property
+    def process(self) -> ServoProcess | None:
+        """The process that has the styluses now."""
+        return self._process
+
+    def start(self, now: float) -> None:
+        """Start with all styluses. Raises DeviceError if the library cannot be loaded."""
+        self._start(list(self._specs), now)
+        assert self._process
+        said = self._process.said(_LOADING)
+        if not said or "loaded" not in said[0]:
+            self.close()
+            silent = f"the servo process ends or hangs when it loads '{self._library}': is that the library of OpenHaptics?"
+            raise DeviceError(said[0].get("failed", silent) if said else silent)
+        for message in said[1:]:
+            self._hear(self._process, message, now)
+
+    def poll(self, now: float) -> dict[str, list[State]]:
+        """Look after the processes; return the new states of each stylus that is open, oldest first."""
+        states: dict[str, list[State]] = {}
+        if self._process is not None:
+            states = self._attend(self._process, now)
+        if self._probe is not None and (found := self._probe.poll(now)) is not None:
+            self._probe = None
+            self._take_note(found, now)
+        self._retry(now)
+        return states
+
+    def close(self) -> None:
+        """End all processes."""
+        for process in (self._process, self._probe):
+            if process is not None:
+                process.close()
+        self._process = self._probe = None
+
+    def _start(self, names: list[str], now: float) -> None:
+        self._process = ServoProcess(self._library, [self._specs[name] for name in names])
+        self._started = self._heard = now
+        self._ending, self._has_ticked = None, False
+        self._held = dict.fromkeys(self._specs, False)
+
+    def _attend(self, process: ServoProcess, now: float) -> dict[str, list[State]]:
+        for message in process.said():
+            self._hear(process, message, now)
+        states: dict[str, list[State]] = {}
+        for name in process.names:
+            new = [State.of(record) for record in process.states[name].read()]
+            if not new:
+                continue
+            self._heard, self._has_ticked = now, True
+            last = new[-1]
+            self._held[name] = bool(last.permitted)
+            if Phase(last.phase).is_lost:
+                self._lose(name, Phase(last.phase), last.code, "", now)
+                self._end(process, now)
+            elif name not in self.lost:
+                states[name] = new
+        self._check(process, now)
+        return states
+
+    def _hear(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
+        if "absent" in message:
+            self._lose(message["stylus"], *absence(message["absent"]), "", now)
+            if self.lost.keys() >= set(process.names):
+                self._end(process, now)
+        elif "stylus" in message:
+            self._opened(process, message)
+        elif "failed" in message:
+            for name in process.names:
+                self._lose(name, Phase.FAULT, 0, message["failed"], now)
+        elif message.get("priority") == "normal" and not self._warned:
+            self._warned = True
+            log.warning(_NO_PRIORITY)
+
+    def _check(self, process: ServoProcess, now: float) -> None:
+        """Take note of a process that has ended, and end one that hangs."""
+        ended, patience = not process.is_alive, _SILENCE if self._has_ticked else _OPENING
+        if not ended and self._ending is None and now - self._heard > patience:
+            self._end(process, now)
+            for name in process.names:
+                self._lose(name, Phase.FAULT, 0, f"no frame for {patience:g} s", now)
+        if not ended and self._ending is not None and now - self._ending > _ENDING:
+            process.kill()
+        if ended:
+            if self._ending is None:
+                for name in process.names:
+                    self._lose(name, Phase.FAULT, 0, "the servo process has ended", now)
+            process.close()
+            self._process = None
+
+    def _end(self, process: ServoProcess, now: float) -> None:
+        if self._ending is None:
+            self._ending = now
+            process.end()
+
+    def _lose(self, name: str, phase: Phase, code: int, cause: str, now: float) -> None:
+        if name in self.lost:
+            self.lost[name].cause = self.lost[name].cause or cause
+            return
+        lasted = now - self._started > _LASTING
+        delay = _FIRST_RETRY if lasted else self._delays[name]
+        self._delays[name] = min(2.0 * delay, _LAST_RETRY)
+        self.lost[name] = Lost(phase, code, cause, now + delay)
+
+    def _retry(self, now: float) -> None:
+        """Start what can be started."""
+        due = [name for name in self._specs if name in self.lost and (self.lost[name].found or now >= self.lost[name].retry)]
+        if self._process is None and self._probe is None:
+            names = [name for name in self._specs if name not in self.lost or name in due]
+            if names:
+                for name in due:
+                    del self.lost[name]
+                self._start(names, now)
+        elif self._process is not None and self._ending is None and due:
+            if any(self.lost[name].found for name in due):
+                if not any(self._held.values()):
+                    self._end(self._process, now)
+            elif self._probe is None:
+                self._probe = Probe(ServoProcess(self._library, [self._specs[name] for name in due]), now)
+
+    def _take_note(self, found: Mapping[str, Finding | None], now: float) -> None:
+        """Take in what a probe has found of lost styluses."""
+        for name, finding in found.items():
+            lost = self.lost[name]
+            if finding is not None and not finding.phase.is_lost:
+                lost.found = True
+                continue
+            if finding is not None:
+                lost.phase, lost.code, lost.cause = finding.phase, finding.code, ""
+            lost.retry = now + self._delays[name]
+            self._delays[name] = min(2.0 * self._delays[name], _LAST_RETRY)

@@ -1,0 +1,1 @@
+"""Headsets of any maker through OpenXR."""

@@ -1,0 +1,156 @@
+"""One session with an OpenXR runtime, without pictures: its states, the user's presence, and where the head is."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from ctypes import POINTER, Structure, byref, cast
+from typing import TypeVar
+
+import xr
+
+from devices.diagnosis import Level
+from devices.headset import HeadState, NoHead
+from devices.openxr import clock
+from devices.vendor_axes import Vector3
+from schemas.errors import DeviceError
+
+__all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
+
+HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
+"""A session without graphics, which is needed; being told whether somebody wears the headset, which is welcome."""
+ORIGINS = {"eye": xr.ReferenceSpaceType.LOCAL, "floor": xr.ReferenceSpaceType.STAGE}
+_VALID = xr.SpaceLocationFlags.ORIENTATION_VALID_BIT | xr.SpaceLocationFlags.POSITION_VALID_BIT
+"""Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the position."""
+_Event = TypeVar("_Event", bound=Structure)
+
+
+def offered() -> set[str]:
+    """Return the names of the extensions of the system's active runtime, which this loads and does not start. Raises DeviceError where there is none."""
+    try:
+        return {extension.extension_name.decode() for extension in xr.enumerate_instance_extension_properties()}
+    except xr.exception.XrException as error:
+        raise _unanswered(error) from error
+
+
+def lacking(found: set[str]) -> str:
+    """Return what is wrong with a runtime that offers `found`; nothing if it can be asked for a head."""
+    missing = [name for name in (HEADLESS, clock.EXTENSION) if name not in found]
+    return (
+        f"this OpenXR runtime does not offer {' and '.join(missing)}, without which a head cannot be asked for; take one that does, such as"
+        " SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
+        if missing
+        else ""
+    )
+
+
+class OpenXrRuntime:
+    """An instance, its session and two spaces: the origin and the head."""
+
+    def __init__(self, origin: str) -> None:
+        """Connect to the runtime that the system has chosen. Raises DeviceError where there is none, or no headset."""
+        self._session: xr.Session | None = None
+        self._instance = self._make_instance()
+        self._running, self._present = False, True
+        try:
+            self._now = clock.runtime_clock(self._instance)
+            system = xr.get_system(self._instance)
+            names = xr.get_instance_properties(self._instance).runtime_name, xr.get_system_properties(self._instance, system).system_name
+            self.hardware = ", ".join(name.decode(errors="replace") for name in names)
+            self._session = xr.create_session(self._instance, xr.SessionCreateInfo(system_id=system))
+            self._base, self._head = (
+                xr.create_reference_space(self._session, xr.ReferenceSpaceCreateInfo(reference_space_type=kind))
+                for kind in (ORIGINS[origin], xr.ReferenceSpaceType.VIEW)
+            )
+        except xr.exception.XrException as error:
+            self.close()
+            raise DeviceError(f"there is no headset, or the OpenXR runtime refuses a session ({_said(error)}); plug it in and look at the runtime") from error
+        except DeviceError:
+            self.close()
+            raise
+
+    @staticmethod
+    def _make_instance() -> xr.Instance:
+        found = offered()
+        version = xr.Version(1, 0, 0)
+        about = xr.ApplicationInfo(application_name="trocar", application_version=1, engine_name="trocar", engine_version=1, api_version=version)
+        enabled = [HEADLESS, clock.EXTENSION, *({PRESENCE} & found)]
+        try:
+            return xr.create_instance(xr.InstanceCreateInfo(application_info=about, enabled_extension_names=enabled))
+        except xr.exception.XrException as error:  # also if it lacks something: only a failure makes the loader look for the active runtime anew
+            raise DeviceError(lacking(found)) if lacking(found) else _unanswered(error) from error
+
+    def locate(self) -> HeadState | NoHead:
+        """Return where the head is now. Raises DeviceError where the runtime or the session is gone."""
+        try:
+            self._heed_events()
+            if not self._running:
+                return NoHead(Level.WARN, "the OpenXR runtime has put the session to sleep; put the headset on")
+            if not self._present:
+                return NoHead(Level.WARN, "nobody wears the headset; put it on")
+            return self._located(self._now())
+        except xr.TimeInvalidError:  # SteamVR, at the start (cmbruns/pyopenxr_examples, issue 12)
+            return NoHead(Level.WARN, "the OpenXR runtime does not tell the time yet; wait, or restart it")
+        except xr.exception.XrException as error:
+            raise DeviceError(f"the OpenXR runtime or the headset is gone ({_said(error)}); start it, plug it in") from error
+
+    def _located(self, now: int) -> HeadState | NoHead:
+        velocity = xr.SpaceVelocity()
+        location = xr.SpaceLocation(next=velocity)
+        result = xr.check_result(xr.raw_functions.xrLocateSpace(self._head, self._base, now, byref(location)))
+        if result.is_exception():
+            raise result
+        if location.location_flags & _VALID != _VALID:
+            return NoHead(Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light")
+        p, q = location.pose.position, location.pose.orientation
+        linear = _vector(velocity.linear_velocity) if velocity.velocity_flags & xr.SpaceVelocityFlags.LINEAR_VALID_BIT else None
+        angular = _vector(velocity.angular_velocity) if velocity.velocity_flags & xr.SpaceVelocityFlags.ANGULAR_VALID_BIT else None
+        return HeadState(now * 1e-9, (p.x, p.y, p.z), (q.x, q.y, q.z, q.w), linear, angular)
+
+    def _heed_events(self) -> None:
+        while True:
+            try:
+                event = xr.poll_event(self._instance)
+            except xr.EventUnavailable:
+                return
+            if event.type == xr.StructureType.EVENT_DATA_SESSION_STATE_CHANGED:
+                self._change_to(_as(event, xr.EventDataSessionStateChanged).state)
+            elif event.type == xr.StructureType.EVENT_DATA_USER_PRESENCE_CHANGED_EXT:
+                self._present = bool(_as(event, xr.EventDataUserPresenceChangedEXT).is_user_present)
+            elif event.type == xr.StructureType.EVENT_DATA_INSTANCE_LOSS_PENDING:
+                raise DeviceError("the OpenXR runtime ends; start it again")
+
+    def _change_to(self, state: xr.SessionState) -> None:
+        """Follow the session's states; of those that are not named here the session runs on."""
+        assert self._session is not None
+        if state == xr.SessionState.READY:
+            xr.begin_session(self._session, xr.SessionBeginInfo())
+            self._running = True
+        elif state == xr.SessionState.STOPPING:
+            xr.end_session(self._session)
+            self._running = False
+        elif state in (xr.SessionState.LOSS_PENDING, xr.SessionState.EXITING):
+            raise DeviceError("the OpenXR runtime has ended the session; plug the headset in and look at the runtime")
+
+    def close(self) -> None:
+        """Destroy session and instance; what is gone already is left."""
+        with suppress(xr.exception.XrException):
+            if self._session is not None:
+                xr.destroy_session(self._session)
+        with suppress(xr.exception.XrException):
+            xr.destroy_instance(self._instance)
+
+
+def _as(event: xr.EventDataBuffer, kind: type[_Event]) -> _Event:
+    return cast(byref(event), POINTER(kind)).contents
+
+
+def _vector(v: xr.Vector3f) -> Vector3:
+    return v.x, v.y, v.z
+
+
+def _unanswered(error: xr.exception.XrException) -> DeviceError:
+    return DeviceError(f"no OpenXR runtime answers ({_said(error)}); start one, and make it the system's active one")
+
+
+def _said(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

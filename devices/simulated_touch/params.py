@@ -1,0 +1,101 @@
+"""What a scenario says of simulated styluses and of the hands that hold them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, field_validator
+
+from devices.haptics.limits import TOUCH
+from devices.haptics.params import SafetyParams
+from hub.participant import Params
+from robots.dvrk.parameters import UnitQuaternion
+from schemas.bag import bag_file
+from schemas.errors import RecordingError, ScenarioError
+from schemas.quantity import Damping, Duration, Length, Mass, Stiffness
+
+__all__ = ["LEVEL", "HandParams", "SimulatedStylusParams", "SimulatedTouchParams", "Waypoint"]
+
+LEVEL = (-0.5, 0.5, -0.5, 0.5)
+"""Orientation (x, y, z, w) of a stylus that points level away from the user: its z along x of the base frame, its x along -y, its y along -z."""
+
+
+class Waypoint(Params):
+    """Where the hand wants to be at a time, and at rest. What is left out is as before."""
+
+    at: Duration = Field(ge=0, description="time since the start")
+    position: tuple[Length, Length, Length] | None = Field(default=None, description="of the tip in the stylus' base frame: x ahead, y left, z up")
+    orientation: UnitQuaternion | None = Field(default=None, description="of the stylus in its base frame: quaternion x, y, z, w")
+    buttons: Annotated[tuple[int, ...], Field(max_length=2)] | None = Field(default=None, description="the buttons that are held from here on: 0, 1")
+
+    @field_validator("buttons")
+    @classmethod
+    def _known(cls, buttons: tuple[int, ...] | None) -> tuple[int, ...] | None:
+        if buttons is not None and not set(buttons) <= {0, 1}:
+            raise ValueError(f"a stylus has the buttons 0 and 1, not {buttons}")
+        return buttons
+
+
+class HandParams(Params):
+    """A hand with the stylus in it: a mass that spring and damper pull to where the hand wants to be.
+
+    The defaults are those of the study that chose the limits of the force (docs/decisions/0022).
+    """
+
+    mass: Mass = Field(default=0.15, gt=0.0, description="of the stylus and what moves with it")
+    stiffness: Stiffness = Field(default=200.0, gt=0.0, description="of the grip")
+    damping: Damping = Field(default=4.0, ge=0.0, description="of the grip")
+
+
+class SimulatedStylusParams(Params):
+    """One stylus, the hand that holds it, and the limits of the force on that hand."""
+
+    path: Annotated[
+        Annotated[tuple[Waypoint, ...], Tag("waypoints")] | Annotated[Path, Tag("recording")],
+        Discriminator(lambda path: "recording" if isinstance(path, str | Path) else "waypoints"),
+    ] = Field(
+        description="where the hand wants to be: waypoints, with least jerk from one to the next; or a recording of poses and buttons, an .mcap file or a"
+        " rosbag2 directory relative to the scenario, in which a hand without buttons holds the dead-man"
+    )
+    dead_man: Annotated[int, Field(ge=0, le=1, description="the button that is to be held for force")] = 0
+    hand: HandParams = HandParams()
+    safety: SafetyParams = SafetyParams()
+
+    @field_validator("path")
+    @classmethod
+    def _sound(cls, path: tuple[Waypoint, ...] | Path, info: ValidationInfo) -> tuple[Waypoint, ...] | Path:
+        """Hold the times in order, and find the recording."""
+        if isinstance(path, Path):
+            context: dict[str, Any] = info.context or {}
+            file = (Path(context.get("directory", Path.cwd())) / path).resolve()
+            try:
+                bag_file(file)
+            except RecordingError as error:
+                raise ValueError(str(error)) from error
+            return file
+        if not path:
+            raise ValueError("a path has at least one waypoint")
+        for before, after in pairwise(path):
+            if after.at <= before.at:
+                raise ValueError(f"the path's times go forward, but {after.at / 1e9:g} s comes after {before.at / 1e9:g} s")
+        return path
+
+    @field_validator("safety")
+    @classmethod
+    def _bearable(cls, safety: SafetyParams) -> SafetyParams:
+        try:
+            safety.within(TOUCH)
+        except ScenarioError as error:
+            raise ValueError(str(error)) from error
+        return safety
+
+
+class SimulatedTouchParams(Params):
+    """The styluses of one simulated device."""
+
+    styluses: Annotated[
+        dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], SimulatedStylusParams], Field(min_length=1, description="by name: right, left")
+    ]
+    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = 100_000_000

@@ -1,0 +1,84 @@
+"""How long things take: bounded histograms of times, and the three ways of a device's messages through a session."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+
+from schemas.trocar_msgs import Latency
+
+__all__ = ["Histogram", "Latencies", "by_way"]
+
+_BITS = 5
+"""Each doubling of time has 2^5 bins: a percentile is right within 1/32 of itself."""
+
+
+class Histogram:
+    """Counts of times in bins whose width grows with the time; memory is bounded by the number of bits of a time (64 x 32 bins at most)."""
+
+    def __init__(self) -> None:
+        self._bins: dict[int, list[int]] = {}
+        self.largest_ns = 0
+
+    @property
+    def count(self) -> int:
+        """How many times were counted."""
+        return sum(count for count, _ in self._bins.copy().values())
+
+    def add(self, time_ns: int) -> None:
+        """Count one time; below zero (two clocks, one offset) counts as zero."""
+        if time_ns < 0:
+            time_ns = 0
+        shift = time_ns.bit_length() - _BITS - 1
+        index = time_ns if shift <= 0 else (shift << _BITS) + (time_ns >> shift)
+        counted = self._bins.get(index)
+        if counted is None:
+            counted = self._bins[index] = [0, 0]
+        counted[0] += 1
+        counted[1] += time_ns
+        if time_ns > self.largest_ns:
+            self.largest_ns = time_ns
+
+    def percentile(self, share: float) -> float:
+        """Return the time (ns) below which `share` of all times are: the mean of its bin. Raises ValueError of nothing."""
+        bins = self._bins.copy()
+        rank, passed = share * sum(count for count, _ in bins.values()), 0
+        for index in sorted(bins):
+            count, total_ns = bins[index]
+            passed += count
+            if passed >= rank:
+                return total_ns / count
+        raise ValueError("no percentile of nothing")
+
+    def message(self, way: str, stream: str) -> Latency:
+        """Return what is told of a stream on its way; raises ValueError of nothing."""
+        p50_s, p99_s = (self.percentile(share) / 1e9 for share in (0.5, 0.99))
+        return Latency(way=way, stream=stream, count=self.count, p50_s=p50_s, p99_s=p99_s, largest_s=self.largest_ns / 1e9)
+
+
+class Latencies:
+    """A histogram for each stream. For use from any thread."""
+
+    def __init__(self) -> None:
+        self._histograms: dict[tuple[str, str], Histogram] = {}
+        self._lock = threading.Lock()
+
+    def add(self, way: str, stream: str, time_ns: int) -> None:
+        """Count one time of a stream on its way: `device to grant`, `grant to state` or `state to force`."""
+        with self._lock:
+            if (way, stream) not in self._histograms:
+                self._histograms[way, stream] = Histogram()
+            self._histograms[way, stream].add(time_ns)
+
+    def messages(self) -> list[Latency]:
+        """Return the percentiles of every stream, by way and name."""
+        with self._lock:
+            return [histogram.message(*key) for key, histogram in sorted(self._histograms.items())]
+
+
+def by_way(latencies: Iterable[Latency]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return latencies as a summary has them: way, stream, and its numbers."""
+    rows: dict[str, dict[str, dict[str, float]]] = {}
+    for one in latencies:
+        rows.setdefault(one.way, {})[one.stream] = {"count": one.count, "p50_s": one.p50_s, "p99_s": one.p99_s, "largest_s": one.largest_s}
+    return rows

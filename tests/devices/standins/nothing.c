@@ -1,0 +1,2 @@
+/* A library that is nobody's. */
+int nothing(void) { return 0; }
