@@ -18,7 +18,7 @@ _JOINT_STATE, _NUMBER, _STRING = "sensor_msgs/msg/JointState", "std_msgs/msg/Flo
 
 def teleoperation_ports(params: TeleoperationParams) -> tuple[Port, ...]:
     """Return the ports of a hand that leads an arm as `params` say."""
-    return (*_hand(params), *_arm(params), *_jaw(params), *_told(params))
+    return (*_hand(params), *_arm(params), *_jaw(params), *_streams(params), *_told(params))
 
 
 def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
@@ -50,7 +50,10 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
     at_rest = p.start + (0.0,) * (2 * len(names))
     fields = ("position", "velocity", "effort")
     seen = p.view == "camera"
-    meaning = "where the command starts, at the first step and whenever the arm gets ready; of a motion controller better its setpoint_js"
+    meaning = (
+        "where the command starts: at the first step, whenever the arm gets ready and, of an arm that tells its operating state, whenever the hand takes"
+        " over; of a motion controller its setpoint_js"
+    )
     return (
         Port(name="measured_js", causality="input", type=_JOINT_STATE, names=names, fields=fields, start=at_rest, description=meaning),
         Port(
@@ -58,7 +61,7 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
             causality="input",
             type="crtk_msgs/msg/OperatingState",
             variability="event",
-            description="of the arm: it follows while ENABLED and homed",
+            description="of the arm: it follows while ENABLED and homed; an arm that tells it may have other masters while it does not follow",
         ),
         Port(
             name="base_in_view",
@@ -86,6 +89,12 @@ def _jaw(p: TeleoperationParams) -> tuple[Port, ...]:
         Port(name="jaw/measured_js", causality="input", type=_JOINT_STATE, names=names, fields=fields, start=at_rest, description=meaning),
         Port(name="jaw/servo_jp", causality="output", type=_JOINT_STATE, names=names, description="command to the jaw; what rolls a needle in it stays"),
     )
+
+
+def _streams(p: TeleoperationParams) -> tuple[Port, ...]:
+    names = [f"{p.arm}/servo_jp", *([f"{p.arm}/jaw/servo_jp"] if p.tool.jaw_joints else [])]
+    meaning = "the command to the arm's motion controller, at every step while it follows; else nothing, so that others may move the arm"
+    return tuple(Port(name=name, causality="output", type=_JOINT_STATE, variability="event", description=meaning) for name in names)
 
 
 def _told(p: TeleoperationParams) -> tuple[Port, ...]:

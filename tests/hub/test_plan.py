@@ -58,6 +58,14 @@ def test_an_input_is_fed_once():
         plan_of(Part("a", out(), out("other")), Part("b", into()), connections=[*FROM_A_TO_B, "a.other -> b.in"])
 
 
+def test_a_queue_of_events_may_have_several_sources():
+    parts = Part("a", out(), out("other")), Part("b", into(variability="event"))
+    plan = plan_of(*parts, connections=[*FROM_A_TO_B, "a.other -> b.in"])
+    assert [link.source_port for link in plan.links] == ["out", "other"]
+    with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'"):
+        plan_of(*parts, connections=FROM_A_TO_B * 2)
+
+
 def test_a_connection_is_named_once():
     with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'") as raised:
         plan_of(Part("a", out()), Part("b", into()), connections=FROM_A_TO_B * 2)
@@ -229,7 +237,11 @@ def test_the_force_side_takes_whole_steps_of_the_motion_side():
 
 @pytest.mark.parametrize(
     ("of", "message"),
-    [("c.out", "unknown participant 'c'"), ("a.in", "no output 'in' to measure"), ("a.out.force", r"'a.out' has no field 'force'. Known: angular, angular.x, .*, linear, linear.x")],
+    [
+        ("c.out", "unknown participant 'c'"),
+        ("a.in", "no output 'in' to measure"),
+        ("a.out.force", r"'a.out' has no field 'force'. Known: angular, angular.x, .*, linear, linear.x"),
+    ],
 )
 def test_measures_are_of_outputs(of, message):
     part = Part("a", out(type="geometry_msgs/msg/TwistStamped"), into(start=(0.0,)))
