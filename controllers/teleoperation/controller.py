@@ -26,6 +26,9 @@ from schemas.vectors import Vector
 
 __all__ = ["Teleoperation"]
 
+_LOCKS = ("lock_rotation", "lock_translation")
+_POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
+"""Of a pose."""
 _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 
 
@@ -43,9 +46,10 @@ class Teleoperation(Stepped):
         self._view, self._engagement = View(params), Engagement(params)
         self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
         self._contact = ContactModelBuilder(params.force, params.planes)
-        self._memory = np.zeros(n + 19)
-        ends = [n, n + 7, n + 14, n + 15, n + 16, n + 17, n + 18]
-        self._command, self._goal, self._tip, self._scale, self._heard, self._started, self._told, self._shared = np.split(self._memory, ends)
+        self._memory = np.zeros(n + 29)
+        parts = np.split(self._memory, [n, n + 7, n + 14, n + 21, n + 23, n + 25, n + 26, n + 27, n + 28])
+        self._command, self._goal, self._tip, self._hand, self._locks, scales, self._started, self._told, self._shared, self._relocked = parts
+        self._scale, self._heard = np.split(scales, 2)
         self._jaw = np.zeros(len(params.tool.jaw_joints))
         self._state = (
             self._memory,
@@ -105,6 +109,9 @@ class Teleoperation(Stepped):
         for message in inputs.events("operating_state"):
             self._engagement.hear_arm(cast("OperatingState", message))
             self._shared[0] = 1.0
+        for i, what in enumerate(_LOCKS):
+            for wish in cast("tuple[BoolMessage, ...]", inputs.events(what)):
+                self._locks[i], self._relocked[0] = wish.data, 1.0
         for joy in cast("tuple[Joy, ...]", inputs.events("buttons")):
             self._engagement.hear_buttons(joy)
             if self._ghost is not None and joy.buttons.size > self.params.buttons.jaw:
@@ -141,9 +148,13 @@ class Teleoperation(Stepped):
             self._command[:] = advance(self._chain, self._command, twist, seconds)
             self._find_tip()
             return
-        if self._engagement.takes_over:
+        if self._engagement.takes_over or self._relocked[0]:
+            self._hand[:], self._relocked[0] = hand, 0.0
             self._law.engage(hand, self._tip, to_base, scale)
-        self._command[:] = self._law.step(self._command, hand, self._tip, to_base, scale, seconds * self._chain.velocity)
+        for lock, part in zip(self._locks, (_ORIENTATION, _POSITION), strict=True):
+            if not lock:
+                self._hand[part] = hand[part]
+        self._command[:] = self._law.step(self._command, self._hand, self._tip, to_base, scale, seconds * self._chain.velocity)
         self._find_tip()
 
     def _lead_jaw(self, gripper: float, seconds: float) -> None:

@@ -42,6 +42,11 @@ def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
             description="of the hand, 0 closed .. 1 open; negative: none, the button leads the jaw",
         ),
         Port(name="scale", causality="input", type=_NUMBER, start=(p.scale,), description="metres of the tip per metre of the hand, over 0 to 1"),
+        *(
+            Port(name=f"lock_{what}", causality="input", type="std_msgs/msg/Bool", variability="event", description=f"whether the tip keeps its {kept}")
+            for what, kept in (("rotation", "orientation"), ("translation", "position"))
+            if p.law == "pose"
+        ),
     )
 
 
@@ -49,7 +54,7 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
     base, names = f"{p.arm}_base", tuple(joint.name for joint in p.chain.joints)
     at_rest = p.start + (0.0,) * (2 * len(names))
     fields = ("position", "velocity", "effort")
-    seen = p.view == "camera"
+    seen = p.view != "base"
     meaning = (
         "where the command starts: at the first step, whenever the arm gets ready and, of an arm that tells its operating state, whenever the hand takes"
         " over; of a motion controller its setpoint_js"
@@ -69,7 +74,7 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
             type=_POSE,
             frame=_CAMERA if seen else "",
             start=None if seen else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-            description="of the arm's base frame in the camera's, for `view: camera`: the motion controller's SUJ/<arm>/measured_cp",
+            description="of the arm's base frame in the camera's, unless `view: base`: the motion controller's SUJ/<arm>/measured_cp",
         ),
         Port(name="tip_wrench", causality="input", type=_WRENCH, frame=base, start=(0.0,) * 6, description="of tissue on the instrument, at the tip"),
         Port(name="rigid_wrench", causality="input", type=_WRENCH, frame=base, start=(0.0,) * 6, description="of rigid things on the instrument, at the tip"),

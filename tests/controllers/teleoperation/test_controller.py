@@ -11,7 +11,7 @@ from robots import rotation
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
 from schemas.errors import StateError
-from schemas.ros import Joy
+from schemas.ros import BoolMessage, Joy
 from schemas.vectors import VectorCodec, has_vector
 from tests.controllers.teleoperation.rig import H, Session
 
@@ -308,3 +308,30 @@ def test_an_arm_without_a_controller_is_held_by_the_command():
     session.step(count=3)
     session.step([0])
     assert np.array_equal(session.command, before)
+
+
+def test_a_lock_keeps_position_or_orientation_and_lets_go_without_a_jump():
+    session = Session(orientation="follow", scale=1.0)
+    session.step(count=5)
+    start, turn = session.tip, session.turn
+
+    def lead(**locks):
+        session.inputs._events = {f"lock_{what}": (BoolMessage(data=lock),) for what, lock in locks.items()}
+        for _ in range(20):
+            session.hand[:3] += [1e-5, 2e-5, -1e-5]
+            session.turn_hand([1e-3, 0.0, -1e-3])
+            before = session.command
+            session.outputs = session.teleoperation.step(session.t, H, session.inputs)
+            session.t += H
+            session.inputs._events = {}
+            assert (np.abs(session.command - before) <= session.chain.velocity * 1e-3).all()
+        return session.tip, session.turn
+
+    position, orientation = lead(translation=True)
+    assert np.allclose(position, start, atol=1e-9)
+    assert not np.allclose(orientation, turn, atol=1e-3)
+    moved, kept = lead(translation=False, rotation=True)
+    assert np.allclose(kept, orientation, atol=1e-9)
+    assert np.allclose(moved - position, 19 * np.array([1e-5, 2e-5, -1e-5]), atol=1e-8)
+    _, turned = lead(rotation=False)
+    assert not np.allclose(turned, kept, atol=1e-3)
