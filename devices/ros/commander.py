@@ -9,8 +9,6 @@ from __future__ import annotations
 import threading
 from time import monotonic_ns
 
-from devices.ros.rules import Refused
-
 __all__ = ["Commander"]
 
 _KEPT_NS = 1_000_000_000
@@ -27,10 +25,11 @@ class Commander:
         self._client, self._until_ns = "", 0
         self._deciding = threading.Lock()
 
-    def check(self, client: str) -> None:
-        """Let `client` lead the arm from now on. Raises Refused while another one does."""
+    def refusal(self, client: str) -> str | None:
+        """Let `client` lead the arm from now on; return why not while another one does."""
         with self._deciding:
             now_ns = monotonic_ns()
             if client != self._client and self._client and (self.busy or now_ns < self._until_ns):
-                raise Refused(f"{client} is not heeded while {self._client} commands the arm; hold, free and state_command are")
+                return f"{client} is not heeded while {self._client} commands the arm; hold, free and state_command are"
             self._client, self._until_ns = client, now_ns + _KEPT_NS
+            return None

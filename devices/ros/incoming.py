@@ -7,7 +7,7 @@ from time import monotonic_ns, time_ns
 
 from devices.ros.commander import Commander
 from devices.ros.row import Row
-from devices.ros.rules import Refused, check, heard
+from devices.ros.rules import as_signal, check
 from devices.ros.stamps import stamp_of
 from devices.ros.traffic import Count
 from schemas.codec import decode, message_type
@@ -28,11 +28,11 @@ _BURST = 150
 class Incoming:
     """One subscribed row."""
 
-    def __init__(self, row: Row, commander: Commander | None, count: Count, hand_on: Callable[[Message], None], tell: Tell) -> None:
+    def __init__(self, row: Row, commander: Commander | None, count: Count, hand_on: Callable[[Row, Message], None], tell: Tell) -> None:
         """Take the row, who leads its arm (None: nobody asks), and where messages go."""
         self._row, self._commander, self._count, self._hand_on, self._tell = row, commander, count, hand_on, tell
         self._model = message_type(row.type)
-        self._port = row.port
+        self._state = row.port if row.port is not None and row.port.variability == "signal" else None
         self._begun_ns = time_ns()
         self._allowance, self._counted_ns = float(_BURST), monotonic_ns()
 
@@ -45,18 +45,24 @@ class Incoming:
         try:
             message = decode(self._model, payload)
             check(message, self._row)
-            if self._row.name == "state_command":
-                self._check_age(message, client)
-            if self._commander is not None and self._row.leads:
-                self._commander.check(client)
-            if self._port is not None and self._port.variability == "signal":
-                message = heard(message, self._port)
-        except Refused as refusal:
-            self._refuse("warning", str(refusal))
         except MessageError as error:
             self._refuse("error", f"{error} (from {client})")
+            return
+        reason = self._not_now(message, client)
+        if reason is None:
+            self._hand_on(self._row, message if self._state is None else as_signal(message, self._state))
         else:
-            self._hand_on(message)
+            self._refuse("warning", reason)
+
+    def _not_now(self, message: Message, client: str) -> str | None:
+        """Return why a valid message is not heeded now."""
+        stamp_ns = stamp_of(message)
+        if self._state is not None and stamp_ns == 0:
+            return f"marked invalid by {client} (stamp 0)"
+        if self._row.name == "state_command" and stamp_ns and stamp_ns < self._begun_ns:  # a connection has brought it, nobody gives it now
+            ago = (time_ns() - stamp_ns) / 1e9
+            return f"given {ago:.1f} s ago by the clock of {client}, before this gateway was there: if it is meant, give it again"
+        return self._commander.refusal(client) if self._commander is not None else None
 
     def _has_allowance(self) -> bool:
         now_ns = monotonic_ns()
@@ -66,13 +72,6 @@ class Incoming:
             return False
         self._allowance -= 1.0
         return True
-
-    def _check_age(self, message: Message, client: str) -> None:
-        """Raise Refused for a latched command that was given before the gateway was there: a client's connection has brought it, nobody gives it now."""
-        stamp_ns = stamp_of(message)
-        if stamp_ns and stamp_ns < self._begun_ns:
-            ago = (time_ns() - stamp_ns) / 1e9
-            raise Refused(f"given {ago:.1f} s ago by {client}'s clock, before this gateway was there: it is latched, not new; give it again if it is meant")
 
     def _refuse(self, topic: str, reason: str) -> None:
         self._count.refused += 1

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
+from devices.ros.outgoing import State
 from devices.ros.row import Row
 from devices.ros.transport import Handler
 from robots.dvrk.kinematics_queries import KinematicsQueries
@@ -18,12 +17,14 @@ from schemas.vectors import Vector
 __all__ = ["kinematics_handler"]
 
 
-def kinematics_handler(row: Row, chain: SerialChain, base: Callable[[], Vector | None]) -> Handler:
-    """Return what answers the service `row` of an arm with this kinematics; `base` returns where its base is in its reference, as a pose (7,)."""
+def kinematics_handler(row: Row, chain: SerialChain, base: State) -> Handler:
+    """Return what answers the service `row` of an arm with this kinematics; `base`: the pose of its base in its reference."""
     queries = KinematicsQueries(chain)
 
     def forward(payload: bytes) -> bytes:
-        stands = None if row.name.startswith("local/") else base()
+        stands = None if row.name.startswith("local/") else base.value
+        if stands is None and not row.name.startswith("local/"):
+            return encode(ForwardKinematicsResponse(message=f"nobody tells {base.port.name} now: is the session running?"))
         answer = queries.forward(decode(ForwardKinematicsRequest, payload).jp, stands)
         return encode(ForwardKinematicsResponse(cp=_pose(answer.value), result=answer.result, message=answer.message))
 

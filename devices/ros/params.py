@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -48,16 +48,17 @@ class GatewayParams(Params):
         default="", description="put before every topic that is not of a real arm, so that simulation and real system share one graph"
     )
     publish_period: Duration = Field(default=10_000_000, ge=500_000, description="of all states in wall time, whatever the step; 10 ms as on the dVRK")
-    robot_description: Path | None = Field(default=None, description="URDF file that is published as robot_description, as `trocar model` writes it")
+    robot_description: Path | None = Field(default=None, description="URDF file that is published as robot_description, as `trocar model export` writes it")
 
     @field_validator("robot_description")
     @classmethod
     def _find(cls, file: Path | None, info: ValidationInfo) -> Path | None:
         if file is None:
             return None
-        path = Path((info.context or {}).get("directory", Path.cwd())) / file
+        context: dict[str, Any] = info.context or {}
+        path = Path(context.get("directory", Path.cwd())) / file
         if not path.is_file():
-            raise ValueError(f"no file '{path}'; `trocar model` writes one")
+            raise ValueError(f"no file '{path}'; `trocar model export` writes one")
         return path.resolve()
 
     @model_validator(mode="after")

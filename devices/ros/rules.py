@@ -13,14 +13,10 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import JointState, PoseStamped, Quaternion
 
-__all__ = ["Refused", "check", "heard"]
+__all__ = ["as_signal", "check"]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of the norm, as for the values of signals (schemas.vectors)."""
-
-
-class Refused(MessageError):
-    """A valid message that is not heeded now."""
 
 
 def check(message: Message, row: Row) -> None:
@@ -56,15 +52,10 @@ def _check_quaternion(q: Quaternion) -> None:
         raise MessageError(f"quaternion (x, y, z, w) has norm {norm:.6g}, expected 1 within {_QUATERNION_TOLERANCE:g}")
 
 
-def heard(message: Message, port: Port) -> Message:
-    """Return what a real arm has told as the signal `port` has it: joints by our names, zeros for what it does not state.
-
-    Raises Refused if the message is marked invalid, by a stamp of 0.
-    """
-    if not (header := getattr(message, "header", None)) or not header.stamp.ns:
-        raise Refused("marked invalid by its sender (stamp 0)")
+def as_signal(message: Message, port: Port) -> Message:
+    """Return what a real arm has told as the signal `port` has it: joints by our names, zeros for what it does not state."""
     if not isinstance(message, JointState):
         return message
-    n = len(port.names)
     stated = {field: getattr(message, field) for field in port.fields}
-    return message.model_copy(update={"name": list(port.names)} | {field: value if value.size else np.zeros(n) for field, value in stated.items()})
+    zeros = np.zeros(len(port.names))
+    return message.model_copy(update={"name": list(port.names)} | {field: value if value.size else zeros for field, value in stated.items()})
