@@ -169,6 +169,8 @@ class Session:
         wire = Wire(session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts())))
         self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
+        for device in devices.values():
+            device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
         self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
 
     def _start(self) -> None:

@@ -27,18 +27,17 @@ class ZenohGateway(Gateway):
     """The kind `ros2-zenoh`."""
 
     params_model = ZenohParams
-    params: ZenohParams
 
     def __init__(self, name: str, params: ZenohParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
+        self._domain = params.domain
         self._connect: Callable[[], zenoh.Session] | None = None
 
     @property
     def foreign_keys(self) -> tuple[str, ...]:
         """Topics and services of the domain, what keeps their last messages, and the graph."""
-        domain = self.params.domain
-        return f"{domain}/**", f"{domain}/**/@adv/**", graph_key(domain)
+        return f"{self._domain}/**", f"{self._domain}/**/@adv/**", graph_key(self._domain)
 
     def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
         """Take what opens a Zenoh session with the hub."""
@@ -50,4 +49,4 @@ class ZenohGateway(Gateway):
             raise DeviceError(f"'{self.name}' shows ROS programs what its hub runs, and has been opened without one")
         from devices.ros.zenoh_transport import ZenohTransport  # it needs the extra
 
-        return ZenohTransport(self._connect(), self.params.domain)
+        return ZenohTransport(self._connect(), self._domain)

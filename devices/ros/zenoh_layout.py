@@ -10,11 +10,10 @@ import struct
 from dataclasses import dataclass
 from typing import Literal
 
+from devices.ros.service_hash import service_hash
 from schemas.codec import message_type, rihs01
 from schemas.errors import MessageError
 from schemas.message import msg_text
-
-from devices.ros.service_hash import service_hash
 
 __all__ = ["LATCHED", "VOLATILE", "Attachment", "Endpoint", "Kind", "graph_key", "key", "type_hash"]
 
