@@ -26,6 +26,7 @@ class ZenohParams(GatewayParams):
 class ZenohGateway(Gateway):
     """The kind `ros2-zenoh`."""
 
+    kind = "ros2-zenoh"
     params_model = ZenohParams
 
     def __init__(self, name: str, params: ZenohParams) -> None:
