@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
+from time import monotonic, sleep
 from typing import ClassVar
 
 from devices.ros.gateway import Gateway
@@ -57,8 +58,35 @@ class MemoryTransport(Transport):
 class MemoryGateway(Gateway):
     kind: ClassVar[str] = "memory"
     transport: MemoryTransport
-    make: ClassVar[Callable[[], MemoryTransport]] = MemoryTransport
 
     def connect(self, directory: Path) -> Transport:
         self.transport = MemoryTransport()
         return self.transport
+
+
+class MemoryPeer:
+    """A program in memory; see `crtk_table.Peer`."""
+
+    def __init__(self, transport: MemoryTransport, name: str = "/console") -> None:
+        self._transport, self._name = transport, name
+        self._at: dict[str, int] = {}
+
+    def join(self, rows: Sequence[Row]) -> None:
+        for row in rows:
+            missed = len(self._transport.published[row.topic])
+            self._at[row.topic] = max(missed - 1, 0) if row.latched else missed
+
+    def send(self, row: Row, message: Message) -> None:
+        self._transport.send(row.topic, message, self._name)
+
+    def heard(self, row: Row, timeout_s: float) -> Message:
+        until = monotonic() + timeout_s
+        while len(self._transport.published[row.topic]) <= self._at[row.topic]:
+            if monotonic() > until:
+                raise TimeoutError(f"nothing on {row.topic}")
+            sleep(0.002)
+        self._at[row.topic] += 1
+        return decode(message_type(row.type), self._transport.published[row.topic][self._at[row.topic] - 1])
+
+    def call(self, row: Row, request: Message) -> Message:
+        return decode(message_type(f"{row.type}_Response"), self._transport.handlers[row.topic](encode(request)))
