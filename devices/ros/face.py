@@ -105,6 +105,7 @@ _PARTS: Mapping[str, tuple[Mapping[str, str], Mapping[str, str]]] = {
             "operator_present": BUTTON,
             "clutch": BUTTON,
             "camera": BUTTON,
+            "warning": _STRING,
         },
         {
             "teleop/enable": _BOOL,
