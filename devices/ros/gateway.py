@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import defaultdict, deque
+from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, cast
 
@@ -15,7 +16,8 @@ from devices.ros.commander import Commander
 from devices.ros.face import face
 from devices.ros.incoming import Incoming
 from devices.ros.kinematics import kinematics_handler
-from devices.ros.outgoing import Event, Outgoing, Periodic, State
+from devices.ros.outgoing import Event, Outgoing, Periodic, Source, State
+from devices.ros.paper import paper_face
 from devices.ros.params import GatewayParams
 from devices.ros.refusals import Refusals
 from devices.ros.row import Row
@@ -72,7 +74,7 @@ class Gateway(Device):
 
     def table(self) -> tuple[Row, ...]:
         """Return the rows of what the parameters ask for."""
-        return face(self.params)
+        return face(self.params) if self.params.profile == "dvrk" else paper_face(self.params)
 
     @abstractmethod
     def connect(self, directory: Path) -> Transport:
@@ -103,7 +105,7 @@ class Gateway(Device):
         """Advertise all that is published; return what is published all the time."""
         rows = [(row, transport.advertise(row), self._traffic[row]) for row in self.rows if row.way == "publish"]
         self._states = {row.port.name: State(row.port) for row, _, _ in rows if row.port is not None and row.periodic}
-        whole = scenery(self.params, self._states)
+        whole: Mapping[str, Source] = scenery(self.params, self._states) if self.params.profile == "dvrk" else {}
         periodic: list[Periodic] = []
         for row, publish, count in rows:
             if row.port is not None and row.periodic:

@@ -36,6 +36,9 @@ class Arms(Params):
 class GatewayParams(Params):
     """Which part of the dVRK is shown, and which real one is listened to."""
 
+    profile: Literal["dvrk", "paper"] = Field(
+        default="dvrk", description="topics of the real system, or of the authors' simulator, behind which a participant of kind `paper` stands"
+    )
     arms: Arms = Field(default=Arms(), description="the simulated arms, as the motion controller is told them")
     mounting: Literal["free", "cart"] = Field(default="free", description="as the motion controller is told it")
     reference: Literal["camera", "base", "world"] = Field(default="camera", description="as the motion controller is told it")
