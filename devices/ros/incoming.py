@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from time import monotonic_ns, time_ns
 
@@ -25,6 +26,10 @@ _BURST = 150
 """Messages that may come at once: of a tenth of a second."""
 
 
+_REMEMBERED = 8
+"""State commands; more programs than that do not command one arm."""
+
+
 class Incoming:
     """One subscribed row."""
 
@@ -34,6 +39,8 @@ class Incoming:
         self._model = message_type(row.type)
         self._state = row.port if row.port is not None and row.port.variability == "signal" else None
         self._begun_ns = time_ns()
+        self._heeded: deque[int] = deque(maxlen=_REMEMBERED)
+        """Stamps of the newest state commands."""
         self._allowance, self._counted_ns = float(_BURST), monotonic_ns()
 
     def take(self, payload: bytes, client: str) -> None:
@@ -59,10 +66,19 @@ class Incoming:
         stamp_ns = stamp_of(message)
         if self._state is not None and stamp_ns == 0:
             return f"marked invalid by {client} (stamp 0)"
-        if self._row.name == "state_command" and stamp_ns and stamp_ns < self._begun_ns:  # a connection has brought it, nobody gives it now
+        if self._row.name == "state_command" and stamp_ns:
+            return self._latched(stamp_ns, client)
+        return self._commander.refusal(client) if self._commander is not None else None
+
+    def _latched(self, stamp_ns: int, client: str) -> str | None:
+        """Return why a state command is one that a new connection has brought, though nobody gives it now; otherwise remember it."""
+        if stamp_ns < self._begun_ns:
             ago = (time_ns() - stamp_ns) / 1e9
             return f"given {ago:.1f} s ago by the clock of {client}, before this gateway was there: if it is meant, give it again"
-        return self._commander.refusal(client) if self._commander is not None else None
+        if stamp_ns in self._heeded:  # maybe in another session: then the simulation does not know
+            return f"heeded before, with the same stamp, {stamp_ns / 1e9:.9f} s: a new one has a new stamp"
+        self._heeded.append(stamp_ns)
+        return None
 
     def _has_allowance(self) -> bool:
         now_ns = monotonic_ns()

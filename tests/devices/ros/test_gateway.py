@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from itertools import pairwise
 from pathlib import Path
 from time import sleep, time_ns
 from typing import Any
@@ -97,7 +98,7 @@ def test_states_are_published_at_its_own_rate_whatever_the_simulation_does(tmp_p
         told = gateway.transport.heard("/PSM1/measured_js")
     stamps = [message.header.stamp.ns for message in told if isinstance(message, JointState)]
     assert len(stamps) >= 10
-    assert all(one < other for one, other in zip(stamps, stamps[1:], strict=False))
+    assert all(one < other for one, other in pairwise(stamps))
     assert np.median(np.diff(stamps)) == pytest.approx(4e6, rel=0.5)
     assert gateway.transport.published["/ECM/measured_js"] == []  # nobody has told it
 
@@ -131,6 +132,9 @@ def test_frames_from_the_cart_to_tips_and_camera(tmp_path: Path) -> None:
     edges = {(one.header.frame_id, one.child_frame_id) for one in told.transforms}
     assert edges == {("Cart", "PSM1_base"), ("PSM1_base", "PSM1"), ("Cart", "ECM_base"), ("ECM_base", "ECM"), ("ECM", "endoscope_left_optical")}
     assert len({child for _, child in edges}) == len(edges)
+    assert len({one.header.stamp.ns for one in told.transforms}) == 1
+    for one in told.transforms[:4]:
+        assert one.transform.model_dump() == {"translation": {"x": 1.0, "y": 2.0, "z": 3.0}, "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
 def test_joint_states_of_all_arms(gateway: MemoryGateway) -> None:
@@ -247,6 +251,15 @@ def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> 
     gateway.transport.send("/PSM1/state_command", now)
     gateway.transport.send("/PSM1/state_command", StringStamped(string="enable"))  # from `ros2 topic pub`
     assert commands(gateway) == [("PSM1/state_command", now), ("PSM1/state_command", StringStamped(string="enable"))]
+
+
+def test_a_command_that_a_connection_brings_again_is_not_heeded_again(gateway: MemoryGateway) -> None:
+    command = StringStamped(header=Header(stamp=Time.from_ns(time_ns())), string="home")
+    for _ in range(2):
+        gateway.transport.send("/PSM1/state_command", command)
+    assert len(commands(gateway)) == 1
+    (told,) = words(gateway, "/PSM1/warning")
+    assert "heeded before" in told
 
 
 def test_one_program_at_a_time_commands_an_arm(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
