@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import ClassVar, cast
 
 from devices.ros.commander import Commander
+from devices.ros.description import description
 from devices.ros.face import face
 from devices.ros.incoming import Incoming
 from devices.ros.kinematics import kinematics_handler
@@ -116,7 +117,7 @@ class Gateway(Device):
                 every = max(1, round(TF_PERIOD_NS / self.params.publish_period)) if row.name == "tf" else 1
                 periodic.append(Periodic(whole[row.name], publish, count, every))
             elif self.params.robot_description is not None:
-                Event(publish, count).write(StringMessage(data=self.params.robot_description.read_text("utf-8")))
+                Event(publish, count).write(StringMessage(data=description(self.params.robot_description)))
         return periodic
 
     def _hand_on(self, row: Row, message: Message) -> None:

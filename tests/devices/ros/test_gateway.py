@@ -153,11 +153,19 @@ def test_joint_states_of_all_arms(gateway: MemoryGateway) -> None:
 
 def test_a_description_is_latched(tmp_path: Path) -> None:
     file = tmp_path / "dvrk.urdf"
-    file.write_text("<robot/>")
+    file.write_text('<robot name="dvrk"><mesh filename="assets/tip.obj" /><mesh filename="package://dvrk/tip.obj" /></robot>')
     with make(SMALL | {"robot_description": str(file)}) as gateway:
         gateway.open(tmp_path)
-        assert words(gateway, "/robot_description") == ["<robot/>"]
+        (told,) = words(gateway, "/robot_description")
+        assert told == f'<robot name="dvrk"><mesh filename="{tmp_path.as_uri()}/assets/tip.obj" /><mesh filename="package://dvrk/tip.obj" /></robot>'
         assert gateway.transport.rows["/robot_description"].latched
+
+
+def test_a_description_that_is_none(tmp_path: Path) -> None:
+    file = tmp_path / "dvrk.urdf"
+    file.write_text("solid tip")
+    with make(SMALL | {"robot_description": str(file)}) as gateway, pytest.raises(DeviceError, match="is no URDF"):
+        gateway.open(tmp_path)
 
 
 def test_a_service_without_a_session_says_so(gateway: MemoryGateway) -> None:
