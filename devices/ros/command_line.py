@@ -43,7 +43,9 @@ def ros(
 def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None:
     clients = ", ".join(f"{client.name}{f' ({client.address})' if client.address else ''}" for client in status.clients)
     out.print(f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'nobody'}", soft_wrap=True)
-    out.print(table(_rows(status), "topic", "direction", "per second", "messages", "refused", "why the last one"))
+    shown = table(_rows(status), "topic", "direction", "per second", "messages", "refused", "why the last one")
+    shown.columns[0].min_width = max((len(topic.topic) for topic in status.topics), default=0)  # nobody can read half a name
+    out.print(shown)
 
 
 def _rows(status: GatewayStatus) -> Iterable[tuple[Any, ...]]:
