@@ -50,4 +50,4 @@ class ZenohGateway(Gateway):
             raise DeviceError(f"'{self.name}' shows ROS programs what its hub runs, and has been opened without one")
         from devices.ros.zenoh_transport import ZenohTransport  # it needs the extra
 
-        return ZenohTransport(self._connect(), self._domain)
+        return ZenohTransport(self._connect, self._domain)

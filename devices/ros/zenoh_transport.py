@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from time import time_ns
 
 import zenoh
@@ -27,29 +28,36 @@ _HEARTBEAT_S = 0.5
 tells it once, and waits for every reader, we tell it all the time: a program that has stopped reading must hold up nobody."""
 
 
+_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+
+
 class ZenohTransport(Transport):
     """Publishes, listens and answers under rmw_zenoh's keys, as one node.
 
     Nothing that is published waits for a reader: what a program does not take is dropped for it, and of a latched topic it asks for the last message again.
-    States, events and pictures queue apart, so that pictures that a slow program does not take cost it no event.
+    States and events queue apart, and pictures have a session of their own: where one program does not take them, the router tries for 50 ms before it drops
+    the rest of a picture, and meanwhile reads nothing else of that session.
     """
 
-    def __init__(self, session: zenoh.Session, domain: int) -> None:
-        """Join the graph of `domain` over `session`, which is closed with the transport."""
-        self._session, self._domain, self._id = session, domain, str(session.zid())
+    def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
+        """Join the graph of `domain` with sessions that `connect` opens."""
+        self._session, self._pictures = (connect(), connect())
+        self._domain, self._id = domain, str(self._session.zid())
         self._graph = Graph(self._id)
         self._topics: set[str] = set()
         self._entities: list[ext.AdvancedPublisher | zenoh.Publisher | zenoh.Subscriber[None] | zenoh.Queryable[None] | zenoh.LivelinessToken] = []
         self._number = 0
         self._closed = False
-        watch = Callback(self._came_or_went, indirect=False)  # in the thread that also brings messages: no message comes before its sender
+        watch, session = (
+            Callback(self._came_or_went, indirect=False),
+            self._session,
+        )  # in the thread that also brings messages: no message comes before its sender
         self._entities.append(session.liveliness().declare_subscriber(graph_key(domain), watch, history=True))
         self._entities.append(session.liveliness().declare_token(Endpoint(self._id, 0, "NN", NODE).token(domain)))
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
-        address, drop = key(self._domain, row.topic, row.type), zenoh.CongestionControl.DROP
-        urgency = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH if row.latched else zenoh.Priority.DATA
-        cdr = zenoh.Encoding.APPLICATION_CDR
+        address, cdr, drop = key(self._domain, row.topic, row.type), zenoh.Encoding.APPLICATION_CDR, zenoh.CongestionControl.DROP
+        urgency = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH
         if row.latched:
             last, numbered = ext.CacheConfig(max_samples=1), ext.MissDetectionConfig(heartbeat=_HEARTBEAT_S)
             publisher = ext.declare_advanced_publisher(
@@ -58,13 +66,13 @@ class ZenohTransport(Transport):
                 encoding=cdr,
                 congestion_control=drop,
                 priority=urgency,
-                express=True,
                 cache=last,
                 sample_miss_detection=numbered,
                 publisher_detection=True,
             )
         else:
-            publisher = self._session.declare_publisher(address, encoding=cdr, congestion_control=drop, priority=urgency, express=True)
+            session = self._pictures if row.type in _PICTURES else self._session
+            publisher = session.declare_publisher(address, encoding=cdr, congestion_control=drop, priority=urgency)
         self._entities.append(publisher)
         gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
         sequence = 0
@@ -117,6 +125,7 @@ class ZenohTransport(Transport):
             for entity in self._entities:
                 entity.undeclare()
             self._session.close()
+            self._pictures.close()
 
     def _announce(self, kind: Kind, row: Row, quality: str) -> str:
         """Tell the graph of a publisher, subscriber or server; return its token."""

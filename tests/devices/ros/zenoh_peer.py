@@ -9,8 +9,12 @@ import struct
 import sys
 import threading
 import time
+from dataclasses import fields as fields_of
+from dataclasses import is_dataclass
 
+import numpy as np
 import zenoh
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zenoh import ext
 from zenoh.handlers import Callback
@@ -22,9 +26,9 @@ CRTK = {
         "std_msgs/Header header\ngeometry_msgs/Pose pose\nstd_msgs/Bool pose_is_valid\ngeometry_msgs/Twist twist\nstd_msgs/Bool twist_is_valid\n"
         "geometry_msgs/Wrench wrench\nstd_msgs/Bool wrench_is_valid"
     ),
-    "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "geometry_msgs/Vector3 p\ngeometry_msgs/Vector3 d\ngeometry_msgs/Vector3 bias",
+    "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "geometry_msgs/Vector3 p\ngeometry_msgs/Vector3 d\ngeometry_msgs/Vector3 bias\ngeometry_msgs/Vector3 deadband",
     "crtk_msgs/msg/CartesianImpedance": (
-        "std_msgs/Header header\ngeometry_msgs/Vector3 position\ngeometry_msgs/Quaternion orientation\n"
+        "std_msgs/Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3 force_position\ngeometry_msgs/Quaternion torque_orientation\n"
         "CartesianImpedanceHalfPlaneGains position_positive\nCartesianImpedanceHalfPlaneGains position_negative\n"
         "CartesianImpedanceHalfPlaneGains orientation_positive\nCartesianImpedanceHalfPlaneGains orientation_negative"
     ),
@@ -94,6 +98,9 @@ class Peer:
         publisher = self.session.declare_publisher(self.key(topic, type_), congestion_control=zenoh.CongestionControl.BLOCK)
         self.kept.append(publisher)
         gid, sent = os.urandom(16), 0
+        end = time.monotonic() + 5.0
+        while not publisher.matching_status.matching and time.monotonic() < end:  # as a program waits for its subscribers
+            time.sleep(0.005)
 
         def publish(message=None, raw=None):
             nonlocal sent
@@ -142,8 +149,30 @@ class Peer:
         return TYPES.deserialize_cdr(reply.ok.payload.to_bytes(), f"{package}/msg/{name}_Response"), went, reply.ok.attachment.to_bytes()
 
 
-def message(type_, **fields):
-    return TYPES.types[type_](**fields)
+def built(store, type_, fields):
+    """Return a message of rosbags from nested dictionaries."""
+    return store.types[type_](**{name: _value(store, desc, fields[name]) for name, desc in store.fielddefs[type_][1]})
+
+
+def _value(store, desc, value):
+    kind, rest = desc
+    if kind == Nodetype.NAME:
+        return built(store, rest, value)
+    if kind == Nodetype.BASE:
+        return value
+    (of, what), _ = rest
+    if of == Nodetype.NAME:
+        return [built(store, what, one) for one in value]
+    return list(value) if what[0] == "string" else np.array(value, {"byte": "uint8", "char": "uint8", "octet": "uint8"}.get(what[0], what[0]))
+
+
+def flat(message):
+    """Return a message of rosbags as nested dictionaries."""
+    if isinstance(message, list):
+        return [flat(one) for one in message]
+    if not is_dataclass(message):
+        return message
+    return {field.name: flat(getattr(message, field.name)) for field in fields_of(message) if not field.name.startswith("__")}
 
 
 def main(endpoint, domain):
