@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import get_args
 
-from devices.ros.params import GatewayParams, RealArm
+from devices.ros.params import GatewayParams, Real
 from devices.ros.row import Row
 from robots.dvrk import arms as dvrk
 from robots.dvrk.mounted import MountedEcm, MountedPsm
@@ -147,7 +147,8 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
     for carried in get_args(CartArm):
         rows += _setup_joints(carried, _reference(carried, params) if carried in params.arms.shown else "")
     for part, (events, commands) in _PARTS.items():
-        rows += _talk(part, events, commands)
+        if part not in params.listen:
+            rows += _talk(part, events, commands)
     for component in params.teleoperations:
         rows += _talk(component, *_TELEOPERATION)
     for camera in params.cameras:
@@ -157,7 +158,9 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         Row("/joint_states", _JOINT_STATE, "publish", periodic=True),
         Row("/robot_description", _STRING, "publish", latched=True),
     )
-    return tuple(_named(row, params.namespace) for row in rows) + tuple(row for name in params.listen for row in _listened(name))
+    return tuple(_named(row, params.namespace) for row in rows) + tuple(
+        row for name in params.listen for row in (_pedals() if name == "footpedals" else _listened(name))
+    )
 
 
 def _reference(arm: CartArm, params: GatewayParams) -> str:
@@ -259,8 +262,11 @@ _REAL_MAX_AGE_NS = 100_000_000
 """A state of a real arm that is older is marked stale: ten periods of 10 ms."""
 
 
-def _listened(arm: RealArm) -> Iterator[Row]:
-    """Yield the rows of a real arm: its states and events come in, commands to it go out."""
+def _listened(arm: Real) -> Iterator[Row]:
+    """Yield the rows of a real arm: its states and events come in, commands to it go out; or those of real pedals."""
+    if arm == "footpedals":
+        yield from _talk(arm, {}, _PARTS[arm][0])
+        return
     names = tuple(joint.name for joint in dvrk.chain(arm).joints)
     is_master, is_psm = arm.startswith("MTM"), arm.startswith("PSM")
     gripper = "gripper" if is_master else "jaw" if is_psm else ""

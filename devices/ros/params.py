@@ -13,9 +13,9 @@ from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.quantity import Duration
 
-__all__ = ["Arms", "GatewayParams", "RealArm"]
+__all__ = ["Arms", "GatewayParams", "Real"]
 
-RealArm = Literal["PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR"]
+Real = Literal["PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR", "footpedals"]
 
 
 class Arms(Params):
@@ -42,7 +42,9 @@ class GatewayParams(Params):
     arms: Arms = Field(default=Arms(), description="the simulated arms, as the motion controller is told them")
     mounting: Literal["free", "cart"] = Field(default="free", description="as the motion controller is told it")
     reference: Literal["camera", "base", "world"] = Field(default="camera", description="as the motion controller is told it")
-    listen: tuple[RealArm, ...] = Field(default=(), description="real arms: their states come in, and commands to them go out")
+    listen: tuple[Real, ...] = Field(
+        default=(), description="real arms: their states come in, and commands to them go out; `footpedals`: what is pressed comes in, instead of going out"
+    )
     teleoperations: tuple[Annotated[str, Field(pattern=r"^MTM[LR]_(PSM[123]|ECM)$")], ...] = Field(
         default=(), description="teleoperation components of the console, such as MTMR_PSM1"
     )

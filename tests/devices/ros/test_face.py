@@ -108,3 +108,9 @@ def test_a_description_that_is_not_there() -> None:
 @pytest.mark.parametrize(("topic", "leads"), [("servo_jp", True), ("jaw/move_jp", True), ("body/servo_cf", True), ("hold", False), ("state_command", False)])
 def test_what_leads_an_arm(topic: str, leads: bool) -> None:
     assert ROWS[f"/PSM1/{topic}"].leads is leads
+
+
+def test_real_pedals_come_in_instead_of_going_out():
+    rows = [row for row in face(GatewayParams.model_validate({"listen": ["footpedals"], "namespace": "simulation"})) if row.owner == "footpedals"]
+    assert {row.way for row in rows} == {"subscribe"}
+    assert "/footpedals/clutch" in {row.topic for row in rows}
