@@ -158,9 +158,7 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         Row("/joint_states", _JOINT_STATE, "publish", periodic=True),
         Row("/robot_description", _STRING, "publish", latched=True),
     )
-    return tuple(_named(row, params.namespace) for row in rows) + tuple(
-        row for name in params.listen for row in (_pedals() if name == "footpedals" else _listened(name))
-    )
+    return tuple(_named(row, params.namespace) for row in rows) + tuple(row for name in params.listen for row in _listened(name))
 
 
 def _reference(arm: CartArm, params: GatewayParams) -> str:
