@@ -41,19 +41,17 @@ class ZenohTransport(Transport):
 
     def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
         """Join the graph of `domain` with sessions that `connect` opens."""
-        self._session, self._pictures = (connect(), connect())
+        self._session, self._pictures = connect(), connect()
         self._domain, self._id = domain, str(self._session.zid())
         self._graph = Graph(self._id)
         self._topics: set[str] = set()
         self._entities: list[ext.AdvancedPublisher | zenoh.Publisher | zenoh.Subscriber[None] | zenoh.Queryable[None] | zenoh.LivelinessToken] = []
         self._number = 0
         self._closed = False
-        watch, session = (
-            Callback(self._came_or_went, indirect=False),
-            self._session,
-        )  # in the thread that also brings messages: no message comes before its sender
-        self._entities.append(session.liveliness().declare_subscriber(graph_key(domain), watch, history=True))
-        self._entities.append(session.liveliness().declare_token(Endpoint(self._id, 0, "NN", NODE).token(domain)))
+        watch = Callback(self._came_or_went, indirect=False)  # in the thread that also brings messages: no message comes before its sender
+        liveliness = self._session.liveliness()
+        self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
+        self._entities.append(liveliness.declare_token(Endpoint(self._id, 0, "NN", NODE).token(domain)))
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         address, cdr, drop = key(self._domain, row.topic, row.type), zenoh.Encoding.APPLICATION_CDR, zenoh.CongestionControl.DROP

@@ -1,13 +1,12 @@
 """A ROS 2 program on Zenoh that shares nothing with the gateway: written from rmw_zenoh's docs/design.md alone, on eclipse-zenoh and rosbags.
 
-As a program, `python -m tests.devices.ros.zenoh_peer ENDPOINT DOMAIN`, it listens to all topics and says how many messages it has had each time that it reads a line.
+As a program, `python -m tests.devices.ros.zenoh_peer ENDPOINT DOMAIN`, it says that it is ready, and listens to all topics until it is killed.
 """
 
 import json
 import os
 import struct
 import sys
-import threading
 import time
 from dataclasses import fields as fields_of
 from dataclasses import is_dataclass
@@ -26,9 +25,10 @@ CRTK = {
         "std_msgs/Header header\ngeometry_msgs/Pose pose\nstd_msgs/Bool pose_is_valid\ngeometry_msgs/Twist twist\nstd_msgs/Bool twist_is_valid\n"
         "geometry_msgs/Wrench wrench\nstd_msgs/Bool wrench_is_valid"
     ),
-    "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "geometry_msgs/Vector3 p\ngeometry_msgs/Vector3 d\ngeometry_msgs/Vector3 bias\ngeometry_msgs/Vector3 deadband",
+    "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "\n".join(f"geometry_msgs/Vector3 {name}" for name in ("p", "d", "bias", "deadband")),
     "crtk_msgs/msg/CartesianImpedance": (
-        "std_msgs/Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3 force_position\ngeometry_msgs/Quaternion torque_orientation\n"
+        "std_msgs/Header header\n"
+        "geometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3 force_position\ngeometry_msgs/Quaternion torque_orientation\n"
         "CartesianImpedanceHalfPlaneGains position_positive\nCartesianImpedanceHalfPlaneGains position_negative\n"
         "CartesianImpedanceHalfPlaneGains orientation_positive\nCartesianImpedanceHalfPlaneGains orientation_negative"
     ),
@@ -176,16 +176,11 @@ def flat(message):
 
 
 def main(endpoint, domain):
-    session, heard, counting = opened(endpoint), [0], threading.Lock()
-
-    def count(_):
-        with counting:
-            heard[0] += 1
-
-    session.declare_subscriber(f"{domain}/**", Callback(count, indirect=False))
-    print("ready", flush=True)
-    for _ in sys.stdin:
-        print(heard[0], flush=True)
+    with opened(endpoint) as session:
+        session.declare_subscriber(f"{domain}/**", Callback(lambda _: None, indirect=False))
+        sys.stdout.write("ready\n")
+        sys.stdout.flush()
+        sys.stdin.read()
 
 
 if __name__ == "__main__":
