@@ -238,7 +238,10 @@ class PortReceiver:
 
 
 class PortPublisher:
-    """Publishes the values of one output port; without a reader it costs one flag test."""
+    """Publishes the values of one output port; without a reader it costs one flag test.
+
+    A step without events is told only to those who need every value (`always`): dozens of quiet ports cost nothing.
+    """
 
     def __init__(
         self, session: zenoh.Session, keys: Keys, key_role: str, participant: str, port: Port, run: int, *, always: bool, lanes: Sequence[LaneSender] = ()
@@ -253,7 +256,7 @@ class PortPublisher:
             priority=zenoh.Priority.REAL_TIME,
             express=True,
         )
-        self._wanted = always
+        self._always = self._wanted = always
         if not always:
             self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
             self._match(self._publisher.matching_status)
@@ -270,7 +273,7 @@ class PortPublisher:
         if not self.codec.is_event:
             self._publisher.put(self.codec.encode(value, time_ns), attachment=Tag.pack(self._run, 0, step, time_ns))
             return
-        if not value:
+        if not value and self._always:
             self._publisher.put(b"", attachment=Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
             self._publisher.put(encode(message), attachment=Tag.pack(self._run, 0, step, time_ns, index, len(value)))
