@@ -206,9 +206,10 @@ def test_a_second_console_does_not_command_the_same_arm(psm, hub):
         assert "second" in warnings[0] or "publisher" in warnings[0]
 
 
-@pytest.mark.parametrize(
-    "payload", [b"", b"\x00\x01\x00\x00", b"\x00\x01\x00\x00" + b"\xff" * 60, bytes(range(256)) * 16], ids=["empty", "header", "lengths", "noise"]
-)
+NO_MESSAGES = {"empty": b"", "header": b"\x00\x01\x00\x00", "lengths": b"\x00\x01\x00\x00" + b"\xff" * 60, "noise": bytes(range(256)) * 16}
+
+
+@pytest.mark.parametrize("payload", NO_MESSAGES.values(), ids=NO_MESSAGES)
 def test_bytes_that_are_no_message_move_nothing(psm, peer, payload):
     warnings = complaints(peer)
     publish = peer.publisher(COMMAND, JOINTS)

@@ -16,7 +16,7 @@ import zenoh
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from zenoh import ext
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, FifoChannel
 
 CRTK = {
     "crtk_msgs/msg/OperatingState": "std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy",
@@ -119,18 +119,18 @@ class Peer:
             take(TYPES.deserialize_cdr(sample.payload.to_bytes(), type_), (*struct.unpack_from("<qqB", attached), attached[17:]))
 
         if not latched:
-            self.kept.append(self.session.declare_subscriber(self.key(topic, type_), Callback(heard)))
+            self.kept.append(self.session.declare_subscriber(self.key(topic, type_), Callback(heard, indirect=False)))
             return
         history, recovery = ext.HistoryConfig(detect_late_publishers=True, max_samples=1), ext.RecoveryConfig(heartbeat=True)
         subscriber = ext.declare_advanced_subscriber(
-            self.session, self.key(topic, type_), Callback(heard), history=history, recovery=recovery, subscriber_detection=True
+            self.session, self.key(topic, type_), Callback(heard, indirect=False), history=history, recovery=recovery, subscriber_detection=True
         )
         self.kept.insert(0, subscriber)
 
     def graph(self):
         """Return (node, kind, topic, type, hash, quality) of all that is there."""
         found = []
-        for reply in self.session.liveliness().get(f"@ros2_lv/{self.domain}/**", timeout=5):
+        for reply in self.session.liveliness().get(f"@ros2_lv/{self.domain}/**", FifoChannel(10_000), timeout=5):
             parts = str(reply.ok.key_expr).split("/")
             found.append((parts[8], parts[5], *([parts[9].replace("%", "/"), *parts[10:]] if len(parts) > 9 else [])))
         return found
