@@ -44,14 +44,16 @@ def access_settings(plan: Plan, session: str, foreign: Mapping[str, Sequence[str
     keys = Keys(session)
     rights = {member.name: _part(plan, keys, member) for member in plan.members.values() if member.host.startswith("remote/")}
     rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]  # all that `trocar ls` needs
+    everything = ["**"]  # but what has a chunk that begins with @, as some foreign keys have
     for name, shared in (foreign or {}).items():
+        everything += shared
         for whose in (CONSOLE, name) if name in rights else (CONSOLE,):
             rights[whose] = [*rights.get(whose, ()), _allow("both", _ALL, *shared)]
     rules = {f"{name} {index}": rule for name, its in rights.items() for index, rule in enumerate(its)}
     access = {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [{"id": "local", **_allow("both", _ALL, "**")}, *({"id": name, **rule} for name, rule in rules.items())],
+        "rules": [{"id": "local", **_allow("both", _ALL, *everything)}, *({"id": name, **rule} for name, rule in rules.items())],
         "subjects": [{"id": "local", "link_protocols": ["tcp"]}, *({"id": name, "cert_common_names": [name]} for name in rights)],
         "policies": [
             {"subjects": ["local"], "rules": ["local"]},
