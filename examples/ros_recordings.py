@@ -2,9 +2,9 @@
 
     python examples/ros_recordings.py configs/data
 
-`masters`: a surgeon at the console. Both masters are told at 100 Hz, as the dVRK publishes; the right one moves twice to the right, with the clutch
-pressed on its way back, and closes its gripper; at last the camera pedal is pressed. `real_arms`: PSM1 and ECM, moving. All movements are of minimum
-jerk (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3), so that velocities are those of the positions.
+`masters`: a surgeon at the console, who homes the arms. Both masters are told at 100 Hz, as the dVRK publishes; the right one moves twice to the right,
+with the clutch pressed on its way back, and closes its gripper; at last both drag the picture to the right with the camera pedal pressed. `real_arms`:
+PSM1 and ECM, moving. All movements are of minimum jerk (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3), so that velocities are those of the positions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robots.dvrk import ecm, psm
 from schemas.codec import encode, typestore
 from schemas.crtk import OperatingState
 from schemas.message import Message
-from schemas.ros import BoolMessage, Header, JointState, Joy, Point, Pose, PoseStamped, Time
+from schemas.ros import BoolMessage, EmptyMessage, Header, JointState, Joy, Point, Pose, PoseStamped, Time
 
 RATE_HZ = 100
 Told = Iterator[tuple[float, str, Message]]
@@ -46,14 +46,16 @@ def masters() -> Told:
     """Yield the console of a surgeon, 8 s."""
     for master in ("MTML", "MTMR"):
         yield 0.0, f"/{master}/operating_state", OperatingState(state="ENABLED", is_homed=True)
+    yield 0.05, "/system/home", EmptyMessage()
     yield 0.1, "/console/teleop/enable", BoolMessage(data=True)
-    pedals = ((0.2, "operatorpresent", 1), (4.0, "clutch", 1), (5.0, "clutch", 0), (7.0, "camera", 1), (7.5, "camera", 0))
+    pedals = ((0.2, "operatorpresent", 1), (4.0, "clutch", 1), (5.0, "clutch", 0), (6.6, "camera", 1), (7.8, "camera", 0))
     for t, pedal, pressed in pedals:
         yield t, f"/footpedals/{pedal}", Joy(buttons=np.array([pressed], np.int32))
     for t in np.arange(0, 8 * RATE_HZ) / RATE_HZ:
         right, _ = between((0.0, 2.5, 3.8, 4.1, 4.9, 5.2, 6.5, 8.0), [[x, 0.0, 0.0] for x in (0.0, 0.0, -0.05, -0.05, 0.0, 0.0, -0.05, -0.05)], t)
-        for master, way in (("MTML", np.zeros(3)), ("MTMR", right)):
-            position = np.array([0.12 if master == "MTML" else -0.12, -0.1, 0.05]) + way  # x is to the left in the display, y up, z ahead
+        both, _ = between((0.0, 6.7, 7.7, 8.0), [[x, 0.0, 0.0] for x in (0.0, 0.0, -0.03, -0.03)], t)
+        for master, way in (("MTML", both), ("MTMR", both + right)):
+            position = np.array([0.12 if master == "MTML" else -0.12, -0.1, 0.3]) + way  # x is to the left in the display, y up, z ahead
             pose = Pose(position=Point(**dict(zip("xyz", position.tolist(), strict=True))))
             yield t, f"/{master}/measured_cp", PoseStamped(pose=pose)
             closing = [[1.0], [1.0], [0.2], [0.2]] if master == "MTMR" else [[1.0]] * 4

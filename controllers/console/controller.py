@@ -170,9 +170,11 @@ class Console(Stepped):
             self._voice.say(f"console/teleop/{'selected' if component.selected[0] else 'unselected'}", StringMessage(data=name))
 
     def _lead_camera(self) -> None:
-        """Tell who leads the endoscope whether it may."""
+        """Tell who leads the endoscope whether it may; make the endoscope ready first."""
         leads = self._enabled[0] and self._operator[0] and self._camera[0]
         if leads != self._leads_camera[0]:
+            for command in self._readiness.orders("ECM") if leads and "ECM" in self.params.arms else ():
+                self._voice.say("ECM/state_command", StringStamped(string=command))
             self._leads_camera[0] = leads
             self._voice.say("teleop/ECM/buttons", Joy(buttons=np.array([leads], np.int32)))
 

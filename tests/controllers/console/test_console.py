@@ -155,6 +155,11 @@ def test_the_camera_pedal_holds_the_arms_and_leads_the_endoscope():
     assert rig.said("MTMR_PSM1/desired_state") == ["ENABLED"]
 
 
+def test_an_endoscope_that_is_not_ready_is_homed_when_it_is_to_be_led():
+    rig = Rig(enabled=True).step({"ECM/operating_state": OFF, "console/emulate_operator_present": DOWN})
+    assert rig.step({"pedals/camera": DOWN}).said("ECM/state_command") == ["enable", "home"]
+
+
 def test_a_surgeon_who_looks_up_holds_everything():
     rig = Rig().led()
     rig.step({"pedals/operatorpresent": UP})
