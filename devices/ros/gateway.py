@@ -160,9 +160,11 @@ class Gateway(Device):
             self._early[port] = value
 
     def _say(self, port: str, text: StringMessage) -> None:
-        """Publish a word of the gateway itself, where there is a topic for it."""
-        if port in self._events:
-            self._events[port].write(text)
+        """Publish a word of the gateway itself, where there is a topic for it: the console has warnings only."""
+        owner = port.rpartition("/")[0]
+        event = self._events.get(port) or self._events.get(f"{owner}/warning")
+        if event is not None:
+            event.write(text)
 
     def close(self) -> None:
         """Leave the graph."""

@@ -212,6 +212,18 @@ def test_only_six_finite_positions_move_an_arm(positions: list[float], velocitie
 
 
 @settings(max_examples=60, deadline=None)
+@given(q=st.tuples(*[st.floats(-2.0, 2.0)] * 4))
+def test_only_unit_quaternions_are_orientations(q: tuple[float, ...]) -> None:
+    gateway = _opened()
+    pose = PoseStamped.model_validate({"pose": {"orientation": dict(zip("xyzw", q, strict=True))}})
+    good = abs(float(np.linalg.norm(q)) - 1.0) <= 1e-3
+    for topic in ("/PSM1/servo_cp", "/PSM1/move_cp"):
+        gateway.transport.send(topic, pose)
+    assert len(commands(gateway)) == 2 * good
+    assert len(words(gateway, "/PSM1/error")) == 2 * (not good)
+
+
+@settings(max_examples=60, deadline=None)
 @given(payload=st.binary(max_size=200))
 def test_no_bytes_bring_it_down(payload: bytes) -> None:
     gateway = _opened()
@@ -248,6 +260,12 @@ def _cdr(positions: list[float], velocities: list[float]) -> bytes:
     for mark, number in zip(marks, [*positions, *velocities], strict=True):
         raw = raw.replace(np.float64(mark).tobytes(), np.float64(number).tobytes(), 1)
     return raw
+
+
+def test_the_console_has_warnings_only(gateway: MemoryGateway) -> None:
+    gateway.transport.send("/console/teleop/set_scale", b"nonsense")
+    (told,) = words(gateway, "/console/warning")
+    assert told.startswith("console: teleop/set_scale refused: std_msgs/msg/Float64")
 
 
 def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> None:
