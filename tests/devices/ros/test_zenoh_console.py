@@ -1,11 +1,15 @@
 """A ROS 2 program on another machine, at the gate of a hub."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from devices.ros.zenoh_gateway import ZenohGateway
 from hub.access import access_settings
 from hub.gate import Gate
 from hub.plan import Member, Plan
+from hub.wire import open_session
 from schemas.crtk import OperatingState
 from schemas.keys import Keys
 from schemas.ros import StringMessage
@@ -69,6 +73,28 @@ def test_a_late_console_gets_the_last_event(gated):
         states = []
         console.listen(EVENT, STATE_TYPE, lambda message, _: states.append(message.state), latched=True)
         assert until(lambda: states == ["ENABLED"])
+
+
+def test_a_gateway_on_another_machine_is_seen_at_the_hub(tmp_path):
+    authority, outside = Authority.founded(tmp_path), f"tls/127.0.0.1:{free_port()}"
+    with router() as inside:
+        gateway = ZenohGateway("ros", ZenohGateway.params_model.model_validate(ARM))
+        far = PLAN.model_copy(update={"members": {"ros": PLAN.members["ros"].model_copy(update={"host": "remote/ros"})}})
+        gate = Gate([outside], authority.hub.listening() | access_settings(far, "s", {"ros": gateway.foreign_keys}))
+        gate.open(inside)
+        gateway.learn_hub(partial(open_session, "client", connect=[outside], security=authority.issued("ros").connecting()))
+        try:
+            with gateway, Peer(inside) as console:
+                gateway.open(tmp_path)
+                heard, states = [], []
+                console.listen(STATE, JOINTS, lambda message, _: heard.append(message))
+                console.listen(EVENT, STATE_TYPE, lambda message, _: states.append(message.state), latched=True)
+                gateway.write(EVENT[1:], OperatingState(state="ENABLED"))
+                assert until(lambda: gateway.write(STATE[1:], np.zeros(18)) or (heard and states))
+                console.publisher(COMMAND, JOINTS)(joints())
+                assert until(lambda: any(sample.port == COMMAND[1:] for sample in gateway.read(0)))
+        finally:
+            gate.close()
 
 
 @pytest.mark.parametrize(("name", "domain"), [("console", 1), ("observer", 0)])
