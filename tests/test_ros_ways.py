@@ -1,10 +1,16 @@
 """The scenarios in which a real dVRK leads or is mirrored, with the recordings that stand for it; and with a gateway in their place, as far as wiring goes."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from hub.endpoint import free_endpoint
 from hub.launch import launch, plan_of
 from hub.scenario_file import load
+from schemas.bag import Bag
 from schemas.scenario import Connection
 
 pytest.importorskip("mujoco")
@@ -61,3 +67,14 @@ def test_what_is_said_of_every_arm_reaches_programs_and_back(name):
     else:
         assert told >= {"dvrk/PSM1/state_joint_current", "dvrk/setup_joint/state_joint_current", "stereo/right/camera_info"}
         assert heard >= {"dvrk/PSM2/state_joint_desired", "dvrk/ECM/state_joint_desired", "release_needle"}
+
+
+@pytest.mark.parametrize("name", ["masters", "real_arms"])
+def test_the_recordings_are_what_the_example_writes(name, tmp_path):
+    root = Path(__file__).parents[1]
+    subprocess.run([sys.executable, root / "examples" / "ros_recordings.py", tmp_path], check=True, cwd=root, env={**os.environ, "PYTHONPATH": str(root)})
+    written, committed = (
+        [(message.topic, message.time_ns, bytes(message.payload)) for message in Bag(directory / name).messages()]
+        for directory in (tmp_path, root / "configs" / "data")
+    )
+    assert written == committed
