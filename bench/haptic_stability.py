@@ -184,16 +184,16 @@ def random_trials(count: int) -> Iterator[Trial]:
     chance = random.Random(1)
     for _ in range(count):
         surface = {"stiffness": 10 ** chance.uniform(1.7, 4.2), "power": chance.choice((1.0, 1.5, 2.0))}
-        surface |= {"damping": chance.choice((0.0, 1.0, 4.0)), "friction": chance.choice((0.0, 0.2, 0.4))}
+        surface |= {"damping": chance.choice((0.0, 1.0, 4.0, 10.0)), "friction": chance.choice((0.0, 0.2, 0.4))}
         yield Trial(
             surface,
             scale=chance.choice((0.1, 0.2, 0.4, 1.0)),
             delay=chance.choice((0.0, 0.07, 0.1, 0.2, 0.3)),
-            jitter=chance.choice((0.0, 0.01, 0.03)),
-            loss=chance.choice((0.0, 0.02, 0.05)),
+            jitter=chance.choice((0.0, 0.01, 0.03, 0.05)),
+            loss=chance.choice((0.0, 0.02, 0.05, 0.2)),
             depth=chance.uniform(0.003, 0.02),
             slide=chance.choice((0.0, chance.uniform(0.005, 0.05))),
-            hand=(chance.choice((0.1, 0.15, 0.3)), chance.choice((100.0, 200.0, 400.0)), chance.choice((3.0, 4.0, 8.0))),
+            hand=(chance.choice((0.1, 0.15, 0.3)), chance.choice((100.0, 200.0, 400.0)), chance.choice((2.0, 3.0, 4.0, 8.0))),
         )
 
 
@@ -210,6 +210,7 @@ def figures(rows: np.ndarray) -> dict[str, float]:
 def largest_gain(stiffness: float, settling: float) -> float:
     """Return the largest |1 - tangent / secant| at which the loop is stable whatever the delay, by the small-gain theorem (docs/decisions/0025)."""
     s, (mass, grip, damping) = 1j * np.logspace(-1, 4, 200_001), Trial().hand
+    damping += ForceParams().damping
     return float(np.min(np.abs((mass * s**2 + damping * s + grip + stiffness) * (1.0 + s * settling))) / stiffness)
 
 

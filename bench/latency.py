@@ -3,7 +3,7 @@
     python bench/latency.py --json
 
 Measured end to end by the hand: from the sample in which it has jumped to the arrival of the first pose of the tip that moves. Beside it
-stand the parts that the session itself tells of.
+stand the parts that the session itself tells of. On a machine that others use too, `chrt -f 10` in front (Linux, as root) tells what it would be alone.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The servo process of the haptic styluses: how well it keeps its time, and what the hand feels when its host is killed.
 
-    python bench/servo.py [--seconds 20] [--planes 4] [--idle]
+    python bench/servo.py [--seconds 20] [--styluses 2] [--planes 4] [--idle]
 
-Two styluses of the stand-in for HDAPI, both in contact, beside a device host that reads them at 1 kHz and sends contact models at 250 Hz, and, unless
+Styluses of the stand-in for HDAPI, all in contact, beside a device host that reads them at 1 kHz and sends contact models at 250 Hz, and, unless
 `--idle`, one busy process on every core. Needs a C compiler.
 """
 
@@ -24,7 +24,7 @@ HOST = Path(hd.__file__).parent / "host.py"
 BURN = "while True: pass"
 
 
-def measured(seconds: float, planes: int, folder: Path) -> None:
+def measured(seconds: float, styluses: int, planes: int, folder: Path) -> None:
     """Run, kill, and print."""
     library = build.compile_library("hd.c", folder / "libHD.so")
     world = hd.HdWorld(library, folder / "world")
@@ -32,7 +32,7 @@ def measured(seconds: float, planes: int, folder: Path) -> None:
     for device in world.devices:
         device.target[1] = 0.03  # HDAPI's y is up: above the floor
         device.buttons = 1
-    host = subprocess.Popen([sys.executable, str(HOST), str(library), str(planes)], env=environment)
+    host = subprocess.Popen([sys.executable, str(HOST), str(library), str(planes), str(styluses)], env=environment)
     try:
         sleep(3.0)
         for device in world.devices:
@@ -48,7 +48,7 @@ def measured(seconds: float, planes: int, folder: Path) -> None:
         host.kill()
         killed = monotonic()
     sleep(0.5)
-    for index, device in enumerate(world.devices):
+    for index, device in enumerate(world.devices[:styluses]):
         rows = world.rows(index, start)
         run, after = rows[rows[:, hd.Row.TIME] < killed], rows[rows[:, hd.Row.TIME] >= killed]
         print(f"{device.name.decode()}: {timing(run)}; {force(run, after, killed)}")
@@ -67,19 +67,21 @@ def force(run: np.ndarray, after: np.ndarray, killed: float) -> str:
     size = np.linalg.norm(np.vstack([run, after])[:, hd.Row.FORCE], axis=1)
     pushing = after[np.linalg.norm(after[:, hd.Row.FORCE], axis=1) > 0.0]
     until = (pushing[-1, hd.Row.TIME] - killed) * 1e3 if len(pushing) else 0.0
-    return f"force up to {size.max():.2f} N, largest step up {np.diff(size).max():.3f} N, of {size[len(run) - 1]:.2f} N zero {until:.0f} ms after the host was killed"
+    last = f"of {size[len(run) - 1]:.2f} N zero {until:.0f} ms after the host was killed"
+    return f"force up to {size.max():.2f} N, largest step up {np.diff(size).max():.3f} N, {last}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--styluses", type=int, choices=(1, 2), default=2)
     parser.add_argument("--planes", type=int, default=4)
     parser.add_argument("--idle", action="store_true")
     arguments = parser.parse_args()
     burning = [] if arguments.idle else [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(os.cpu_count() or 1)]
     try:
         with tempfile.TemporaryDirectory() as folder:
-            measured(arguments.seconds, arguments.planes, Path(folder))
+            measured(arguments.seconds, arguments.styluses, arguments.planes, Path(folder))
     finally:
         for process in burning:
             process.kill()

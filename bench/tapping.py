@@ -38,7 +38,7 @@ class Tapping(Device):
         Port(name="state", causality="input", type=POSE),
     )
 
-    def open(self, directory: Path) -> None:  # noqa: ARG002
+    def open(self, directory: Path) -> None:
         """Start at rest."""
         self._chance = random.Random(1)
         self._x, self._jumped_ns, self._due_ns = 0.0, 0, None
@@ -56,7 +56,7 @@ class Tapping(Device):
                 self._x, self._jumped_ns, self._due_ns = WAY_M - self._x, now_ns, None
         yield pose_sample(self.ports[0], t, (self._x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
-    def write(self, port: str, value: Value) -> None:  # noqa: ARG002
+    def write(self, port: str, value: Value) -> None:
         """Take the pose of the tip: the first that changes its motion reflects the jump."""
         now_ns, tip = monotonic_ns(), np.asarray(value)[:3]
         move = tip - self._tip

@@ -127,8 +127,8 @@ class EcmTeleoperation(Stepped):
         pose, twist, joy = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TwistStamped", "sensor_msgs/msg/Joy"
         read = "read at the start and whenever the arm becomes ready"
         return (
-            Port(name="head", causality="input", type=pose, max_age_ns=p.max_age, description="pose of the head: x ahead, y left, z up"),
-            Port(name="head_twist", causality="input", type=twist, max_age_ns=p.max_age, description="of the head, in the frame of its pose"),
+            Port(name="pose", causality="input", type=pose, max_age_ns=p.max_age, description="pose of the head: x ahead, y left, z up"),
+            Port(name="twist", causality="input", type=twist, max_age_ns=p.max_age, description="of the head, in the frame of its pose"),
             Port(name="mode", causality="input", type=_STRING, variability="event", description=" or ".join(_MODES)),
             Port(name="buttons", causality="input", type=joy, variability="event", description="mode and dead-man, as the parameters say"),
             Port(name="scale", causality="input", type="std_msgs/msg/Float64", start=(p.scale,), description="motion of the camera over that of the head"),
@@ -177,11 +177,11 @@ class EcmTeleoperation(Stepped):
 
     def _follows(self, inputs: Inputs) -> bool:
         held = self.params.buttons.dead_man is None or bool(self._held[0])
-        return held and bool(self._ready[0]) and not (inputs.stale("head") or inputs.stale("head_twist"))
+        return held and bool(self._ready[0]) and not (inputs.stale("pose") or inputs.stale("twist"))
 
     def _asked(self, inputs: Inputs) -> Vector:
         """Return dq/dt, shape (4,), for the twist of the head, turned into its own frame and scaled."""
-        to_head, twist = rotation.matrix(inputs["head"][3:]).T, inputs["head_twist"]
+        to_head, twist = rotation.matrix(inputs["pose"][3:]).T, inputs["twist"]
         own = float(inputs["scale"][0]) * np.concatenate([to_head @ twist[:3], to_head @ twist[3:]])
         return _limited(self._chain, self._command, own, self._mode_name)
 

@@ -68,15 +68,16 @@ def access_settings(plan: Plan, session: str, foreign: Mapping[str, Sequence[str
         "key_exprs": [f"{keys.prefix}/device/**", f"{Keys('*').prefix}/control/**"],
         "size_limit": _DEVICE_BYTES,
     }
-    return {"access_control": access, "low_pass_filter": [size], "transport/link/rx/max_message_size": _MOST_BYTES}
+    limits = {"low_pass_filter": [size], "transport/link/rx/max_message_size": _MOST_BYTES}
+    return {"access_control": access, **limits, "scouting/gossip/enabled": False}  # who else is here, and at which address, is nobody's business
 
 
 def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
     """Return the rights of one remote participant."""
     name, role, hub = member.name, member.key_role, keys.alive("hub", "hub")
-    links = [(link.source, link.source_port) for link in plan.links if link.target == name]
-    outlets = [(outlet.source, outlet.source_port) for outlet in plan.outlets if outlet.device == name]
-    heard = [keys.output(plan.members[source].key_role, source, port) for source, port in dict.fromkeys(links + outlets)]
+    links = [keys.output("engine", link.source, link.source_port) for link in plan.links if link.target == name]
+    outlets = [keys.feed(outlet.source, outlet.source_port) for outlet in plan.outlets if outlet.device == name]
+    heard = list(dict.fromkeys(links + outlets))
     listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]  # as the hub does, to all participants at once
     return [
         _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),

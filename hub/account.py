@@ -9,7 +9,7 @@ from time import monotonic_ns
 
 from hub.clock import Clock
 from hub.intake import Intake
-from hub.latency import Latencies, by_way
+from hub.latency import Histogram, by_way
 from hub.observers import Observers
 from hub.plan import Member, Plan
 from hub.recorder import RecorderSummary
@@ -17,7 +17,7 @@ from hub.summary import Progress, Summary
 from hub.wire import Drops
 from schemas.lockstep import Report
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import ParticipantStatus, SessionStatus
+from schemas.trocar_msgs import Latency, ParticipantStatus, SessionStatus
 
 __all__ = ["Account"]
 
@@ -38,7 +38,7 @@ class Account:
         self._drops = drops
         self._observers = observers
         self._intake = intake
-        self._latencies = Latencies()
+        self._answers = Histogram()
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
         self._started_ns: int | None = None
@@ -55,7 +55,7 @@ class Account:
 
     def acknowledged(self, granted_ns: int) -> None:
         """All steps of a grant that was given at `granted_ns` (monotonic) are done."""
-        self._latencies.add("grant to state", "all participants", monotonic_ns() - granted_ns)
+        self._answers.add(monotonic_ns() - granted_ns)
 
     def book(self, member: Member, report: Report) -> int:
         """Book the hashes and the last step that a participant reports; return the simulated time (ns) at the end of that step."""
@@ -89,7 +89,7 @@ class Account:
             detail=self.detail,
             participants=members,
             devices=self._intake.statuses,
-            latencies=[*self._latencies.messages(), *self._intake.latencies],
+            latencies=self._latencies,
         )
 
     def summary(self, recorded: RecorderSummary | None) -> Summary:
@@ -111,7 +111,7 @@ class Account:
             recording=None if recorded is None else str(recorded.path),
             recording_complete=None if recorded is None else recorded.complete,
             energy_residual_j=self._observers.energy.residual_j,
-            latency=by_way([*self._latencies.messages(), *self._intake.latencies]),
+            latency=by_way(self._latencies),
             measures=self._observers.measures.results(),
         )
 
@@ -120,6 +120,11 @@ class Account:
         if self._started_ns is None:
             return 0
         return monotonic_ns() - self._started_ns if self._wall_ns is None else self._wall_ns
+
+    @property
+    def _latencies(self) -> list[Latency]:
+        answers = [self._answers.message("grant to state", "all participants")] if self._answers.count else []
+        return [*answers, *self._intake.latencies]
 
     @property
     def _dropped(self) -> int:

@@ -5,7 +5,6 @@ The clocks are the monotonic ones of both machines, so that nobody who sets a wa
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 __all__ = ["ClockOffset", "Exchange"]
@@ -45,14 +44,14 @@ class ClockOffset:
     """The offset of two clocks, from the exchange of the last ones that is least wrong by now."""
 
     def __init__(self) -> None:
-        self._exchanges: deque[Exchange] = deque(maxlen=_WINDOW)
+        self._exchanges: tuple[Exchange, ...] = ()  # never changed, only replaced: other threads may be looking through it
 
     def add(self, exchange: Exchange) -> None:
         """Take an exchange. One that cannot be true together with those before (a clock stood still or jumped) makes them forgotten."""
         now_ns, best = exchange.answered_ns, self.best(exchange.answered_ns)
         if best is not None and abs(best.offset_ns - exchange.offset_ns) > best.error_ns(now_ns) + exchange.error_ns(now_ns) + 2:
-            self._exchanges.clear()
-        self._exchanges.append(exchange)
+            self._exchanges = ()
+        self._exchanges = (*self._exchanges, exchange)[-_WINDOW:]
 
     def best(self, now_ns: int) -> Exchange | None:
         """Return the exchange whose offset is least wrong; None before the first."""

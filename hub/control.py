@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from time import monotonic_ns
+from time import monotonic, monotonic_ns, sleep
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -25,7 +25,9 @@ from schemas.keys import Keys
 from schemas.ports import BondSide
 from schemas.ros import StringMessage
 
-__all__ = ["ClockReply", "ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask"]
+__all__ = ["ClockReply", "ControlServer", "Empty", "JoinReply", "JoinRequest", "Refusal", "RunState", "SetRequest", "StepRequest", "ask", "present"]
+
+_PATIENCE_S = 5.0
 
 R = TypeVar("R", bound=BaseModel)
 Q = TypeVar("Q", bound=BaseModel)
@@ -192,8 +194,9 @@ class ControlServer:
                         at = key_of(request)
                     reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
-                    self._drops.refuse(key, error)
-                    reply = Refusal(refused=str(error))
+                    reason = _reason(error)
+                    self._drops.refuse(key, reason)
+                    reply = Refusal(refused=reason)
                 query.reply(at, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
 
         return session.declare_queryable(key, Callback(answer))
@@ -223,6 +226,14 @@ class ControlServer:
             queryable.undeclare()
 
 
+def _reason(error: Exception) -> str:
+    """Return why a request is refused, for the person who made it."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    found = error.errors(include_url=False)
+    return "; ".join(f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].removeprefix('Value error, ')} (got {detail['input']!r})" for detail in found)
+
+
 def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R], *, timeout_s: float = 5.0) -> R:
     """Send a control request and return the reply.
 
@@ -241,3 +252,15 @@ def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[
             except ValidationError as error:
                 raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
     raise ConnectError(f"nobody answers on {key}: is the hub running, and does its session have what this names?")
+
+
+def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
+    """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask` raises."""
+    deadline = monotonic() + _PATIENCE_S
+    while True:
+        try:
+            return ask(session, keys.join(request.host), request, JoinReply, timeout_s=10.0)
+        except ConnectError:
+            if monotonic() > deadline:
+                raise
+            sleep(0.1)

@@ -14,7 +14,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.clock_watch import ClockWatch
-from hub.control import Empty, JoinReply, JoinRequest, ask
+from hub.control import Empty, JoinReply, JoinRequest, ask, present
 from hub.device_loop import DeviceLoop
 from hub.participant import Device
 from hub.registry import make
@@ -59,10 +59,10 @@ class DeviceHost:
             while True:
                 try:
                     with self._connect() as session:
-                        reply = ask(session, self._keys.join(self._request.host), self._request, JoinReply, timeout_s=10.0 if not joined else 2.0)
+                        reply = present(session, self._keys, self._request)
                         joined, told = True, ""
                         self._take_part(session, reply)
-                    log.warning("device '%s': the hub is gone; it gets no force any more, and joins again when the hub is back", self._name)
+                    log.warning("device '%s': the hub is gone; nothing is written to it any more, and it joins again when the hub is back", self._name)
                 except (ConnectError, MessageError) as error:
                     if not joined:
                         raise

@@ -19,6 +19,7 @@ __all__ = ["DeviceLoop", "Uplink"]
 log = logging.getLogger(__name__)
 
 _LONGEST_SLEEP_S = 0.05
+_STATES = (Joy, DiagnosticStatus)
 
 
 class Uplink(Protocol):

@@ -52,7 +52,8 @@ def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
 def _children(branch: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
     """Yield the schemas of what stands under `part` in a mapping or a list."""
     properties: dict[str, Any] = branch.get("properties", {})
-    candidates: list[Any] = [properties[part]] if part in properties else [branch.get("additionalProperties"), branch.get("items")]
+    patterns: dict[str, Any] = branch.get("patternProperties", {})
+    candidates: list[Any] = [properties[part]] if part in properties else [branch.get("additionalProperties"), *patterns.values(), branch.get("items")]
     return (cast("dict[str, Any]", schema) for schema in candidates if isinstance(schema, dict))
 
 

@@ -65,6 +65,7 @@ class GateLog:
         """`known`: the names in certificates for which there are access rules."""
         self._known = known
         self._addresses: dict[str, str] = {}
+        self._let_in: set[str] = set()
         self._names: dict[str, str] = {}
         self._lists: dict[str, _List] = {}
         self._told: dict[str, set[str]] = {}
@@ -86,8 +87,16 @@ class GateLog:
         elif verdict := _VERDICT.search(text):
             yield from self._judge(verdict)
 
+    def ended(self, address: str) -> Iterator[Told]:
+        """Yield what is to be told when a connection from `address` has ended."""
+        if address in self._let_in:
+            self._let_in.discard(address)
+        else:
+            yield logging.WARNING, f"the connection from {address} was not let in"
+
     def _greet(self, name: str, address: str) -> Told:
         self._addresses[name] = address
+        self._let_in.add(address)
         self._told.pop(name, None)
         if name in self._known:
             return logging.INFO, f"'{name}' connects from {address}"

@@ -7,19 +7,28 @@ import logging
 import os
 import sys
 import threading
+from collections import deque
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from time import monotonic
 from typing import Any, TextIO
 
 import zenoh
 
+from hub.endpoint import address
 from hub.gate import OPEN
 from hub.gate_log import LISTENED_TO, GateLog
+from hub.knocks import ended_connections
 from hub.wire import open_session
 from schemas.errors import ConnectError
 
 __all__ = ["main"]
 
-_MOST_PER_SECOND = 50
+_MOST_PER_SECOND = 200
+"""So much is told of whoever knocks, however often."""
+
+_LATER_S = 0.3
+"""That a connection has ended may be known before the line of the log is read which says that it was let in."""
 
 
 def main() -> None:
@@ -36,7 +45,10 @@ def main() -> None:
         sys.exit(1)
     answers.write(f"{OPEN}\n")
     known = [name for subject in security["access_control"]["subjects"] for name in subject.get("cert_common_names", ())]
-    threading.Thread(target=_tell, args=(zenohs_log, GateLog(known), answers), name="log", daemon=True).start()
+    gate_log, tell = GateLog(known), _Telling(answers)
+    ports = {address(endpoint)[1] for endpoint in orders["listen"]}
+    for task in (lambda: _read(zenohs_log, gate_log, tell), lambda: _look(ports, gate_log, tell)):
+        threading.Thread(target=task, daemon=True).start()
     with session:
         sys.stdin.read()
 
@@ -49,17 +61,41 @@ def _parted_outputs() -> tuple[TextIO, TextIO]:
     return answers, os.fdopen(reading, encoding="utf-8", errors="replace")
 
 
-def _tell(zenohs_log: TextIO, gate_log: GateLog, answers: TextIO) -> None:
-    """Hand on what is to be told, but not more than so much in a second, whoever knocks at the gate and how often."""
-    second, told = 0, 0
+class _Telling:
+    """Tells the hub, but not more than so much in a second."""
+
+    def __init__(self, answers: TextIO) -> None:
+        self._answers = answers
+        self._lock = threading.Lock()
+        self._second = self._count = 0
+
+    def __call__(self, told: Iterable[tuple[int, str]]) -> None:
+        for level, message in told:
+            with self._lock:
+                now = int(monotonic())
+                self._second, self._count = now, self._count + 1 if now == self._second else 1
+                if self._count < _MOST_PER_SECOND:
+                    self._answers.write(f"{level} {message}\n")
+                elif self._count == _MOST_PER_SECOND:
+                    self._answers.write(f"{logging.WARNING} there is more in this second than is told\n")
+
+
+_Tell = Callable[[Iterable[tuple[int, str]]], None]
+
+
+def _read(zenohs_log: TextIO, gate_log: GateLog, tell: _Tell) -> None:
     for line in zenohs_log:
-        for level, message in gate_log.read(line):
-            now = int(monotonic())
-            second, told = now, told + 1 if now == second else 1
-            if told < _MOST_PER_SECOND:
-                answers.write(f"{level} {message}\n")
-            elif told == _MOST_PER_SECOND:
-                answers.write(f"{logging.WARNING} more is refused in this second than is told\n")
+        tell(gate_log.read(line))
+
+
+def _look(ports: set[int], gate_log: GateLog, tell: _Tell) -> None:
+    ended: deque[tuple[float, str]] = deque()
+    with suppress(OSError, AttributeError):  # a system that does not tell it; one without such sockets
+        for other in ended_connections(ports, _LATER_S):
+            if other is not None:
+                ended.append((monotonic() + _LATER_S, other))
+            while ended and ended[0][0] <= monotonic():
+                tell(gate_log.ended(ended.popleft()[1]))
 
 
 if __name__ == "__main__":

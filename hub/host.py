@@ -124,7 +124,8 @@ class Host:
             stride = self.plan.stride(member.name, port.name)
             depth = self._depth(member.name, port.name, here=True)
             readers = sorted({self.plan.members[k.target].host for k in self.plan.links if (k.source, k.source_port) == (member.name, port.name)} - {self.name})
-            publisher = self._wire.publisher(member, port, readers) if self._wire else None
+            feeds = (member.name, port.name) in {(outlet.source, outlet.source_port) for outlet in self.plan.outlets}
+            publisher = self._wire.publisher(member, port, readers, feeds=feeds) if self._wire else None
             cell = Cell(member.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
             sink = _Sink(port, vector, () if vector is None else vector.neutral.shape, cell, publisher)

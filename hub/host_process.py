@@ -21,7 +21,7 @@ import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
 from hub.clock_watch import ClockWatch
-from hub.control import Empty, JoinReply, JoinRequest, ask
+from hub.control import Empty, JoinReply, JoinRequest, ask, present
 from hub.device_host import DeviceHost
 from hub.device_loop import DeviceLoop
 from hub.host import Host
@@ -44,6 +44,7 @@ __all__ = ["main", "run_device", "run_host"]
 log = logging.getLogger(__name__)
 
 _PRIME_S = 0.01
+_IDLE_S = 0.2
 _PATIENCE_S = 2.0
 """How long a participant may go on computing after the hub is gone, before the process is ended under it."""
 
@@ -58,7 +59,7 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
     """
     request = JoinRequest(host=host, pid=os.getpid())
     with reach(endpoint, host.removeprefix("remote/"), certificates, mode="peer") as session:
-        reply = ask(session, Keys(session_name).join(host), request, JoinReply, timeout_s=10.0)
+        reply = present(session, Keys(session_name), request)
         keys = Keys(reply.session)
         with _ending_with_hub(session, keys):
             connect = partial(reach, endpoint, host.removeprefix("remote/"), certificates)
@@ -95,7 +96,6 @@ class _JoinedHost:
         first = next(iter(mine.values()))
         refused = session.declare_publisher(keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
-        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
         self._wire = Wire(session, keys, reply.run, self._drops, host, spin=may_spin(len(plan.hosts())), watched=reply.watched)
         self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
         self._acks = {
@@ -108,6 +108,8 @@ class _JoinedHost:
             )
             for member in self._host.members
         }
+        if self._acks:
+            self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
         self._next_step = 0
         devices = {name: device for name, device in made.items() if isinstance(device, Device)}
         for device in devices.values():
@@ -132,6 +134,8 @@ class _JoinedHost:
             ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
             raise
         ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        while not self._acks:  # devices alone, which live in threads of their own
+            sleep(_IDLE_S)
         grant = self._first_grant()
         while True:
             try:

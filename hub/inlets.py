@@ -31,8 +31,6 @@ class _Inlet:
     port: str
     codec: PortCodec
     simulated: bool = False
-    rate: float = 0.0
-    """Messages per second."""
     max_age_ns: int = 0
     queue: deque[tuple[bytes, int, int | None]] = field(default_factory=deque[tuple[bytes, int, int | None]])
     """Payload, arrival, and the time at which the device had it, by its own clock."""
@@ -40,22 +38,11 @@ class _Inlet:
     stale: bool = True
     newest: tuple[int, int] = (0, 0)
     """Admission and sequence number."""
-    allowance: float = 0.0
-    """Messages that may come at once: refilled at `rate`, at most those of a second."""
-    allowed_ns: int = 0
 
     @property
     def name(self) -> str:
         """The stream's name in reports."""
         return f"{self.source}.{self.port}"
-
-    def limit(self, now_ns: int) -> None:
-        """Refuse what floods; raises MessageError."""
-        self.allowance = min(self.allowance + (now_ns - self.allowed_ns) * 1e-9 * self.rate, max(self.rate, 1.0))
-        self.allowed_ns = now_ns
-        if self.allowance < 1.0:
-            raise MessageError(f"device '{self.source}' sends more than {self.rate:g} messages/s on port '{self.port}' (rate_limit); this one is refused")
-        self.allowance -= 1.0
 
     def follow(self, stamp: Stamp) -> None:
         """Refuse what is not newer than what was here already; raises LateError."""
@@ -79,7 +66,7 @@ class Inlets:
             port = plan.members[inlet.target].port(inlet.target_port)
             source = plan.members[inlet.device].port(inlet.device_port)
             device = plan.members[inlet.device]
-            new = _Inlet(inlet.device, inlet.device_port, PortCodec(source.filled_from(port)), simulated=device.follows_clock, rate=device.rate_limit)
+            new = _Inlet(inlet.device, inlet.device_port, PortCodec(source.filled_from(port)), simulated=device.follows_clock)
             known = self._inlets.setdefault((inlet.device, inlet.device_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
         fed = {(link.target, link.target_port) for link in plan.links} | {(i.target, i.target_port) for i in plan.inlets}
@@ -102,14 +89,11 @@ class Inlets:
     def offer(self, participant: str, port: str, payload: bytes, now_ns: int, stamp: Stamp | None = None) -> None:
         """Take a sample that arrived at `now_ns` of the port's clock; what is set by hand has no stamp.
 
-        Raises MessageError if it is none of this port or one too many, and LateError if a newer one was here before it.
+        Raises MessageError if it is none of this port, and LateError if a newer one was here before it.
         """
         inlet = self._inlets.get((participant, port))
         if inlet is None:
             raise MessageError(f"no connection takes '{participant}.{port}'")
-        if stamp is not None and not inlet.simulated:
-            with self._lock:
-                inlet.limit(now_ns)
         inlet.codec.accept(payload)
         with self._lock:
             if stamp is not None:

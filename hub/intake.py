@@ -10,6 +10,8 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.allowance import Allowance
+from hub.complaints import Complaints
 from hub.device_loop import DeviceLoop
 from hub.devices import SimulatedDevices
 from hub.inlets import Inlets
@@ -27,10 +29,12 @@ from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
 
 __all__ = ["Intake"]
 
-
 _SWITCH_S = 5e-4
 """How long a step may compute in Python before a device's sample is taken, instead of 5 ms: it brought the median of `bench/latency.py` from 2.5
 to 2.2 ms."""
+
+_STATUSES = 10.0
+"""How often the host of a device may tell of it, in a second; it does so once."""
 
 
 class Intake:
@@ -41,6 +45,8 @@ class Intake:
         self._plan, self._keys, self._run, self._drops, self._inlets = plan, keys, run, drops, inlets
         self._connected = {(inlet.device, inlet.device_port) for inlet in plan.inlets}
         self._statuses: dict[str, DeviceStatus] = {}
+        self._latencies: dict[str, list[Latency]] = {}
+        """What the host of each device told last, also of one that is gone."""
         self._time_ns = 0
         self._switch_s = sys.getswitchinterval()
 
@@ -58,7 +64,9 @@ class Intake:
         for uplink, loop in zip(self._uplinks, self._loops.values(), strict=True):
             loop.attach(uplink)
         self.relink = Relink(self._plan, session, self._keys, self.simulated.links)
+        self._complaints = Complaints(self._plan, self._keys, session, self._drops)
         self._away = [m.name for m in members.values() if m.role == "device" and m.host != "hub"]
+        self._status_allowance = Allowance(_STATUSES * (1.0 + len(members)))
         wall = [member for member in members.values() if member.role == "device" and not member.follows_clock]
         spoken = [(m.name, p.name) for m in wall for p in m.ports if p.causality == "output" and self._is_heard(m.name, p.name)]
         self._subscribers = [session.declare_subscriber(self._keys.output("device", *source), self._listener(*source)) for source in spoken]
@@ -81,7 +89,7 @@ class Intake:
     def forget(self, device: str) -> None:
         """A device is gone: nothing is known of its clock any more."""
         self._inlets.offsets_ns.pop(device, None)
-        self._statuses.pop(device, None)
+        self._statuses = {name: status for name, status in self._statuses.items() if name != device}
 
     @property
     def statuses(self) -> list[DeviceStatus]:
@@ -91,7 +99,7 @@ class Intake:
     @property
     def latencies(self) -> list[Latency]:
         """How long samples took into the simulation, and its values out of it."""
-        told = (latency for status in self.statuses for latency in status.latencies)
+        told = (latency for _, latencies in sorted(self._latencies.items()) for latency in latencies)
         return [*self._inlets.latencies.messages(), *self.simulated.latencies.messages(), *told]
 
     def _is_heard(self, device: str, port: str) -> bool:
@@ -111,9 +119,14 @@ class Intake:
             self._observers.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
+        allowance = Allowance(self._plan.members[device].rate_limit)
+
         def take(sample: zenoh.Sample) -> None:
+            now_ns = monotonic_ns()
             try:
-                self._offer(device, port, sample.payload.to_bytes(), monotonic_ns(), Stamp.of(sample))
+                if not allowance.spend(now_ns):
+                    raise MessageError(f"device '{device}' sends more than {allowance.rate:g} messages/s on port '{port}' (rate_limit)")
+                self._offer(device, port, sample.payload.to_bytes(), now_ns, Stamp.of(sample))
             except MessageError as error:
                 self._drops.count(sample, error)
 
@@ -121,13 +134,16 @@ class Intake:
 
     def _told(self, sample: zenoh.Sample) -> None:
         try:
+            if not self._status_allowance.spend(monotonic_ns()):
+                raise MessageError("devices tell of themselves more often than they may")
             status = decode(DeviceStatus, sample.payload.to_bytes())
-            if str(sample.key_expr) != self._keys.device_status(status.device):
-                raise MessageError(f"tells of '{status.device}' under another name")
+            if str(sample.key_expr) != self._keys.device_status(status.device) or status.device not in self._plan.members:
+                raise MessageError(f"tells of '{status.device}', which is no device of this name here")
         except MessageError as error:
             self._drops.count(sample, error)
             return
         self._statuses = {**self._statuses, status.device: status}  # a new one: others may be looking through the old one
+        self._latencies = {**self._latencies, status.device: status.latencies}
         if status.round_trip_ns >= 0:
             self._inlets.offsets_ns[status.device] = status.offset_ns
 
@@ -141,3 +157,4 @@ class Intake:
         self.simulated.close()
         for entity in (*self._subscribers, self.relink):
             entity.undeclare()
+        self._complaints.close()

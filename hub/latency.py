@@ -18,28 +18,42 @@ class Histogram:
 
     def __init__(self) -> None:
         self._bins: dict[int, list[int]] = {}
-        self.count = 0
         self.largest_ns = 0
+
+    @property
+    def count(self) -> int:
+        """How many times were counted."""
+        return sum(count for count, _ in self._bins.copy().values())
 
     def add(self, time_ns: int) -> None:
         """Count one time; below zero (two clocks, one offset) counts as zero."""
-        time_ns = max(time_ns, 0)
-        shift = max(time_ns.bit_length() - _BITS - 1, 0)
-        counted = self._bins.setdefault((shift << _BITS) + (time_ns >> shift), [0, 0])
+        if time_ns < 0:
+            time_ns = 0
+        shift = time_ns.bit_length() - _BITS - 1
+        index = time_ns if shift <= 0 else (shift << _BITS) + (time_ns >> shift)
+        counted = self._bins.get(index)
+        if counted is None:
+            counted = self._bins[index] = [0, 0]
         counted[0] += 1
         counted[1] += time_ns
-        self.count += 1
-        self.largest_ns = max(self.largest_ns, time_ns)
+        if time_ns > self.largest_ns:
+            self.largest_ns = time_ns
 
     def percentile(self, share: float) -> float:
         """Return the time (ns) below which `share` of all times are: the mean of its bin. Raises ValueError of nothing."""
-        rank, passed = share * self.count, 0
-        for index in sorted(self._bins):
-            count, total_ns = self._bins[index]
+        bins = self._bins.copy()
+        rank, passed = share * sum(count for count, _ in bins.values()), 0
+        for index in sorted(bins):
+            count, total_ns = bins[index]
             passed += count
             if passed >= rank:
                 return total_ns / count
         raise ValueError("no percentile of nothing")
+
+    def message(self, way: str, stream: str) -> Latency:
+        """Return what is told of a stream on its way; raises ValueError of nothing."""
+        p50_s, p99_s = (self.percentile(share) / 1e9 for share in (0.5, 0.99))
+        return Latency(way=way, stream=stream, count=self.count, p50_s=p50_s, p99_s=p99_s, largest_s=self.largest_ns / 1e9)
 
 
 class Latencies:
@@ -59,11 +73,7 @@ class Latencies:
     def messages(self) -> list[Latency]:
         """Return the percentiles of every stream, by way and name."""
         with self._lock:
-            found = sorted(self._histograms.items())
-            return [
-                Latency(way=way, stream=stream, count=h.count, p50_s=h.percentile(0.5) / 1e9, p99_s=h.percentile(0.99) / 1e9, largest_s=h.largest_ns / 1e9)
-                for (way, stream), h in found
-            ]
+            return [histogram.message(*key) for key, histogram in sorted(self._histograms.items())]
 
 
 def by_way(latencies: Iterable[Latency]) -> dict[str, dict[str, dict[str, float]]]:

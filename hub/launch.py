@@ -15,9 +15,10 @@ from hub.credentials import HUB, examine, load
 from hub.files import file_hashes
 from hub.gate import Gate
 from hub.participant import Device, Params, Stepped
-from hub.plan import Plan, make_plan
+from hub.plan import Plan
 from hub.scenario_file import ScenarioFile
 from hub.session import Session
+from hub.wiring import make_plan
 from schemas.scenario import Scenario
 
 __all__ = ["in_one_host", "launch", "plan_of"]

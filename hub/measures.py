@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hub.plan import Plan, measured_port
+from hub.plan import Plan
+from hub.wiring import measured_port
 from schemas.scenario import Measure, Scenario
 from schemas.vectors import Vector
 

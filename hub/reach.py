@@ -36,7 +36,9 @@ def reach(endpoint: str, name: str, certificates: Path | None = None, *, mode: s
     if not endpoint.startswith("tls/"):
         raise ConnectError(f"'{endpoint}': a hub on another machine is reached by TLS only: tls/{host}:{port}")
     credentials = load(name, certificates)
-    examine(credentials)
+    whose = examine(credentials).name
+    if whose != name:
+        raise ConnectError(f"{credentials.file} is the certificate of '{whose}', with which nobody can join as '{name}'")
     try:
         session = open_session("client", connect=[endpoint], security=credentials.connecting())
     except ConnectError as error:

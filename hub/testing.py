@@ -19,10 +19,10 @@ from hub.endpoint import free_endpoint
 from hub.inputs import Inputs
 from hub.launch import in_one_host
 from hub.participant import BondPlan, Device, Outputs, Sample, Setup, Stepped, Value
-from hub.plan import make_plan
 from hub.session import Session
 from hub.summary import Summary
 from hub.wire import PortCodec
+from hub.wiring import make_plan
 from schemas.codec import encode
 from schemas.errors import MessageError, StateError, TrocarError
 from schemas.message import Message

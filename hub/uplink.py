@@ -134,7 +134,7 @@ class _Inflow:
 
     def __init__(self, outlet: Outlet, run: Run, link: Link, loop: DeviceLoop, drops: Drops, latencies: Latencies, offset: ClockOffset | None) -> None:
         source, target = run.plan.members[outlet.source], run.plan.members[outlet.device].port(outlet.device_port)
-        self.key = run.keys.output(source.key_role, outlet.source, outlet.source_port)
+        self.key = run.keys.feed(outlet.source, outlet.source_port)
         self._codec = PortCodec(source.port(outlet.source_port).model_copy(update={"variability": target.variability}))
         self._port, self._stream = target.name, f"{outlet.source}.{outlet.source_port} -> {outlet.device}.{target.name}"
         self._run, self._link, self._loop, self._drops, self._latencies, self._offset = run, link, loop, drops, latencies, offset

@@ -237,32 +237,54 @@ class PortReceiver:
         self._subscriber.undeclare()
 
 
-class PortPublisher:
-    """Publishes the values of one output port; without a reader it costs one flag test.
+class _Outgoing:
+    """A publisher that knows whether anybody listens, and tells when that changes."""
 
-    A step without events is told only to those who need every value (`always`): dozens of quiet ports cost nothing.
-    """
-
-    def __init__(
-        self, session: zenoh.Session, keys: Keys, key_role: str, participant: str, port: Port, run: int, *, always: bool, lanes: Sequence[LaneSender] = ()
-    ) -> None:
-        self.codec = PortCodec(port)
-        self._lanes = lanes
-        self._run = run
+    def __init__(self, session: zenoh.Session, key: str, choked: zenoh.CongestionControl, changed: Callable[[], None], *, always: bool) -> None:
         self._publisher = session.declare_publisher(
-            keys.output(key_role, participant, port.name),
-            encoding=zenoh.Encoding.APPLICATION_CDR,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.REAL_TIME,
-            express=True,
+            key, encoding=zenoh.Encoding.APPLICATION_CDR, congestion_control=choked, priority=zenoh.Priority.REAL_TIME, express=True
         )
-        self._always = self._wanted = always
+        self.wanted = always
+        self._changed = changed
         if not always:
             self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
             self._match(self._publisher.matching_status)
 
     def _match(self, status: Any) -> None:
-        self._wanted = bool(status.matching)
+        self.wanted = bool(status.matching)
+        self._changed()
+
+    def put(self, payload: bytes, tag: bytes) -> None:
+        self._publisher.put(payload, attachment=tag)
+
+    def close(self) -> None:
+        self._publisher.undeclare()
+
+
+class PortPublisher:
+    """Publishes the values of one output port; without a reader it costs a flag test.
+
+    Devices of the wall clock hear it under a key of their own, where a signal is dropped if the way to one of them is choked. A step without events is told
+    only to those who need every value (`always`): dozens of quiet ports cost nothing.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, keys: Keys, member: Member, port: Port, run: int, *, always: bool, feeds: bool, lanes: Sequence[LaneSender] = ()
+    ) -> None:
+        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock is connected."""
+        self.codec = PortCodec(port)
+        self._lanes = lanes
+        self._run = run
+        self._always = always
+        block, drop = zenoh.CongestionControl.BLOCK, zenoh.CongestionControl.DROP
+        self._ways: list[_Outgoing] = []
+        self._ways.append(_Outgoing(session, keys.output(member.key_role, member.name, port.name), block, self._look, always=always))
+        if feeds:
+            self._ways.append(_Outgoing(session, keys.feed(member.name, port.name), block if self.codec.is_event else drop, self._look, always=False))
+        self._look()
+
+    def _look(self) -> None:
+        self._wanted = [way for way in self._ways if way.wanted]
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
@@ -271,18 +293,23 @@ class PortPublisher:
         if not self._wanted:
             return
         if not self.codec.is_event:
-            self._publisher.put(self.codec.encode(value, time_ns), attachment=Tag.pack(self._run, 0, step, time_ns))
+            self._send(self.codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns))
             return
         if not value and self._always:
-            self._publisher.put(b"", attachment=Tag.pack(self._run, 0, step, time_ns, 0, 0))
+            self._ways[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
-            self._publisher.put(encode(message), attachment=Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+            self._send(encode(message), Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+
+    def _send(self, payload: bytes, tag: bytes) -> None:
+        for way in self._wanted:
+            way.put(payload, tag)
 
     def close(self) -> None:
         """Stop publishing."""
         for lane in self._lanes:
             lane.close()
-        self._publisher.undeclare()
+        for way in self._ways:
+            way.close()
 
 
 class Wire:
@@ -304,12 +331,12 @@ class Wire:
         self._receivers: list[PortReceiver | LaneReceiver] = []
         self._cells: list[RemoteCell] = []
 
-    def publisher(self, member: Member, port: Port, readers: Sequence[str]) -> PortPublisher:
-        """Return a publisher of an output of a participant here; the hosts `readers` need every value."""
+    def publisher(self, member: Member, port: Port, readers: Sequence[str], *, feeds: bool) -> PortPublisher:
+        """Return a publisher of an output of a participant here; the hosts `readers` need every value, `feeds`: devices of the wall clock the newest."""
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
         always = len(fast) < len(readers) or (member.name, port.name) in self._watched
-        publisher = PortPublisher(self.session, self.keys, member.key_role, member.name, port, self.run, always=always, lanes=lanes)
+        publisher = PortPublisher(self.session, self.keys, member, port, self.run, always=always, feeds=feeds, lanes=lanes)
         self._publishers.append(publisher)
         return publisher
 

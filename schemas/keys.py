@@ -42,6 +42,10 @@ class Keys:
         """Key of an output port; `role` is `engine` for all that is stepped, else `device`."""
         return f"{self.prefix}/{role}/{participant}/out/{port}"
 
+    def feed(self, participant: str, port: str) -> str:
+        """Key on which the values of an output are for devices of the wall clock: one that does not keep up misses some, and holds nobody up."""
+        return f"{self.prefix}/engine/{participant}/feed/{port}"
+
     def refused(self, role: str, participant: str) -> str:
         """Key on which a host tells of messages that it had to drop, under the name of one of its participants."""
         return f"{self.prefix}/{role}/{participant}/refused"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -91,10 +92,12 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(star
     file.write_text(json.dumps(SCENARIO))
     endpoint = free_endpoint(range(1))
     hub = start("run", str(file), "--listen", endpoint)
+    hand.until(lambda: _listens(endpoint), "the hub listens")
     start("device", "stylus", "--connect", endpoint, **{VARIABLE: str(world.file)})
     hand.until(lambda: len(world.rows()) > 0, "the servo runs")
     hand.until(lambda: _presses(hand), "the hand feels the table")
     hub.kill()
+    hub.wait()
     killed = monotonic()
     sleep(0.5)
     rows = world.rows(since=killed)
@@ -106,6 +109,15 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(star
     forces = np.linalg.norm(world.rows()[:, Row.FORCE], axis=1)
     assert 0.5 < forces.max() <= 1.98 + 1e-9
     assert np.diff(forces).max() <= 0.1 + 1e-9
+
+
+def _listens(endpoint: str) -> bool:
+    host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
+    try:
+        socket.create_connection((host, int(port)), timeout=1.0).close()
+    except OSError:
+        return False
+    return True
 
 
 def _presses(hand: Hand) -> bool:

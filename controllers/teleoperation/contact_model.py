@@ -51,6 +51,7 @@ class ForceParams(Params):
 
     scale: float = Field(default=1.0, ge=0.0, allow_inf_nan=False, description="newtons at the hand per newton at the tip; 0 gives no force")
     max_stiffness: Stiffness = Field(default=400.0, gt=0.0, description="of a surface as the hand feels it; what is stiffer is felt softer")
+    damping: Damping = Field(default=1.0, ge=0.0, description="of a measured surface as the hand feels it, against what a delay builds up")
 
 
 class ContactModelBuilder:
@@ -103,11 +104,12 @@ class ContactModelBuilder:
         ]
         felt = (estimate for estimate in (self._tissue, self._rigid) if estimate.known)
         planes += [
-            self._plane(hand, to_base.T @ surface.normal, surface.depth(tip) / scale, gain * surface.stiffness, friction=surface.friction) for surface in felt
+            self._plane(hand, to_base.T @ surface.normal, surface.depth(tip) / scale, gain * surface.stiffness, self._force.damping, surface.friction)
+            for surface in felt
         ]
         return planes
 
-    def _plane(self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float = 0.0, friction: float = 0.0) -> ContactPlane:
+    def _plane(self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float, friction: float) -> ContactPlane:
         """Return the plane with this `normal` (3,) at which the hand is `depth` below it, both as the hand has them."""
         x, y, z = normal.tolist()
         return ContactPlane(

@@ -53,8 +53,8 @@ class Limits:
     """Silence of the simulation up to which its last contact model counts in full, s."""
     decay: float = 0.02
     """Time constant of the force's decay after that, s."""
-    silence: float = 0.15
-    """Silence after which there is no force, s."""
+    silence: float = 0.13
+    """Silence after which there is no force, s. A hub that dies has 150 ms until then, of which its last model and a busy device host may use up 20."""
     ramp: float = 1.0
     """Time in which the force comes in after it was off, s."""
     calm_force: float = 0.2

@@ -56,9 +56,8 @@ class Servo:
                 self._release(now)
                 self._ended.set()
                 return CALLBACK_DONE
-            for stylus in self._styluses:
-                stylus.frame(now)
-            for code, handle in errors(self._hd):
+            complaints = [complaint for stylus in self._styluses for complaint in stylus.frame(now)]
+            for code, handle in complaints + errors(self._hd):
                 for stylus in self._by_handle.get(handle, self._styluses):
                     stylus.note(code, now)
             for stylus in self._styluses:

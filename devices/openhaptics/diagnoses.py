@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from devices.diagnosis import Level
 from devices.haptics.diagnoses import FORCE_DIAGNOSES
 from devices.haptics.safety import Condition
@@ -12,7 +14,7 @@ from devices.openhaptics.stylus import Phase
 __all__ = ["FOUND", "lost", "present"]
 
 _AGAIN = "it is tried again by itself"
-_CALIBRATE = {
+_CALIBRATE: Mapping[int, str] = {
     Style.INKWELL: "put the stylus into the inkwell",
     Style.ENCODER_RESET: "hold the stylus in its reset position and press its button",
 }
@@ -30,7 +32,7 @@ def lost(phase: Phase, code: int, cause: str, device: str | None) -> tuple[Level
         return Level.ERROR, f"it cannot be opened ({why}): see that it is plugged in and switched on, and {known}; {_AGAIN}"
     if phase is Phase.BUSY:
         return Level.ERROR, f"another program uses it{f' ({why})' if code else ''}: end that program; {_AGAIN}"
-    return Level.ERROR, f"it has failed ({why}): see to its cable and power; {_AGAIN}"
+    return Level.ERROR, f"it has failed ({why}){': see to its cable and power' if code else ''}; {_AGAIN}"
 
 
 def present(state: State, refusal: str) -> tuple[Level, str]:
@@ -39,8 +41,8 @@ def present(state: State, refusal: str) -> tuple[Level, str]:
     if phase is Phase.SETTLING:
         return Level.STALE, "it gives no valid frames; if that lasts, switch it off and on"
     if phase is Phase.UNCALIBRATED:
-        do = _CALIBRATE.get(Style(state.code), "") if state.code else ""
-        return Level.WARN, f"it is not calibrated: {do or 'calibrate it with the setup program of its vendor'}"
+        do = _CALIBRATE.get(state.code, "calibrate it with the setup program of its vendor")
+        return Level.WARN, f"it is not calibrated: {do}"
     if phase is Phase.WARNED:
         cool = "; let its motors cool" if state.code == Code.WARM_MOTORS else ""
         return Level.WARN, f"no force: the device warns of {Code.text(state.code)}{cool}"

@@ -203,7 +203,8 @@ def _places() -> Iterator[Path]:
                 yield Path(base) / "lib" / "x64" / "Release" / "hd.dll"
         yield Path(os.environ.get("SYSTEMROOT", r"C:\Windows")) / "System32" / "hd.dll"
     else:
-        yield from (Path(folder) / "libHD.so" for folder in ("/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/local/lib"))
+        named = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
+        yield from (Path(folder) / "libHD.so" for folder in (*filter(None, named), "/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/local/lib"))
 
 
 def load(path: Path) -> Hdapi:

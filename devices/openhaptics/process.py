@@ -20,8 +20,8 @@ from devices.openhaptics.stylus import Spec
 
 __all__ = ["ServoProcess"]
 
-_CALIBRATIONS = "/usr/share/3DSystems"
-"""Where the Linux driver keeps the configuration and calibration of its devices, and wants to be told so (TouchDriver 2019.2.15)."""
+_ENVIRONMENT: dict[str, str] = {} if sys.platform == "win32" else {"GTDD_HOME": "/usr/share/3DSystems"}
+"""The Linux driver wants to be told where it keeps configuration and calibration of its devices (TouchDriver 2019.2.15)."""
 _PATIENCE_S = 1.0
 
 
@@ -45,7 +45,7 @@ class ServoProcess:
                 text=True,
                 pass_fds=inherited,
                 process_group=0,  # Ctrl-C is for this process, which then ends that one
-                env={"GTDD_HOME": _CALIBRATIONS, **os.environ},
+                env={**_ENVIRONMENT, **os.environ},
                 creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
             )
         finally:

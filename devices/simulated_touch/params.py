@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, StringConstraints, ValidationInfo, field_validator
+from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, field_validator
 
 from devices.haptics.limits import TOUCH
 from devices.haptics.params import SafetyParams
@@ -52,7 +52,10 @@ class HandParams(Params):
 class SimulatedStylusParams(Params):
     """One stylus, the hand that holds it, and the limits of the force on that hand."""
 
-    path: Annotated[tuple[Waypoint, ...], Field(min_length=1)] | Path = Field(
+    path: Annotated[
+        Annotated[tuple[Waypoint, ...], Tag("waypoints")] | Annotated[Path, Tag("recording")],
+        Discriminator(lambda path: "recording" if isinstance(path, str | Path) else "waypoints"),
+    ] = Field(
         description="where the hand wants to be: waypoints, with least jerk from one to the next; or a recording of poses and buttons, an .mcap file or a"
         " rosbag2 directory relative to the scenario, in which a hand without buttons holds the dead-man"
     )
@@ -72,6 +75,8 @@ class SimulatedStylusParams(Params):
             except RecordingError as error:
                 raise ValueError(str(error)) from error
             return file
+        if not path:
+            raise ValueError("a path has at least one waypoint")
         for before, after in pairwise(path):
             if after.at <= before.at:
                 raise ValueError(f"the path's times go forward, but {after.at / 1e9:g} s comes after {before.at / 1e9:g} s")

@@ -48,7 +48,7 @@ class RecordedScene:
             asked = "" if robot is None else f" of '{robot}'"
             raise RecordingError(f"'{recording.file}': no scene{asked}; participants of kind mujoco: {', '.join(robots) or 'none'}")
         name = robot or robots[0]
-        self._scene = MujocoParams.model_validate(participants[name].params).model_dump(include=set(SceneParams.model_fields))
+        self._params = MujocoParams.model_validate(participants[name].params)
         self._qpos = f"/engine/{name}/out/qpos"
         self._looks, self._lens = _looks(participants), _lens(participants)
         self._nodes = _by_body([topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type])
@@ -74,11 +74,12 @@ class RecordedScene:
         shown["skins"] = {name: self._looks.get(name, {}) for name in bodies}
         if camera == "overview":
             shown |= {"view": self._overview(bodies, position, target), "baseline": 0.0}
-        elif "ECM" not in self._scene["arms"]:
+        elif "ECM" not in self._params.arms:
             raise RecordingError(f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an endoscope; take the overview")
         else:
             shown |= self._lens
-        scene = EndoscopeScene(EndoscopeParams.model_validate(self._scene | shown), gl.name, bodies)
+        stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)  # a default that is stated may be refused
+        scene = EndoscopeScene(EndoscopeParams.model_validate(stated | shown), gl.name, bodies)
         try:
             left, right = scene.draw(positions)
         finally:
@@ -118,7 +119,7 @@ class RecordedScene:
         if position is not None and target is not None:
             return ViewParams(position=position, target=target)
         points = [body.rest.astype(np.float64) for body in bodies.values()]
-        points += [np.array([thing["position"]]) for thing in self._scene["objects"].values()]
+        points += [np.array([thing.position]) for thing in self._params.objects.values()]
         if not points:
             raise RecordingError(f"'{self._recording.file}': neither soft bodies nor objects to look at; say where the overview looks, from where and at what")
         cloud = np.concatenate(points)

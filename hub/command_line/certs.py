@@ -22,6 +22,9 @@ _HUB_DAYS = 397
 _PARTICIPANT_DAYS = 30
 """There is no list of certificates that are revoked: one that is lost must not be worth much for long."""
 
+_LEAST_DAYS, _MOST_DAYS = 0.01, 3650
+"""A quarter of an hour, for a try; the authority's own ten years."""
+
 Directory = Annotated[Path | None, typer.Option("--dir", metavar="DIR", file_okay=False, help="Where the certificates are; by default this user's own.")]
 Hosts = Annotated[list[str] | None, typer.Argument(metavar="HOST", help="A name or an address by which other machines reach this one.")]
 
@@ -33,7 +36,12 @@ def _directory(given: Path | None) -> Path:
 
 
 @app.command()
-def init(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[float, typer.Option(help="How long the hub's is valid.")] = _HUB_DAYS) -> None:
+def init(
+    hosts: Hosts = None,
+    *,
+    directory: Directory = None,
+    days: Annotated[float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the hub's is valid.")] = _HUB_DAYS,
+) -> None:
     """Make an authority and the certificate of this machine's hub: once, on the machine where the hub runs."""
     _needs_cryptography()
     from hub.certs import found, names_of_this_machine
@@ -45,7 +53,12 @@ def init(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[fl
 
 
 @app.command()
-def renew(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[float, typer.Option(help="How long it is valid.")] = _HUB_DAYS) -> None:
+def renew(
+    hosts: Hosts = None,
+    *,
+    directory: Directory = None,
+    days: Annotated[float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long it is valid.")] = _HUB_DAYS,
+) -> None:
     """Make a new certificate for the hub, with the same names unless others are given."""
     _needs_cryptography()
     from hub.certs import renew as make
@@ -57,12 +70,10 @@ def renew(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[f
 
 @app.command()
 def issue(
-    name: Annotated[
-        str, typer.Argument(metavar="NAME", help="A participant with `host: remote`; `observer` reads the status, `console` is for ROS programs.")
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A participant with `host: remote`; `observer` reads the status, `console` is for ROS programs.")],
     *,
     directory: Directory = None,
-    days: Annotated[float, typer.Option(help="How long it is valid.")] = _PARTICIPANT_DAYS,
+    days: Annotated[float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long it is valid.")] = _PARTICIPANT_DAYS,
 ) -> None:
     """Make the certificate of one participant, for another machine; an older one stays valid as long as it is."""
     _needs_cryptography()

@@ -30,7 +30,7 @@ class Session:
         self.outputs = self.controller.configure(Setup(period_ns=H, directory=Path()))
         self.head, self.twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
         self.measured, self.scale = np.array([*q, *np.zeros(8)]), np.array([self.controller.params.scale])
-        self.inputs = Inputs({"head": self.head, "head_twist": self.twist, "measured_js": self.measured, "scale": self.scale})
+        self.inputs = Inputs({"pose": self.head, "twist": self.twist, "measured_js": self.measured, "scale": self.scale})
         self.modes, self.warnings, self.t = [], [], 0
 
     def step(self, *modes, buttons=(), state=(), stale=(), count=1):
@@ -150,7 +150,7 @@ def test_no_joint_is_ever_too_fast_or_out_of_its_range(moves):
         session.twist[:] = twist
         for _ in range(40):
             before = session.q
-            session.step(*([] if mode == "stale" else [mode]), stale=["head"] if mode == "stale" else [])
+            session.step(*([] if mode == "stale" else [mode]), stale=["pose"] if mode == "stale" else [])
             assert (np.abs(session.velocity) <= CHAIN.velocity * (1 + 1e-12)).all()
             assert (session.q >= CHAIN.lower).all()
             assert (session.q <= CHAIN.upper).all()
@@ -183,7 +183,7 @@ def test_at_the_end_of_a_range_nothing_is_stored_and_the_others_go_on():
     assert session.step().velocity[2] == -0.05
 
 
-@pytest.mark.parametrize("silent", [["head"], ["head_twist"], ["head", "head_twist"]])
+@pytest.mark.parametrize("silent", [["pose"], ["twist"], ["pose", "twist"]])
 def test_a_head_that_is_not_heard_leaves_the_camera_where_it_is(silent):
     session = Session()
     session.twist[3:] = [0.1, 0.1, 0.1]
@@ -232,7 +232,7 @@ def test_it_starts_from_where_the_arm_is_and_again_when_it_becomes_ready():
 @pytest.mark.parametrize("mode", ["orientation", "position"])
 def test_the_contract_of_a_controller(mode):
     twist = [0.02, 0.01, 0.0, 0.1, 0.2, 0.3]
-    inputs = {"head": [0, 0, 0, 0, 0, 0, 1], "head_twist": twist, "buttons": (Joy(buttons=[0, 1]),)}
+    inputs = {"pose": [0, 0, 0, 0, 0, 0, 1], "twist": twist, "buttons": (Joy(buttons=[0, 1]),)}
     params = EcmTeleoperationParams(mode=mode, endoscope="down")
     check_engine(lambda: EcmTeleoperation("camera", params), period_ns=H, inputs=inputs)
 

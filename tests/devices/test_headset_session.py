@@ -55,7 +55,7 @@ def test_a_headset_asleep_holds_the_camera_and_comes_back(tmp_path):
     library = compile_library("ovr.c", tmp_path / "libOVRRT64.so.1")
     wearer = Wearer(Standin.in_dll(ctypes.CDLL(str(library)), "standin"))
     head, camera = LibOvr("head", LibOvrParams(library=library)), EcmTeleoperation("camera", EcmTeleoperationParams())
-    connections = ["head.pose -> camera.head", "head.twist -> camera.head_twist", "camera.joint_velocity -> wearer.velocity"]
+    connections = ["head.pose -> camera.pose", "head.twist -> camera.twist", "camera.joint_velocity -> wearer.velocity"]
     scenario = {
         "name": "asleep",
         "step": "4 ms",

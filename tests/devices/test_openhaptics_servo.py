@@ -13,18 +13,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import Phase as HypothesisPhase
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from devices.diagnosis import Level
 from devices.haptics.contact import Plane
 from devices.haptics.limits import Limits
 from devices.haptics.safety import Condition
-from devices.openhaptics import hdapi
+from devices.openhaptics import diagnoses, hdapi
 from devices.openhaptics.callback import Servo
 from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, State, device_ends, model_doubles, servo_ends
 from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, INVALID_HANDLE, Code
 from devices.openhaptics.stylus import Phase, Spec, Stylus
 from schemas.errors import DeviceError
 from tests.devices.standins import build
-from tests.devices.standins.hd import AUTO, ENCODER_RESET, INKWELL, NEEDS_MANUAL_INPUT, NEEDS_UPDATE, HdWorld
+from tests.devices.standins.hd import AUTO, ENCODER_RESET, INKWELL, NEEDS_MANUAL_INPUT, NEEDS_UPDATE, OK, HdWorld
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
@@ -59,6 +63,7 @@ class Rig:
             self.models.append(models)
             self._states.append(states)
         self.servo = Servo(self.hd, self.styluses)
+        self._last: list[State] = [None, None]  # pyright: ignore[reportAttributeAccessIssue]  # there is one after the first tick
         self.now = 100.0
         self.answer = CALLBACK_CONTINUE
         self.sent: list[float] = []
@@ -68,31 +73,33 @@ class Rig:
         for stylus in self.styluses:
             stylus.allow(Limits(), passivity=False)
 
-    def run(self, ticks: int = 5, *, touching: bool = False) -> State:
-        """Go on; return the last state of the first stylus. `touching`: fresh contact models arrive."""
+    def run(self, ticks: int = 5, *, planes: list[Plane] | None = None, touching: bool = False) -> State:
+        """Go on; return the last state of the first stylus. `planes`: contact models of these arrive; `touching`: of the floor."""
+        planes = [FLOOR] if touching else planes
         for _ in range(ticks):
             self.now += DT
             self.hd.standin_tick(DT)
-            if touching:
+            if planes is not None:
                 for models in self.models:
-                    models.write(model_doubles([FLOOR], round(self.now * 1e9), self.now))
+                    models.write(model_doubles(planes, round(self.now * 1e9), self.now))
             if self.answer == CALLBACK_CONTINUE:
                 self.answer = self.servo.tick(self.now)
             self.sent.append(math.hypot(*self.world.motors(0)))
         return self.state(0)
 
     def state(self, stylus: int) -> State:
-        return State.of(self._states[stylus].read()[-1])
+        self._last[stylus] = next((State.of(record) for record in reversed(self._states[stylus].read())), self._last[stylus])
+        return self._last[stylus]
 
-    def press(self) -> State:
+    def press(self, ticks: int = 2000) -> State:
         """Bring both hands into the contact, from above and with the dead-man held, until the force is there."""
         self.allow()
         for device in self.world.devices:
             device.buttons, device.target[1] = 1, 0.03
-        self.run(500, touching=True)
+        self.run(ticks // 4, touching=True)
         for device in self.world.devices:
             device.target[1] = -0.005
-        return self.run(2000, touching=True)
+        return self.run(ticks, touching=True)
 
 
 @pytest.fixture
@@ -217,6 +224,46 @@ def test_a_stylus_that_loses_its_calibration_gives_neither_pose_nor_force(rig: C
     assert (state.force, one.world.devices[0].force_output) == ((0.0, 0.0, 0.0), 0)
 
 
+@pytest.mark.parametrize("code", [Code.EXCEEDED_MAX_FORCE, Code.COMM_ERROR])
+def test_a_stylus_that_waits_for_its_calibration_does_not_hide_what_another_complains_of(rig: Callable[..., Rig], code: Code) -> None:
+    one = rig()
+    one.press()
+    one.world.devices[1].calibration, one.world.devices[1].styles = NEEDS_UPDATE, 0  # asks, tick by tick, and is refused
+    assert one.run(200, touching=True).force[2] > 1.0
+    assert Phase(one.state(1).phase) is Phase.UNCALIBRATED
+    one.world.devices[0].error, one.world.devices[0].error_frames = code, 1
+    state = one.run(2, touching=True)
+    assert (state.code, state.force) == (code, (0.0, 0.0, 0.0))
+
+
+def test_a_stylus_that_is_unplugged_while_it_is_not_calibrated_is_lost(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    one.world.devices[0].calibration, one.world.devices[0].styles = NEEDS_UPDATE, 0
+    one.run()
+    one.world.devices[0].error, one.world.devices[0].error_frames = Code.COMM_ERROR, 1
+    assert Phase(one.run(2).phase) is Phase.FAULT
+
+
+def test_a_complaint_of_a_stylus_that_is_not_calibrated_leaves_what_to_do_about_that(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    device = one.world.devices[0]
+    device.calibration, device.error, device.error_frames = NEEDS_MANUAL_INPUT, Code.WARM_MOTORS, 100
+    assert diagnoses.present(one.run(50), "") == (Level.WARN, "it is not calibrated: put the stylus into the inkwell")
+
+
+def test_a_warning_is_no_letting_go_for_a_hand_that_was_too_fast(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    one.press()
+    device = one.world.devices[0]
+    device.velocity[1] = -5.0
+    one.run(2, touching=True)
+    device.error, device.error_frames, device.target[1] = Code.EXCEEDED_MAX_VELOCITY, 1, 0.03
+    one.run(1200, touching=True)
+    device.target[1] = -0.005
+    state = one.run(1500, touching=True)
+    assert (Phase(state.phase), tuple(Condition)[state.cause], state.force) == (Phase.READY, Condition.TOO_FAST, (0.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize(
     ("dead_man", "field", "held"),
     [(0, "buttons", 1), (1, "buttons", 2), ("safety-switch", "safety_switch", 1), ("inkwell", "inkwell", 0)],
@@ -261,6 +308,47 @@ def test_an_exception_in_the_callback_ends_in_a_frame_without_force_on_every_han
     assert [math.hypot(*one.world.motors(i)) for i in (0, 1)] == [0.0, 0.0]
 
 
+numbers = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf])
+events = st.one_of(
+    st.tuples(st.just("buttons"), st.integers(0, 3)),
+    st.tuples(st.just("placeholder"), st.integers(0, 1)),
+    st.tuples(st.just("calibration"), st.sampled_from([NEEDS_UPDATE, NEEDS_MANUAL_INPUT])),
+    st.tuples(st.just("inkwell"), st.integers(0, 1)),
+    st.tuples(st.just("error"), st.sampled_from([code for code in Code if code])),
+    st.tuples(st.just("planes"), st.lists(st.builds(Plane, *[numbers] * 8), max_size=4)),
+    st.tuples(st.just("height"), st.floats(-0.05, 0.05)),
+    st.tuples(st.just("silence"), st.booleans()),
+)
+
+
+@settings(max_examples=10, phases=[HypothesisPhase.generate])
+@given(days=st.lists(st.tuples(events, st.integers(1, 60)), max_size=12))
+def test_whatever_happens_the_force_keeps_its_limits(library: Path, tmp_path_factory: pytest.TempPathFactory, days: list[tuple[tuple[str, Any], int]]) -> None:
+    """From a hand with force in it, through random bad days: never above the limit, never up by more than the slew, zero where nothing permits it."""
+    one = Rig(library, tmp_path_factory.mktemp("world") / "world")
+    one.press(ticks=1000)
+    assert one.sent[-1] > 0.5
+    device, planes, silent = one.world.devices[0], [FLOOR], False
+    for (what, value), ticks in days:
+        if what == "error":
+            device.error, device.error_frames = value, 1
+        elif what == "planes":
+            planes = value
+        elif what == "silence":
+            silent = value
+        elif what == "height":
+            device.target[1] = value
+        else:
+            setattr(device, what, value)
+        for _ in range(ticks):
+            complained = device.error_frames and what == "error"
+            one.run(1, planes=None if silent else planes)
+            if complained or not device.buttons & 1 or device.calibration != OK or device.placeholder:
+                assert one.run(1, planes=None if silent else planes).force == (0.0, 0.0, 0.0)
+    assert max(one.sent) <= Limits().force + 1e-9
+    assert max(np.diff(one.sent)) <= 0.1 + 1e-9
+
+
 def test_a_clean_run_leaves_no_error_in_the_library(rig: Callable[..., Rig]) -> None:
     one = rig(dead_man="inkwell")
     assert Phase(one.run(300).phase) is Phase.READY
@@ -284,6 +372,12 @@ def test_the_servo_process_holds_nothing_that_could_delay_a_callback() -> None:
 def test_names_of_errors() -> None:
     assert Code.text(0x0102) == "HD_INVALID_OPERATION (0x0102)"
     assert Code.text(0x0999) == "HDAPI error 0x0999"
+
+
+def test_the_library_is_found_where_the_loader_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "libHD.so").touch()
+    monkeypatch.setenv("LD_LIBRARY_PATH", f"/nowhere:{tmp_path}")
+    assert hdapi.find(None) == tmp_path / "libHD.so"
 
 
 def test_a_library_that_is_not_there_or_is_another(tmp_path: Path) -> None:

@@ -131,3 +131,16 @@ def test_bad_usage_is_refused(recordings: dict[str, Recording], arguments: list[
 def test_a_recording_without_a_scene_is_refused(recordings: dict[str, Recording]) -> None:
     with pytest.raises(RecordingError, match="no scene of 'robo'; participants of kind mujoco: robot"):
         RecordedScene(recordings["hub"], "robo")
+
+
+def test_a_scene_on_the_cart_is_drawn_as_it_was_stated(tmp_path: Path) -> None:
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+    file = tmp_path / "cart.yaml"
+    file.write_text(
+        "name: cart\nstep: 5 ms\nduration: 10 ms\n"
+        "participants: {robot: {kind: mujoco, mounting: cart, looks: false, arms: {PSM1: {instrument: palpation-probe}, ECM: {endoscope: up}}}}\n"
+    )
+    launch(load(str(file)), endpoint=free_endpoint(range(1)), record=tmp_path / "bag").run()
+    picture = RecordedScene(Recording(tmp_path / "bag")).picture(0, camera="left", size=(40, 30))
+    assert picture.shape == (30, 40, 3)

@@ -133,6 +133,14 @@ def test_strangers_may_not_join(steer):
                 console.ask(f"join/{host}", JoinRequest(host=host, pid=1), JoinReply)
 
 
+def test_a_host_joins_under_its_own_name_and_need_not_know_the_session(steer):
+    with steer() as (console, _):
+        with pytest.raises(MessageError, match="belongs on trocar/steered/control/join/there, and came on trocar/steered/control/join/other"):
+            console.ask("join/other", JoinRequest(host="there", pid=1), JoinReply)
+        with pytest.raises(MessageError, match="is here already, as process"):
+            ask(console._client, Keys("*").join("other"), JoinRequest(host="other", pid=1), JoinReply)
+
+
 def test_status_says_who_lives_where(steer):
     with steer() as (console, _):
         console.ask("pause")

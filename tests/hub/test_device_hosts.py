@@ -3,9 +3,11 @@
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from signal import SIGKILL, SIGTERM
 from time import monotonic, sleep
 
+from hub.endpoint import free_endpoint
 from hub.live import live_sessions
 from tests.hub.proxy import Proxy
 
@@ -16,7 +18,9 @@ pace: realtime
 participants:
   player: {kind: "toys:Player", clock: wall, max_age_ms: 100, host: remote}
   deaf: {kind: "toys:Deaf"}
+  loud: {kind: "toys:Loud"}
 connections:
+  - loud.out -> player.noise
   - player.hand -> deaf.hand
   - player.buttons -> deaf.buttons
 measure:
@@ -96,7 +100,7 @@ def test_a_host_outlives_the_hub_and_joins_the_next_session_of_its_name(prepare,
         until(lambda: second.is_followed())
         second.end()
     said = " ".join((tmp_path / "player.log").read_text().split())
-    assert "device 'player': the hub is gone; it gets no force any more, and joins again when the hub is back" in said
+    assert "device 'player': the hub is gone; nothing is written to it any more, and it joins again when the hub is back" in said
     assert said.count("takes part in session 'hand'") == 2
 
 
@@ -121,13 +125,18 @@ def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
         until(lambda: running.is_followed())
         proxy.hold()
         sleep(0.3)
-        before = running.fresh
+        before, step = running.fresh, running.status.step
         sleep(2.7)
         assert running.fresh - before < 50
+        assert running.status.step > step + 500  # what is for the device waits for nobody
         proxy.go_on()
         until(lambda: running.is_followed())
         assert running.status.participants[0].pid == process.pid
+        process.terminate()
+        process.wait(10)
+        until(lambda: running.status.participants[0].pid == 0)
         running.end()
+    assert running.summary.latency["state to force"]["loud.out -> player.noise"]["count"] > 100  # though the device is gone
     assert (tmp_path / "player.log").read_text().count("takes part") == 1
 
 
@@ -145,4 +154,23 @@ def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
         assert [device.device for device in until(lambda: running.status.devices)] == ["player"]
         running.end()
     assert "device 'player' is gone, what it leads holds: start 'trocar device player' again, or mend the network" in caplog.text
+    assert (tmp_path / "player.log").read_text().count("takes part") == 2
+
+
+def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
+    (tmp_path / "session.yaml").write_text(SCENARIO)
+    endpoint = free_endpoint(range(1))
+    command = [sys.executable, "-P", "-m", "hub.command_line", "run", str(tmp_path / "session.yaml"), "--listen", endpoint]
+
+    def is_followed():
+        return any(one.stream == "player.hand" and one.count > 50 for status in live_sessions([endpoint]) for one in status.latencies)
+
+    with ExitStack() as stack:
+        for signal in (SIGKILL, SIGTERM):
+            with subprocess.Popen(command, stderr=subprocess.DEVNULL) as hub:
+                until(lambda: live_sessions([endpoint]))
+                if signal == SIGKILL:
+                    stack.enter_context(player(endpoint, tmp_path / "player.log"))
+                until(is_followed)
+                hub.send_signal(signal)
     assert (tmp_path / "player.log").read_text().count("takes part") == 2

@@ -1,62 +1,116 @@
 import threading
 from pathlib import Path
+from time import sleep
 
 import numpy as np
+import pytest
 
 from hub.device_loop import DeviceLoop
-from hub.participant import Device, Params, Sample
-from schemas.ros import DiagnosticStatus, Float64Message, Joy
+from hub.participant import Sample
+from schemas.errors import MessageError, ParticipantError
+from schemas.ros import Float64Message, Joy
+from tests.hub.parts import Stylus, out
 
 MS = 1_000_000
 
 
-class Speaker(Device):
-    """Says everything once, at its first reading, and goes on with numbers."""
+class Pen(Stylus):
+    """Says how often it was read, and button 1 at the third read; what it is told to raise, it raises."""
 
-    def __init__(self):
-        super().__init__("speaker", Params())
-        self.read_twice, self.readings = threading.Event(), 0
-
-    ports = ()
-
-    def open(self, directory):
-        pass
+    def __init__(self, fails_at=10**9, refuses=None):
+        super().__init__("pen", out("count"), out("button", variability="event"))
+        self.reads, self.fails_at, self.refuses = 0, fails_at, refuses
+        self.closed = False
 
     def read(self, t):
-        self.readings += 1
-        if self.readings == 1:
-            told = [DiagnosticStatus(level=level, name="speaker", message=str(level)) for level in (2, 0)]
-            return [Sample("buttons", Joy(buttons=np.array([1], np.int32))), *(Sample("diagnostics", status) for status in told)]
-        self.read_twice.set()
-        return [Sample("number", Float64Message(data=float(self.readings)))]
+        self.reads += 1
+        if self.reads == self.fails_at:
+            raise OSError("the cable is out")
+        yield Sample("count", Float64Message(data=float(self.reads)))
+        if self.reads == 3:
+            yield Sample("button", Joy(buttons=np.array([1], np.int32)))
+
+    def write(self, port, value):
+        if self.refuses is not None:
+            raise self.refuses
 
     def close(self):
-        pass
+        self.closed = True
 
 
-class Listener:
+class Uplink:
     def __init__(self):
-        self.heard, self.told = [], threading.Event()
+        self.got = []
+        self.enough = threading.Event()
 
     def exchange(self, t, samples):
-        self.heard += samples
-        self.told.set()
+        self.got.extend((t, sample.port) for sample in samples)
+        if len(self.got) > 20:
+            self.enough.set()
 
 
-def test_who_listens_late_is_told_first_how_buttons_and_diagnoses_stand():
-    speaker = Speaker()
-    loop = DeviceLoop("speaker", speaker, MS, failed=lambda name, cause: None)
-    loop.start(Path())
-    try:
-        assert speaker.read_twice.wait(5.0)
-        for _ in range(2):
-            listener = Listener()
-            loop.attach(listener)
-            assert listener.told.wait(5.0)
-            loop.attach(None)
-            buttons, diagnosis = listener.heard[:2]
-            assert (buttons.port, buttons.message.buttons.tolist()) == ("buttons", [1])
-            assert (diagnosis.port, diagnosis.message.level) == ("diagnostics", 0)
-            assert {sample.port for sample in listener.heard[2:]} <= {"number"}
-    finally:
+@pytest.fixture
+def start():
+    loops = []
+
+    def start(pen, period_ns=MS):
+        failures = []
+        loop = DeviceLoop("pen", pen, period_ns, failed=lambda *failure: failures.append(failure))
+        loops.append(loop)
+        loop.start(Path.cwd())
+        return loop, failures
+
+    yield start
+    for loop in loops:
         loop.close()
+
+
+def test_an_uplink_gets_what_is_read_while_it_is_attached_and_the_buttons_as_they_are(start):
+    pen, uplink, later = Pen(), Uplink(), Uplink()
+    loop, failures = start(pen)
+    while pen.reads < 10:
+        sleep(0.001)
+    loop.attach(uplink)
+    assert uplink.enough.wait(5)
+    loop.attach(later)
+    told = len(uplink.got)
+    assert later.enough.wait(5)
+    assert len(uplink.got) == told
+    for got in (uplink.got, later.got):
+        assert [port for _, port in got][:2] == ["button", "count"]
+        times = [t for t, _ in got]
+        assert times == sorted(times)
+        assert [port for _, port in got].count("button") == 1
+    loop.close()
+    assert pen.closed
+    assert failures == []
+
+
+def test_what_a_device_raises_is_told_once_and_ends_its_loop(start):
+    pen = Pen(fails_at=5)
+    _, failures = start(pen)
+    while not failures:
+        sleep(0.001)
+    sleep(0.02)
+    assert failures == [("pen", "OSError: the cable is out")]
+    assert pen.reads == 5
+
+
+def test_a_value_that_is_refused_is_the_writers_affair_and_any_other_error_the_devices(start):
+    loop, failures = start(Pen(refuses=MessageError("no such port")))
+    with pytest.raises(MessageError, match="no such port"):
+        loop.write("force", 1.0)
+    assert failures == []
+    loop, failures = start(Pen(refuses=OSError("burnt out")))
+    loop.write("force", 1.0)
+    loop.write("force", 1.0)
+    assert failures == [("pen", "OSError: burnt out")]
+
+
+def test_a_device_that_cannot_be_opened_says_so():
+    class Unplugged(Pen):
+        def open(self, directory):
+            raise OSError("no such device")
+
+    with pytest.raises(ParticipantError, match=r"participant 'pen' failed.*cannot be opened: no such device"):
+        DeviceLoop("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())

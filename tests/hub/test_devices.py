@@ -8,6 +8,8 @@ from time import sleep
 import pytest
 
 from hub.live import live_sessions
+from hub.recording import Recording
+from hub.verify import verify
 from schemas.errors import ParticipantError
 
 SCENARIO = """\
@@ -135,3 +137,25 @@ def test_a_device_is_told_every_event_and_each_value_of_a_signal_once(prepare, t
     words, numbers = lines("words"), lines("numbers")
     assert words == [f"word {i}" for i in range(len(words))]
     assert len(numbers) == len(set(numbers)) <= 1 + summary.steps // 2
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connected(prepare, tmp_path, host):
+    scenario = SCENARIO.replace("  - player.buttons -> deaf.buttons\n", "") + "  x: {kind: peak-norm, of: player.hand.position}\n"
+    session = prepare(scenario, f"participants.player.host={host}", record=tmp_path / "recording")
+    summary = session.run(until(session, lambda steps, fresh, pressed: fresh > 200))
+    assert summary.dropped_messages == 0
+    assert summary.measures["x"] > 0.1 / 7
+    recording = Recording(tmp_path / "recording")
+    counts = recording.counts
+    assert counts["/device/player/out/buttons"] > 20
+    assert counts["/device/player/out/hand"] > 20
+    assert verify(recording).same
+
+
+def test_a_device_that_sends_more_than_it_may_is_held_to_it(prepare, caplog):
+    session = prepare(SCENARIO, "participants.player.rate_limit=50")
+    summary = session.run(until(session, lambda steps, fresh, pressed: steps > 1500))
+    assert summary.dropped_messages > 500
+    assert "device 'player' sends more than 50 messages/s on port 'buttons' (rate_limit)" in caplog.text
+    assert summary.measures["pressed"] < 50 * (1.0 + summary.wall_time_s) + 60

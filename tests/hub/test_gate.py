@@ -5,6 +5,7 @@ import os
 import signal
 import socket
 import ssl
+import sys
 from contextlib import contextmanager
 from time import monotonic, sleep
 
@@ -53,6 +54,7 @@ PLAN = Plan(
     bonds=(),
 )
 CONTACT, SECRET = (KEYS.output("engine", "robot", port) for port in ("contact", "secret"))
+FEED = KEYS.feed("robot", "contact")
 
 
 class Hub:
@@ -78,14 +80,14 @@ class Hub:
             query.reply(str(query.key_expr).replace("/*/", "/s/", 1), b"a secret")
 
     def say(self):
-        for key in (CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
+        for key in (CONTACT, FEED, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
             self.router.put(key, b"said")
 
     @contextmanager
-    def client(self, credentials, protocol="tls"):
+    def client(self, credentials, protocol="tls", mode="client"):
         """Connect; raises ConnectError after a moment."""
         settings = {} if credentials is None else credentials.connecting()
-        with open_session("client", connect=[f"{protocol}/127.0.0.1:{self.port}"], security=settings | {"connect/timeout_ms": 300}) as session:
+        with open_session(mode, connect=[f"{protocol}/127.0.0.1:{self.port}"], security=settings | {"connect/timeout_ms": 300}) as session:
             yield session
 
     def close(self):
@@ -139,7 +141,7 @@ def test_a_device_does_its_part(hub, told, caplog):
         told("'touch' connects from 127.0.0.1:")
         assert asks(touch, Keys("*").join("remote/touch")) == [KEYS.join("remote/touch")]
         assert asks(touch, KEYS.control("clock")) == [KEYS.control("clock")]
-        contact, link, alive = hears(touch, CONTACT), hears(touch, KEYS.link("touch")), []
+        contact, link, alive = hears(touch, FEED), hears(touch, KEYS.link("touch")), []
         touch.liveliness().declare_subscriber(KEYS.alive("hub", "hub"), Callback(lambda sample: alive.append(sample.kind)), history=True)
         touch.liveliness().declare_token(KEYS.alive("device", "touch"))
         sleep(0.1)
@@ -148,7 +150,8 @@ def test_a_device_does_its_part(hub, told, caplog):
             touch.put(key, b"x")
             wait_for(lambda key=key: key in hub.heard)
         wait_for(lambda: f"alive: {KEYS.alive('device', 'touch')}" in hub.heard and contact and link and alive)
-    assert not [line for line in caplog.messages if "refused" in line]
+    sleep(0.5)
+    assert not [line for line in caplog.messages if "refused" in line or "not let in" in line]
 
 
 def test_a_remote_engine_hears_grants_too(hub):
@@ -192,7 +195,7 @@ ASKED = [
     "trocar/**",
     "@/*/router/**",
 ]
-READ = [SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
+READ = [CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
 
 
 @pytest.mark.parametrize("deed", FORBIDDEN)
@@ -219,11 +222,29 @@ def test_a_device_asks_nothing_that_is_not_for_it(hub, told, key):
 @pytest.mark.parametrize("key", READ)
 def test_a_device_hears_nothing_that_is_not_for_it(hub, told, key):
     with hub.client(hub.authority.issued("touch")) as touch:
-        own, heard = hears(touch, CONTACT), hears(touch, key)
+        own, heard = hears(touch, FEED), hears(touch, key)
         told("refused to 'touch' at 127.0.0.1:", f" on {key}")
         hub.say()
         wait_for(lambda: own)
-        assert set(heard) <= {CONTACT, KEYS.link("touch")}  # what the session is sent for its other subscribers
+        assert set(heard) <= {FEED, KEYS.link("touch")}  # what the session is sent for its other subscribers
+
+
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_who_does_not_come_as_a_client_may_do_no_more(hub, told, mode):
+    with hub.client(hub.authority.issued("touch"), mode=mode) as touch:
+        heard, alive = hears(touch, "**"), []
+        touch.liveliness().declare_subscriber("**", Callback(lambda sample: alive.append(str(sample.key_expr))), history=True)
+        told("refused to 'touch' at 127.0.0.1:", "declare subscriber on **")
+        hub.say()
+        hub.heard.clear()
+        for key in (SECRET, KEYS.grant, KEYS.output("device", "head", "pose"), KEYS.output("device", "touch", "pose")):
+            touch.put(key, b"x")
+        touch.liveliness().declare_token(KEYS.alive("device", "head"))
+        assert asks(touch, KEYS.control("shutdown")) == []
+        sleep(0.3)
+        assert heard == []
+        assert set(alive) <= {KEYS.alive("hub", "hub"), KEYS.alive("device", "head")}  # what it may see, and what it said itself
+        assert set(hub.heard) <= {KEYS.output("device", "touch", "pose")}
 
 
 def test_a_participant_that_the_session_has_not_gets_nothing(hub, told):
@@ -278,6 +299,8 @@ def test_plain_tcp_opens_nothing(hub, told):
     with pytest.raises(ConnectError), hub.client(None, protocol="tcp"):
         pass
     told("refused a connection: it does not speak TLS")
+    if sys.platform == "linux":
+        told("the connection from 127.0.0.1:", "was not let in")
 
 
 def test_nobody_without_a_certificate_gets_in(hub, told):

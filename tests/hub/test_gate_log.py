@@ -104,3 +104,10 @@ def test_a_key_gives_no_orders_to_a_terminal():
 @pytest.mark.parametrize("line", ["", "nonsense", "ThreadId(1) is unauthorized to", "2026 INFO zenoh: hello"])
 def test_any_other_line_is_passed_over(line):
     assert read(line) == []
+
+
+def test_a_connection_that_ended_was_let_in_or_not():
+    log = GateLog(["touch"])
+    list(log.read(came("touch")))
+    assert list(log.ended("10.0.0.2:40000")) == []
+    assert list(log.ended("10.0.0.2:40001")) == [(logging.WARNING, "the connection from 10.0.0.2:40001 was not let in")]

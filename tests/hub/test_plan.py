@@ -264,6 +264,12 @@ def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
     assert plan.order == ("a",)
 
 
+def test_nothing_is_extrapolated_for_a_device():
+    stylus, engine = Stylus("stylus", out("pose", type=POSE), into("force", size=3)), Part("a", out(size=3))
+    with pytest.raises(ScenarioError, match="'stylus' is a device, which is written what is there"):
+        plan_of(stylus, engine, connections=[{"source": "a.out", "target": "stylus.force", "extrapolation": "linear"}])
+
+
 def test_a_device_in_wall_time_is_read_at_a_rate_of_its_own():
     stylus = Stylus("stylus", out("pose", type=POSE, clock="wall"))
     assert plan_of(stylus).members["stylus"].read_ns == 1_000_000

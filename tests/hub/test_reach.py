@@ -120,6 +120,11 @@ def test_a_hub_elsewhere_is_reached_by_tls_and_with_a_certificate_only(authority
         reach("tls/192.0.2.1:7447", "touch", tmp_path)
 
 
+def test_a_certificate_is_not_lent(authority):
+    with pytest.raises(ConnectError, match=r"touch\.pem is the certificate of 'touch', with which nobody can join as 'head'"):
+        reach("tls/127.0.0.1:7447", "head", authority.issued("touch").file)
+
+
 def test_the_way_to_mend_it_comes_with_the_error(authority):
     with pytest.raises(ConnectError, match=r"cannot reach the hub at tls/127\.0\.0\.1:\d+: nobody listens there"):
         reach(f"tls/127.0.0.1:{free_port()}", "touch", authority.issued("touch").file)

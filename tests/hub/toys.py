@@ -88,6 +88,18 @@ class Chain(Bare):
         return self.digest
 
 
+class Loud(Bare):
+    """Gives 32 KiB in each step."""
+
+    ports = (Port(name="out", causality="output", size=4096),)
+
+    def configure(self, setup):
+        return {"out": np.zeros(4096)}
+
+    def step(self, t, h, inputs):
+        return {"out": np.zeros(4096)}
+
+
 class Talker(Chain):
     """Says between 0 and 4 things in a step."""
 
@@ -211,6 +223,7 @@ class Player(Device):
         return (
             Port(name="hand", causality="output", type=POSE, frame="stylus_base", clock=clock, max_age_ns=age),
             Port(name="buttons", causality="output", type=JOY, variability="event", clock=clock),
+            Port(name="noise", causality="input", size=4096),
         )
 
     def open(self, directory):

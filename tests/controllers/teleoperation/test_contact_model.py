@@ -59,6 +59,7 @@ def test_tissue_and_rigid_things_each_have_a_plane_of_their_own():
     assert len(found) == 4
     tissue, rigid = found[2:]
     assert (tissue.normal.z, rigid.normal.x) == (1.0, -1.0)
+    assert tissue.damping == rigid.damping == ForceParams().damping
     assert np.allclose(push(tissue, np.zeros(3)), [0, 0, 0.2 * 500.0 * 0.004 / 0.2], rtol=0.05)
     assert np.allclose(push(rigid, np.zeros(3)), [-0.2, 0, 0], rtol=0.05)  # 0.5 N at a hand 0.5 mm deep, which 400 N/m allow 0.2 N
 

@@ -12,9 +12,10 @@ from pydantic import ValidationError
 from devices.simulated_touch.device import SimulatedTouch
 from devices.simulated_touch.params import SimulatedTouchParams
 from hub.participant import Sample
+from hub.scenario_file import load
 from hub.testing import check_device
 from schemas.codec import encode
-from schemas.errors import MessageError
+from schemas.errors import MessageError, ScenarioError
 from schemas.ros import DiagnosticStatus, Header, Joy, PoseStamped, Time, TwistStamped, Vector3, WrenchStamped
 from schemas.trocar_msgs import ContactModel, ContactPlane
 
@@ -175,7 +176,7 @@ def test_ports_are_those_of_a_stylus() -> None:
 @pytest.mark.parametrize(
     ("params", "problem"),
     [
-        ({"path": []}, "at least 1 item"),
+        ({"path": []}, "at least one waypoint"),
         ({"path": [{"at": "1 s"}, {"at": "1 s"}]}, "go forward"),
         ({"path": [{"at": 0, "buttons": [2]}]}, "buttons 0 and 1"),
         ({"safety": {"force": "2 N"}}, "device bears 1.98 N"),
@@ -201,3 +202,31 @@ def test_stamps_of_late_reads_go_forward() -> None:
     stamps = [s.message.header.stamp.ns for t in (0, MS // 2, 3 * MS // 2, 9 * MS) for s in device.read(t) if s.port == "right/pose"]
     assert stamps == [0, MS, 9 * MS]
     assert all(a < b for a, b in pairwise(stamps))
+
+
+def test_a_misspelt_word_deep_in_a_scenario_is_told_with_the_right_one(tmp_path: Path) -> None:
+    file = tmp_path / "scenario.yaml"
+    file.write_text("name: a\nstep: 1 ms\nparticipants:\n  touch: {kind: simulated-touch, styluses: {right: {path: [{at: 0, bottons: [0]}]}}}\n")
+    with pytest.raises(ScenarioError) as refused:
+        load(str(file))
+    (line,) = str(refused.value).splitlines()
+    assert line.startswith(f"{file}:4:")
+    assert line.endswith("there is no 'bottons' here. Did you mean 'buttons'? Known: at, buttons, orientation, position.")
+
+
+def test_a_hand_too_fast_has_no_force_until_it_lets_go_and_the_diagnosis_says_so() -> None:
+    path = [
+        {"at": 0, "position": [0, 0, 0.2], "buttons": [0]},
+        {"at": "0.1 s", "position": [0, 0, 0.02]},  # 3 m/s
+        {"at": "1.5 s", "position": [0, 0, -0.01]},
+        {"at": "2 s", "position": [0, 0, 0.02], "buttons": []},
+        {"at": "2.1 s", "buttons": [0]},
+        {"at": "3.5 s"},
+        {"at": "4 s", "position": [0, 0, -0.01]},
+    ]
+    samples = _play(_device(path, safety={"passivity": True}), 4.5)
+    forces = np.linalg.norm(_forces(samples), axis=1)
+    assert not forces[:500].any()
+    assert forces[-1] == pytest.approx(1.0, abs=0.01)
+    told = [message.message for message in _of(samples, "diagnostics")]
+    assert [text.partition(";")[0] for text in told] == ["force is on", "no force: the hand was too fast", "no force: the dead-man is not held", "force is on"]

@@ -1,4 +1,4 @@
-"""A device host in small, to be killed: `python host.py LIBRARY PLANES`, with TROCAR_STANDIN_HD set. Reads two styluses at 1 kHz and sends contact at 250 Hz.
+"""A device host in small, to be killed: `python host.py LIBRARY PLANES [STYLUSES]`, with TROCAR_STANDIN_HD set. Reads at 1 kHz and sends contact at 250 Hz.
 
 Each hand is on a floor 10 mm above the origin of its base frame, made of up to four planes.
 """
@@ -29,6 +29,8 @@ def floor(time_ns: int, planes: int) -> ContactModel:
 def main() -> None:
     """Go on until killed."""
     styluses = {"right": {}, "left": {"device": "left"}}
+    if sys.argv[3:] == ["1"]:
+        del styluses["left"]
     touch = Touch("touch", TouchParams.model_validate({"library": sys.argv[1], "styluses": styluses}))
     touch.open(Path.cwd())
     start, tick = monotonic_ns(), 0
