@@ -35,7 +35,7 @@ def ros(
         return
     out = Console(highlight=False)
     if not gateways:
-        out.print("no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`, `ros2-dds` or `ros1`: trocar run ros", soft_wrap=True)
+        out.print("no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`: trocar run ros", soft_wrap=True)
     for (session, name), status in gateways.items():
         _print(out, session, name, status)
 

@@ -1,4 +1,4 @@
-"""A gateway to ROS, whatever the middleware: the base of the kinds `ros2-zenoh`, `ros2-dds` and `ros1`.
+"""A gateway to ROS, whatever the middleware: the base of kinds such as `ros2-zenoh`.
 
 It makes publishers, subscribers, services and ports from one table (`devices.ros.face`), and knows no physics. A gateway for another middleware is
 a `connect` that returns another transport.
@@ -46,7 +46,7 @@ class Gateway(Device):
     params_model = GatewayParams
     params: GatewayParams
     kind: ClassVar[str]
-    """As the scenario calls it: `ros2-dds`."""
+    """As the scenario calls it: `ros2-zenoh`."""
 
     def __init__(self, name: str, params: GatewayParams) -> None:
         """Take the participant's name and its parameters."""
