@@ -300,6 +300,11 @@ def test_no_scenario_raises_a_limit(change: dict[str, Any], words: str) -> None:
         TouchParams.model_validate({"styluses": {"right": {"safety": change}}})
 
 
+def test_two_styluses_are_two_devices() -> None:
+    with pytest.raises(ValidationError, match="'right' and 'left' are both the default device; give each a 'device'"):
+        TouchParams.model_validate({"styluses": {"right": {}, "left": {}}})
+
+
 def test_a_wrong_library_is_an_error(tmp_path: Path) -> None:
     params = TouchParams.model_validate({"library": "libHD.so", "styluses": {"right": {}}})
     with pytest.raises(DeviceError, match="no library of OpenHaptics at"):
