@@ -14,14 +14,14 @@ from schemas.quantity import Duration, Length
 
 __all__ = ["StylusParams", "TouchParams"]
 
-_DEAD_MAN = "what is to be held for force: the index of a button, the safety switch of the stylus, or the stylus itself (out of its inkwell)"
+_DEAD_MAN = "what is to be held for force: the index of a button, or the safety switch of the stylus"
 
 
 class StylusParams(Params):
     """One stylus."""
 
     device: Annotated[str | None, Field(min_length=1, description="its name in the vendor's setup program; default: the default device")] = None
-    dead_man: Annotated[Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch", "inkwell"], Field(description=_DEAD_MAN)] = 0
+    dead_man: Annotated[Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch"], Field(description=_DEAD_MAN)] = 0
     tip_offset: Annotated[Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")] = 0.039
     """The default is that of sawSensablePhantom (mtsSensableHD.cpp)."""
     safety: SafetyParams = SafetyParams()

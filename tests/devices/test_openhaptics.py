@@ -114,7 +114,7 @@ def _press(world: HdWorld, hands: Hands, *styluses: str) -> None:
 
 
 def test_it_keeps_the_contract_of_a_device(library: Path, world: HdWorld) -> None:
-    params = {"library": str(library), "styluses": {"right": {"dead_man": "inkwell"}, "left": {"device": "left", "safety": {"force": "1 N"}}}}
+    params = {"library": str(library), "styluses": {"right": {"dead_man": "safety-switch"}, "left": {"device": "left", "safety": {"force": "1 N"}}}}
     check_device(lambda: Touch("touch", TouchParams.model_validate(params)))
 
 
