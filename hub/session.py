@@ -367,10 +367,13 @@ class Session:
         self._membership.lose(member.host)
         if member.role == "device":
             self._intake.forget(name)
+        if self._account.phase not in ("starting", "running", "paused"):
+            return
+        if member.role == "device":
             log.warning(
                 "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the network; a host that still runs joins again", name, name
             )
-        elif self._account.phase in ("starting", "running", "paused"):
+        else:
             self._fail(name, "its host is gone")
 
     def _refused_elsewhere(self, sample: zenoh.Sample) -> None:

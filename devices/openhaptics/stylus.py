@@ -65,7 +65,7 @@ class Spec:
     device: str | None
     """Name of the device in the vendor's configuration; None: the default device."""
     dead_man: int | str
-    """Index of a button, `safety-switch`, or `inkwell`: held while the stylus is out of it."""
+    """Index of a button, or `safety-switch`. Not the inkwell's switch: a stylus that was dropped is out of it, too."""
     tip_offset: float
     """From the centre of the gimbal to the tip, m."""
 
@@ -138,9 +138,8 @@ class Stylus:
         dead_man = self._spec.dead_man
         if isinstance(dead_man, int):
             return bool(self._buttons.value >> dead_man & 1)
-        held = dead_man == "safety-switch"
-        self._hd.hdGetBooleanv(Get.SAFETY_SWITCH if held else Get.INKWELL_SWITCH, self._switch)
-        return bool(self._switch.value) is held
+        self._hd.hdGetBooleanv(Get.SAFETY_SWITCH, self._switch)
+        return bool(self._switch.value)
 
     def _look(self) -> list[tuple[int, int]]:
         """Look at the calibration, and update it where that can be done; return what HDAPI complained of before. Force output is on only while it stands."""

@@ -266,7 +266,7 @@ def test_a_warning_is_no_letting_go_for_a_hand_that_was_too_fast(rig: Callable[.
 
 @pytest.mark.parametrize(
     ("dead_man", "field", "held"),
-    [(0, "buttons", 1), (1, "buttons", 2), ("safety-switch", "safety_switch", 1), ("inkwell", "inkwell", 0)],
+    [(0, "buttons", 1), (1, "buttons", 2), ("safety-switch", "safety_switch", 1)],
 )
 def test_what_is_held_permits_force(rig: Callable[..., Rig], dead_man: int | str, field: str, held: int) -> None:
     one = rig(dead_man=dead_man)
@@ -350,7 +350,7 @@ def test_whatever_happens_the_force_keeps_its_limits(library: Path, tmp_path_fac
 
 
 def test_a_clean_run_leaves_no_error_in_the_library(rig: Callable[..., Rig]) -> None:
-    one = rig(dead_man="inkwell")
+    one = rig(dead_man="safety-switch")
     assert Phase(one.run(300).phase) is Phase.READY
     assert Phase(one.state(1).phase) is Phase.READY
     assert hdapi.errors(one.hd) == []
