@@ -96,7 +96,7 @@ def test_a_console_drives_an_arm_as_on_the_real_system() -> None:
         assert edges[0] == ("DISABLED", False, True)
         assert ("ENABLED", False, True) in edges
         console.move(*(HOME + 0.02))
-        np.testing.assert_allclose(console.positions, HOME + 0.02, atol=1e-6)
+        console.until(lambda: np.allclose(console.positions, HOME + 0.02, atol=1e-6))  # states come after their own time
         console.move(*(HOME + 0.02))  # nothing to move, and yet busy and then idle
         Console(console.transport, "/other").order("move_jp", JointState(position=HOME))
         console.order("move_jp", JointState(position=np.array([0.0, 0.0, 0.9, 0.0, 0.0, 0.0])))
