@@ -348,8 +348,9 @@ class Session:
         self._interrupt()
 
     def _check(self) -> None:
-        """Raise the first failure, if there is one: in the words of a participant, if they are here already."""
+        """Raise the first failure, if there is one: in the words of a participant, if they are here already; else an interrupt that got lost."""
         if self._failures.first is None:
+            self._interrupt.check()
             return
         self._acks.raise_failure()
         self._failures.check()
