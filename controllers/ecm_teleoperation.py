@@ -114,9 +114,9 @@ class EcmTeleoperation(Stepped):
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._chain = ecm.chain(params.endoscope, "view")
-        self._state = np.zeros(2 * _JOINTS + 5)
-        self._command, self._velocity, self._mode, self._pressed, self._held, self._ready, self._started = np.split(
-            self._state, np.cumsum([_JOINTS, _JOINTS, 1, 1, 1, 1])
+        self._state = np.zeros(2 * _JOINTS + 7)
+        self._command, self._velocity, self._mode, self._pressed, self._held, self._ready, self._started, self._scale, self._heard = np.split(
+            self._state, np.cumsum([_JOINTS, _JOINTS, 1, 1, 1, 1, 1, 1])
         )
 
     @property
@@ -152,13 +152,14 @@ class EcmTeleoperation(Stepped):
         """Start with the arm held where the parameters say."""
         self._command[:] = self.params.start
         self._mode[0], self._ready[0] = _MODES.index(self.params.mode), 1.0
+        self._scale[0] = self._heard[0] = self.params.scale
         return self._outputs((StringMessage(data=self.params.mode),), ())
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Move the command with the velocity that the head's twist asks for."""
         before = self._mode[0]
         self._heed_state(inputs.events("operating_state"))
-        warnings = self._heed_mode(inputs.events("mode"))
+        warnings = self._heed_mode(inputs.events("mode")) + self._heed_scale(float(inputs["scale"][0]))
         self._heed_buttons(inputs.events("buttons"))
         if not self._started[0]:
             self._command[:] = np.clip(inputs["measured_js"][:_JOINTS], self._chain.lower, self._chain.upper)
@@ -182,7 +183,7 @@ class EcmTeleoperation(Stepped):
     def _asked(self, inputs: Inputs) -> Vector:
         """Return dq/dt, shape (4,), for the twist of the head, turned into its own frame and scaled."""
         to_head, twist = rotation.matrix(inputs["pose"][3:]).T, inputs["twist"]
-        own = float(inputs["scale"][0]) * np.concatenate([to_head @ twist[:3], to_head @ twist[3:]])
+        own = self._scale[0] * np.concatenate([to_head @ twist[:3], to_head @ twist[3:]])
         return _limited(self._chain, self._command, own, self._mode_name)
 
     def _heed_state(self, events: tuple[Message, ...]) -> None:
@@ -202,6 +203,14 @@ class EcmTeleoperation(Stepped):
                 warnings.append(StringMessage(data=f"there is no mode '{wish.data}'.{did_you_mean(wish.data, _MODES)}"))
         return tuple(warnings)
 
+    def _heed_scale(self, scale: float) -> tuple[StringMessage, ...]:
+        """Take the scale; return what is wrong with it, once."""
+        news, self._heard[0] = scale != self._heard[0], scale
+        if scale > 0.0:
+            self._scale[0] = scale
+            return ()
+        return (StringMessage(data=f"scale {scale:g} is refused, it must be above 0; it stays {self._scale[0]:g}"),) if news else ()
+
     def _heed_buttons(self, events: tuple[Message, ...]) -> None:
         """Follow the buttons; a Joy without one of them says nothing of it."""
         keys = self.params.buttons
@@ -218,7 +227,7 @@ class EcmTeleoperation(Stepped):
         return {"servo_jp": self._command, "joint_velocity": self._velocity, "active_mode": modes, "warning": warnings}
 
     def state_hash(self) -> int:
-        """Return the hash of the command, its velocity, the mode and the buttons."""
+        """Return the hash of the command, its velocity, the mode, the buttons and the scale."""
         return state_hash(self._state)
 
     def save(self) -> bytes:

@@ -6,10 +6,10 @@ certificate says. The hub's own machine, which reaches the gate by TCP over loop
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hub.credentials import OBSERVER
+from hub.credentials import CONSOLE, OBSERVER
 from hub.plan import Member, Plan
 from schemas.keys import Keys
 
@@ -36,16 +36,24 @@ _MOST_BYTES = 2**25
 Rule = dict[str, Any]
 
 
-def access_settings(plan: Plan, session: str) -> dict[str, Any]:
-    """Return Zenoh's settings by which each remote participant of `plan` may do its part in `session`, and nothing else."""
+def access_settings(plan: Plan, session: str, foreign: Mapping[str, Sequence[str]] | None = None) -> dict[str, Any]:
+    """Return Zenoh's settings by which each remote participant of `plan` may do its part in `session`, and nothing else.
+
+    `foreign`: by the device, the keys that it shares with programs, which connect with the certificate `console`.
+    """
     keys = Keys(session)
     rights = {member.name: _part(plan, keys, member) for member in plan.members.values() if member.host.startswith("remote/")}
     rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]  # all that `trocar ls` needs
+    everything = ["**"]  # but what has a chunk that begins with @, as some foreign keys have
+    for name, shared in (foreign or {}).items():
+        everything += shared
+        for whose in (CONSOLE, name) if name in rights else (CONSOLE,):
+            rights[whose] = [*rights.get(whose, ()), _allow("both", _ALL, *shared)]
     rules = {f"{name} {index}": rule for name, its in rights.items() for index, rule in enumerate(its)}
     access = {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [{"id": "local", **_allow("both", _ALL, "**")}, *({"id": name, **rule} for name, rule in rules.items())],
+        "rules": [{"id": "local", **_allow("both", _ALL, *everything)}, *({"id": name, **rule} for name, rule in rules.items())],
         "subjects": [{"id": "local", "link_protocols": ["tcp"]}, *({"id": name, "cert_common_names": [name]} for name in rights)],
         "policies": [
             {"subjects": ["local"], "rules": ["local"]},

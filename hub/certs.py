@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from hub.credentials import HUB, OBSERVER, examine, load
+from hub.credentials import CONSOLE, HUB, OBSERVER, examine, load
 from schemas.errors import ConnectError, ScenarioError
 from schemas.keys import valid_name
 
@@ -69,12 +69,13 @@ def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
 
 
 def issue(directory: Path, name: str, days: float) -> Path:
-    """Make a certificate for the participant `name`, or `observer`, in place of an older one; return its file, which is all the other machine needs.
+    """Make a certificate for the participant `name`, `observer` or `console`, in place of an older one; return its file, which is all the other machine needs.
 
     Raises ScenarioError if nobody can have that name, ConnectError if `directory` has no authority.
     """
     if not valid_name(name) or name in (HUB, "ca"):
-        raise ScenarioError(f"'{name}' cannot have a certificate: give the name of a participant that the scenario places with 'host: remote', or '{OBSERVER}'")
+        whose = f"the name of a participant that the scenario places with 'host: remote', '{OBSERVER}', or '{CONSOLE}' for ROS programs"
+        raise ScenarioError(f"'{name}' cannot have a certificate: give {whose}")
     return _issue(directory, name, days)
 
 

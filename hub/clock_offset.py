@@ -55,4 +55,5 @@ class ClockOffset:
 
     def best(self, now_ns: int) -> Exchange | None:
         """Return the exchange whose offset is least wrong; None before the first."""
-        return min(self._exchanges, key=lambda exchange: exchange.error_ns(now_ns), default=None)
+        exchanges = tuple(self._exchanges)  # another thread may add one
+        return min(exchanges, key=lambda exchange: exchange.error_ns(now_ns), default=None)

@@ -194,8 +194,9 @@ class ControlServer:
                         at = key_of(request)
                     reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
-                    self._drops.refuse(key, error)
-                    reply = Refusal(refused=str(error))
+                    reason = _reason(error)
+                    self._drops.refuse(key, reason)
+                    reply = Refusal(refused=reason)
                 query.reply(at, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
 
         return session.declare_queryable(key, Callback(answer))
@@ -223,6 +224,14 @@ class ControlServer:
         """Answer no more."""
         for queryable in self._queryables:
             queryable.undeclare()
+
+
+def _reason(error: Exception) -> str:
+    """Return why a request is refused, for the person who made it."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    found = error.errors(include_url=False)
+    return "; ".join(f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].removeprefix('Value error, ')} (got {detail['input']!r})" for detail in found)
 
 
 def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R], *, timeout_s: float = 5.0) -> R:

@@ -15,10 +15,13 @@ import typer
 
 from schemas.errors import ConnectError
 
-__all__ = ["HUB", "OBSERVER", "Certificate", "Credentials", "default_directory", "examine", "load"]
+__all__ = ["CONSOLE", "HUB", "OBSERVER", "Certificate", "Credentials", "default_directory", "examine", "load"]
 
 HUB = "hub"
 """Name of the certificate with which a hub listens."""
+
+CONSOLE = "console"
+"""Name of the certificate with which programs reach the devices of a session that share keys with them, such as gateways to ROS, and nothing else."""
 
 OBSERVER = "observer"
 """Name of the certificate with which anybody may read the status of a session, and nothing else."""
@@ -38,7 +41,7 @@ class Credentials:
 
     @property
     def name(self) -> str:
-        """Whom the certificate names: a participant, `hub` or `observer`."""
+        """Whom the certificate names: a participant, `hub`, `observer` or `console`."""
         return self.file.stem
 
     def listening(self) -> dict[str, Any]:

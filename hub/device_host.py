@@ -114,6 +114,7 @@ class DeviceHost:
             device = make(member.kind, self._name, params, directory)
             if not isinstance(device, Device):
                 raise ParticipantError(self._name, -1, f"'{member.kind}' is no device here")
+            device.learn_hub(self._connect)
             self._loop, self._held = DeviceLoop(self._name, device, member.read_ns, failed=self._device_failed), wanted
             self._loop.start(directory)
         return self._loop

@@ -279,7 +279,7 @@ class Host:
         cell = reader.cell
         if reader.messages is not None:
             if arrived := reader.events(step, self.plan.step_ns):
-                slot.events[reader.port] = tuple(message for _, message in arrived)
+                slot.events[reader.port] = (*slot.events.get(reader.port, ()), *(message for _, message in arrived))
             return
         tag = cell.tag(step, fresh=reader.fresh)
         value = cell.get(tag)

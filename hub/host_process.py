@@ -11,7 +11,8 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from time import sleep
@@ -61,7 +62,8 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
         reply = present(session, Keys(session_name), request)
         keys = Keys(reply.session)
         with _ending_with_hub(session, keys):
-            joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory))
+            connect = partial(reach, endpoint, host.removeprefix("remote/"), certificates)
+            joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory), connect)
             try:
                 joined.serve()
             finally:
@@ -83,7 +85,9 @@ def run_device(endpoint: str, session_name: str, name: str, *, directory: Path |
 class _JoinedHost:
     """The participants of this process and their connection to the hub."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, request: JoinRequest, reply: JoinReply, directory: Path) -> None:
+    def __init__(
+        self, session: zenoh.Session, keys: Keys, request: JoinRequest, reply: JoinReply, directory: Path, connect: Callable[[], zenoh.Session]
+    ) -> None:
         self._session, self._keys, self._request, self._run, self._directory = session, keys, request, reply.run, directory
         plan, host = reply.plan, request.host
         self._step_ns = plan.step_ns
@@ -108,6 +112,8 @@ class _JoinedHost:
             self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
         self._next_step = 0
         devices = {name: device for name, device in made.items() if isinstance(device, Device)}
+        for device in devices.values():
+            device.learn_hub(connect)
         self._loops = {name: DeviceLoop(name, device, plan.members[name].read_ns, failed=self._device_failed) for name, device in devices.items()}
         self._stack = contextlib.ExitStack()
         if devices:

@@ -19,7 +19,7 @@ class Interrupt:
     """
 
     def __init__(self) -> None:
-        self._armed = False
+        self._armed = self._raised = False
         self._sending = threading.Lock()
         self._before: Any = None
 
@@ -32,7 +32,7 @@ class Interrupt:
     def disarm(self) -> None:
         """Raise nothing any more: the main thread is closing what it has opened. No signal is on its way from other threads after that."""
         with self._sending:
-            self._armed = False
+            self._armed = self._raised = False
 
     def __call__(self) -> None:
         """Interrupt the main thread, also out of a call that sleeps."""
@@ -47,7 +47,12 @@ class Interrupt:
     def _raise(self, _number: int, _frame: FrameType | None) -> None:
         """Runs in the main thread, between two of its instructions: after `disarm` nothing can come."""
         if self._armed:
-            self._armed = False
+            self._armed, self._raised = False, True
+            raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raise again what was raised and got lost: in a callback that Zenoh calls in the main thread nobody hears of it."""
+        if self._raised:
             raise KeyboardInterrupt
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:

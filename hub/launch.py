@@ -7,6 +7,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import distributions
 from pathlib import Path
+from typing import Any
 
 from hub import registry
 from hub.access import access_settings
@@ -54,15 +55,16 @@ def launch(
     here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
     directory = loaded.source.directory
     attachments = {} if record is None else _attachments(scenario, plan, loaded)
-    gate = _gate(outside, certificates, plan, scenario.name) if outside else None
+    foreign = {name: p.foreign_keys for name, p in participants.items() if isinstance(p, Device) and p.foreign_keys}
+    gate = _gate(outside, certificates, access_settings(plan, scenario.name, foreign)) if outside else None
     return Session(scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments)
 
 
-def _gate(endpoints: Sequence[str], certificates: Path | None, plan: Plan, session: str) -> Gate:
-    """Return a gate for the remote participants of `plan`; raises ConnectError if the hub has no valid certificate."""
+def _gate(endpoints: Sequence[str], certificates: Path | None, access: dict[str, Any]) -> Gate:
+    """Return a gate with rules of `access`; raises ConnectError if the hub has no valid certificate."""
     credentials = load(HUB, certificates)
     examine(credentials)
-    return Gate(endpoints, credentials.listening() | access_settings(plan, session))
+    return Gate(endpoints, credentials.listening() | access)
 
 
 def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:

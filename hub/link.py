@@ -56,6 +56,7 @@ class Line:
 
     def send(self, now_ns: int, message: Any) -> None:
         """Put a message on its way."""
+        self.link.used = True
         spec, draw, luck = self.link.spec, self.chance.random(), self.chance.random()
         arrival_ns = now_ns + spec.delay_ns + round(draw * spec.jitter)
         if self.reliable:
@@ -83,6 +84,8 @@ class Link:
         """Take the link of the scenario."""
         self.spec = spec or LinkSpec()
         self._lines: dict[tuple[str, str], Line] = {}
+        self.used = False
+        """Whether anything was ever sent over it: a gateway has hundreds of ports, and most links lie nowhere."""
         self._outages = list(self.spec.outages)
         self._orders: deque[LinkOrder] = deque()
 
@@ -94,7 +97,7 @@ class Link:
     @property
     def idle(self) -> bool:
         """Say whether it is clear and nothing is on its way: what is sent now need not be sent over it."""
-        return self.clear and all(line.empty for line in self._lines.values())
+        return self.clear and (not self.used or all(line.empty for line in self._lines.values()))
 
     def line(self, port: Port) -> Line:
         """Return the line of one of the device's ports: outputs go to the hub, inputs come from there."""

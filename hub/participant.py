@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
+import zenoh
 from pydantic import BaseModel, ConfigDict
 
 from hub.inputs import Inputs
@@ -135,6 +136,14 @@ class Sample:
 
 class Device(_Participant):
     """A participant that lives in wall time, or, if it can play by a script, in simulated time."""
+
+    @property
+    def foreign_keys(self) -> tuple[str, ...]:
+        """Zenoh keys, none of Trocar's own, that programs and this device share at the hub's router: who has the certificate `console` may use them."""
+        return ()
+
+    def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
+        """Take, before `open`, what opens a Zenoh session of one's own with the hub. Only a device with foreign keys needs one."""
 
     @abstractmethod
     def open(self, directory: Path) -> None:

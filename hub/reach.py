@@ -30,9 +30,16 @@ def reach(endpoint: str, name: str, certificates: Path | None = None, *, mode: s
 
     `mode`, Zenoh's, counts over loopback only: from elsewhere everything goes through the hub. Raises ConnectError with what mends it.
     """
-    if is_loopback(endpoint):
-        return open_session(mode, listen=["tcp/127.0.0.1:0"] if mode == "peer" else [], connect=[endpoint])
     host, port = address(endpoint)
+    if is_loopback(endpoint):
+        try:
+            return open_session(mode, listen=["tcp/127.0.0.1:0"] if mode == "peer" else [], connect=[endpoint])
+        except ConnectError as error:
+            if _answers(host, port):
+                raise
+            raise ConnectError(
+                f"cannot reach the hub at {endpoint}: nobody listens there. Is it running? trocar ls shows the sessions of this machine"
+            ) from error
     if not endpoint.startswith("tls/"):
         raise ConnectError(f"'{endpoint}': a hub on another machine is reached by TLS only: tls/{host}:{port}")
     credentials = load(name, certificates)

@@ -169,6 +169,8 @@ class Session:
         wire = Wire(session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts())))
         self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
         devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
+        for device in devices.values():
+            device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
         self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
 
     def _start(self) -> None:
@@ -346,8 +348,9 @@ class Session:
         self._interrupt()
 
     def _check(self) -> None:
-        """Raise the first failure, if there is one: in the words of a participant, if they are here already."""
+        """Raise the first failure, if there is one: in the words of a participant, if they are here already; else an interrupt that got lost."""
         if self._failures.first is None:
+            self._interrupt.check()
             return
         self._acks.raise_failure()
         self._failures.check()
@@ -365,10 +368,13 @@ class Session:
         self._membership.lose(member.host)
         if member.role == "device":
             self._intake.forget(name)
+        if self._account.phase not in ("starting", "running", "paused"):
+            return
+        if member.role == "device":
             log.warning(
                 "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the network; a host that still runs joins again", name, name
             )
-        elif self._account.phase in ("starting", "running", "paused"):
+        else:
             self._fail(name, "its host is gone")
 
     def _refused_elsewhere(self, sample: zenoh.Sample) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from queue import SimpleQueue
+from threading import Thread
 from time import monotonic_ns
 
 import zenoh
@@ -56,8 +59,20 @@ class DeviceUplink:
         self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         outlets = [outlet for outlet in run.plan.outlets if outlet.device == member.name]
         self._inflows = [_Inflow(outlet, run, self._link, loop, drops, self._latencies, offset) for outlet in outlets]
-        self._subscribers = [session.declare_subscriber(inflow.key, Callback(inflow.take, indirect=True)) for inflow in self._inflows]
+        self._arrived: SimpleQueue[tuple[_Inflow, zenoh.Sample] | None] = SimpleQueue()
+        self._taker = Thread(target=self._take, name=f"inflow {member.name}", daemon=True)
+        self._taker.start()
+        self._subscribers = [session.declare_subscriber(inflow.key, Callback(partial(self._put, inflow), indirect=False)) for inflow in self._inflows]
         self._subscribers.append(session.declare_subscriber(run.keys.link(member.name), Callback(self._relink, indirect=True)))
+
+    def _put(self, inflow: _Inflow, sample: zenoh.Sample) -> None:
+        self._arrived.put((inflow, sample))
+
+    def _take(self) -> None:
+        """Take what arrives, all in one thread: with one for each of a hundred ports the simulation would wait for every one of them in turn."""
+        while (arrived := self._arrived.get()) is not None:
+            inflow, sample = arrived
+            inflow.take(sample)
 
     def exchange(self, t: int, samples: list[Sample]) -> None:
         """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link."""
@@ -101,6 +116,8 @@ class DeviceUplink:
         self._status.put(encode(self._report(monotonic_ns())))
         for entity in (*self._subscribers, *self._publishers.values(), self._status):
             entity.undeclare()
+        self._arrived.put(None)
+        self._taker.join(timeout=2.0)
 
 
 def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:

@@ -137,7 +137,7 @@ class _Wiring:
     def __init__(self, scenario: Scenario, members: Mapping[str, Member]) -> None:
         self._scenario = scenario
         self._members = members
-        self._fed: dict[tuple[str, str], str] = {}
+        self._fed: dict[tuple[str, str], list[str]] = {}
         self._rank = {name: i for i, name in enumerate(scenario.order or ())}
         self.links: list[Link] = []
         self.inlets: list[Inlet] = []
@@ -151,7 +151,7 @@ class _Wiring:
         source = self._resolve(connection.source, "output", path)
         target = self._resolve(connection.target, "input", path)
         _check_fit(connection.source, source, connection.target, target, path)
-        self._feed(connection.target, str(connection.source), path)
+        self._feed(connection.target, str(connection.source), path, shared=target.variability == "event")
         one, other = connection.source, connection.target
         if connection.extrapolation == "linear" and (target.variability == "event" or not has_vector(target.type)):
             values = f"values of {target.type}" if target.variability == "signal" else "events"
@@ -204,10 +204,12 @@ class _Wiring:
             raise ScenarioError(f"'{end}' is an {ports[end.port].causality}, here an {causality} is wanted", path=path)
         return ports[end.port]
 
-    def _feed(self, end: Endpoint, source: str, path: Path) -> None:
-        if (before := self._fed.get((end.participant, end.port))) is not None:
-            raise ScenarioError(f"input '{end}' is fed twice, by '{before}' and by '{source}'", path=path)
-        self._fed[end.participant, end.port] = source
+    def _feed(self, end: Endpoint, source: str, path: Path, *, shared: bool = False) -> None:
+        """Note who feeds an input; one that is `shared`, a queue of events, may have several sources."""
+        before = self._fed.setdefault((end.participant, end.port), [])
+        if before and (not shared or source in before):
+            raise ScenarioError(f"input '{end}' is fed twice, by '{before[0]}' and by '{source}'", path=path)
+        before.append(source)
 
     def check_inputs(self) -> None:
         """Refuse an input that has neither a source nor a start value."""

@@ -45,7 +45,8 @@ def typestore() -> Typestore:
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, model in message_types().items():
         if name not in store.types:
-            store.register(get_types_from_msg(msg_text(model), name))
+            (fields,) = get_types_from_msg(msg_text(model), name).values()  # the parser puts `msg` into the name of a service's parts
+            store.register({name: fields})
     return store
 
 

@@ -4,10 +4,28 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from schemas.message import Bool, Message, String
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from schemas.message import Bool, Float64Array, Message, String
 from schemas.ros import BoolMessage, Header, Pose, Quaternion, Twist, Vector3, Wrench
 
-__all__ = ["CartesianImpedance", "CartesianImpedanceHalfPlaneGains", "CartesianState", "OperatingState", "StringStamped"]
+__all__ = [
+    "CartesianImpedance",
+    "CartesianImpedanceHalfPlaneGains",
+    "CartesianState",
+    "ForwardKinematicsRequest",
+    "ForwardKinematicsResponse",
+    "InverseKinematicsRequest",
+    "InverseKinematicsResponse",
+    "OperatingState",
+    "StringStamped",
+]
+
+
+def _empty() -> NDArray[np.float64]:
+    return np.zeros(0)
 
 
 class OperatingState(Message):
@@ -66,3 +84,37 @@ class CartesianImpedance(Message):
     position_negative: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
     orientation_positive: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
     orientation_negative: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
+
+
+class ForwardKinematicsRequest(Message):
+    """Asks where an arm is at joint positions `jp`; `cp` is not looked at."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/srv/QueryForwardKinematics_Request"
+    jp: Float64Array = Field(default_factory=_empty)
+    cp: Pose = Pose()
+
+
+class ForwardKinematicsResponse(Message):
+    """Where it is, unless `result` is false: then `message` says why not."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/srv/QueryForwardKinematics_Response"
+    cp: Pose = Pose()
+    result: Bool = False
+    message: String = ""
+
+
+class InverseKinematicsRequest(Message):
+    """Asks for the joint positions, nearest to `jp`, at which an arm is at `cp`."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/srv/QueryInverseKinematics_Request"
+    cp: Pose = Pose()
+    jp: Float64Array = Field(default_factory=_empty)
+
+
+class InverseKinematicsResponse(Message):
+    """The joint positions, unless `result` is false: then `message` says why there are none."""
+
+    ros_type: ClassVar[str] = "crtk_msgs/srv/QueryInverseKinematics_Response"
+    jp: Float64Array = Field(default_factory=_empty)
+    result: Bool = False
+    message: String = ""

@@ -49,9 +49,13 @@ __all__ = [
     "Pose",
     "PoseStamped",
     "Quaternion",
+    "QuaternionStamped",
     "RegionOfInterest",
     "StringMessage",
+    "TFMessage",
     "Time",
+    "Transform",
+    "TransformStamped",
     "Twist",
     "TwistStamped",
     "Vector3",
@@ -189,6 +193,38 @@ class PoseStamped(Message):
     ros_type: ClassVar[str] = "geometry_msgs/msg/PoseStamped"
     header: Header = Header()
     pose: Pose = Pose()
+
+
+class QuaternionStamped(Message):
+    """An orientation in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/QuaternionStamped"
+    header: Header = Header()
+    quaternion: Quaternion = Quaternion()
+
+
+class Transform(Message):
+    """Where a frame is in another one: translation in metres and rotation."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/Transform"
+    translation: Vector3 = Vector3()
+    rotation: Quaternion = Quaternion()
+
+
+class TransformStamped(Message):
+    """Where the frame `child_frame_id` is in the frame of the header."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/TransformStamped"
+    header: Header = Header()
+    child_frame_id: String = ""
+    transform: Transform = Transform()
+
+
+class TFMessage(Message):
+    """Where frames are."""
+
+    ros_type: ClassVar[str] = "tf2_msgs/msg/TFMessage"
+    transforms: list[TransformStamped] = Field(default_factory=list[TransformStamped])
 
 
 class Twist(Message):

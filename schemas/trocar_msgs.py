@@ -16,6 +16,9 @@ __all__ = [
     "ContactPlane",
     "CouplingEnergy",
     "DeviceStatus",
+    "GatewayClient",
+    "GatewayStatus",
+    "GatewayTopic",
     "Grant",
     "InletSample",
     "Latency",
@@ -190,3 +193,36 @@ class SessionStatus(Message):
     participants: list[ParticipantStatus] = Field(default_factory=list[ParticipantStatus])
     devices: list[DeviceStatus] = Field(default_factory=list[DeviceStatus])
     latencies: list[Latency] = Field(default_factory=list[Latency])
+
+
+class GatewayClient(Message):
+    """A ROS program at the other side of a gateway."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/GatewayClient"
+    name: String
+    address: String = ""
+
+
+class GatewayTopic(Message):
+    """What has gone over one ROS topic or service of a gateway."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/GatewayTopic"
+    topic: String
+    way: String
+    """`publish`, `subscribe` or `serve`, seen from the gateway."""
+    rate: Float64 = 0.0
+    """Messages per second of late."""
+    messages: UInt64 = 0
+    refused: UInt64 = 0
+    reason: String = ""
+    """Why the last one was refused."""
+
+
+class GatewayStatus(Message):
+    """Who is connected to a gateway to ROS, and what goes through it."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/GatewayStatus"
+    kind: String
+    clients: list[GatewayClient] = Field(default_factory=list[GatewayClient])
+    topics: list[GatewayTopic] = Field(default_factory=list[GatewayTopic])
+    """Those over which anything has gone."""

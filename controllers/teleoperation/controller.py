@@ -20,12 +20,15 @@ from robots import rotation
 from schemas.crtk import OperatingState
 from schemas.errors import StateError
 from schemas.ports import Port
-from schemas.ros import BoolMessage, Header, Joy, StringMessage, Time
+from schemas.ros import BoolMessage, Header, JointState, Joy, StringMessage, Time
 from schemas.trocar_msgs import ContactModel
 from schemas.vectors import Vector
 
 __all__ = ["Teleoperation"]
 
+_LOCKS = ("lock_rotation", "lock_translation")
+_POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
+"""Of a pose."""
 _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 
 
@@ -43,9 +46,10 @@ class Teleoperation(Stepped):
         self._view, self._engagement = View(params), Engagement(params)
         self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
         self._contact = ContactModelBuilder(params.force, params.planes)
-        self._memory = np.zeros(n + 18)
-        ends = [n, n + 7, n + 14, n + 15, n + 16, n + 17]
-        self._command, self._goal, self._tip, self._scale, self._heard, self._started, self._told = np.split(self._memory, ends)
+        self._memory = np.zeros(n + 29)
+        parts = np.split(self._memory, [n, n + 7, n + 14, n + 21, n + 23, n + 25, n + 26, n + 27, n + 28])
+        self._command, self._goal, self._tip, self._hand, self._locks, scales, self._started, self._told, self._shared, self._relocked = parts
+        self._scale, self._heard = np.split(scales, 2)
         self._jaw = np.zeros(len(params.tool.jaw_joints))
         self._state = (
             self._memory,
@@ -56,8 +60,9 @@ class Teleoperation(Stepped):
             *(() if self._ghost is None else (self._ghost.state,)),
         )
         self._outputs: dict[str, Any] = {"servo_jp": self._command, "goal_cp": self._goal}
+        self._streams = {f"{params.arm}/servo_jp": self._command}
         if self._ghost is not None:
-            self._outputs["jaw/servo_jp"] = self._jaw
+            self._outputs["jaw/servo_jp"] = self._streams[f"{params.arm}/jaw/servo_jp"] = self._jaw
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -69,13 +74,13 @@ class Teleoperation(Stepped):
         self._stand_at(np.array(self.params.start), np.array([self.params.jaw, 0.0]))
         self._scale[0] = self._heard[0] = self.params.scale
         self._told[0] = -1.0
-        self._outputs |= {"contact": ContactModel(header=Header()), "following": _HOLDS, "state": (), "warning": ()}
+        self._outputs |= {"contact": ContactModel(header=Header()), "following": _HOLDS, "state": (), "warning": (), **dict.fromkeys(self._streams, ())}
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Move the command after the hand if it leads; hold it if nobody does."""
         self._hear(inputs)
-        if not (self._started[0] and self._engagement.arm_is_ready):
+        if not self._holds_command:
             self._stand_at(inputs["measured_js"], inputs["jaw/measured_js"] if self._ghost is not None else self._jaw)
             self._started[0] = 1.0
         warnings = self._heed_scale(float(inputs["scale"][0]))
@@ -87,15 +92,26 @@ class Teleoperation(Stepped):
             self._lead(inputs, to_base, seconds)
         self._lead_jaw(gripper, seconds)
         self._tell(warnings + self._engagement.warnings)
+        self._stream(Time.from_ns(t + h))
         period = max(self.params.contact_period, h)
         if not (t + h) % period:
             self._outputs["contact"] = self._feel(inputs, to_base, Time.from_ns(t + h), period * 1e-9)
         return self._outputs
 
+    @property
+    def _holds_command(self) -> bool:
+        """Whether the command stays what it was; else it goes where the arm is. An arm with a controller of its own may be moved by others meanwhile."""
+        follows = self._engagement.phase is Phase.ENABLED
+        return bool(self._started[0]) and self._engagement.arm_is_ready and (follows or not self._shared[0])
+
     def _hear(self, inputs: Inputs) -> None:
         """Take what buttons and arm say."""
         for message in inputs.events("operating_state"):
             self._engagement.hear_arm(cast("OperatingState", message))
+            self._shared[0] = 1.0
+        for i, what in enumerate(_LOCKS):
+            for wish in cast("tuple[BoolMessage, ...]", inputs.events(what)):
+                self._locks[i], self._relocked[0] = wish.data, 1.0
         for joy in cast("tuple[Joy, ...]", inputs.events("buttons")):
             self._engagement.hear_buttons(joy)
             if self._ghost is not None and joy.buttons.size > self.params.buttons.jaw:
@@ -132,9 +148,13 @@ class Teleoperation(Stepped):
             self._command[:] = advance(self._chain, self._command, twist, seconds)
             self._find_tip()
             return
-        if self._engagement.takes_over:
+        if self._engagement.takes_over or self._relocked[0]:
+            self._hand[:], self._relocked[0] = hand, 0.0
             self._law.engage(hand, self._tip, to_base, scale)
-        self._command[:] = self._law.step(self._command, hand, self._tip, to_base, scale, seconds * self._chain.velocity)
+        for lock, part in zip(self._locks, (_ORIENTATION, _POSITION), strict=True):
+            if not lock:
+                self._hand[part] = hand[part]
+        self._command[:] = self._law.step(self._command, self._hand, self._tip, to_base, scale, seconds * self._chain.velocity)
         self._find_tip()
 
     def _lead_jaw(self, gripper: float, seconds: float) -> None:
@@ -156,6 +176,12 @@ class Teleoperation(Stepped):
         self._outputs["state"] = () if phase == self._told[0] else (StringMessage(data=phase.name),)
         self._outputs["warning"] = tuple(StringMessage(data=warning) for warning in warnings)
         self._told[0] = phase
+
+    def _stream(self, stamp: Time) -> None:
+        """Send the commands to the arm's controller while it follows, and nothing else."""
+        follows = self._engagement.phase is Phase.ENABLED
+        for port, positions in self._streams.items():
+            self._outputs[port] = (_positions(positions, stamp),) if follows else ()
 
     def _feel(self, inputs: Inputs, to_base: Vector, stamp: Time, elapsed: float) -> ContactModel:
         """Return what the hand is to feel, `elapsed` seconds after the last time."""
@@ -194,3 +220,9 @@ class Teleoperation(Stepped):
 
     def close(self) -> None:
         """Nothing is held."""
+
+
+def _positions(values: Vector, stamp: Time) -> JointState:
+    """Return joint positions as a message, which needs no check: they are within the joints' ranges."""
+    none = np.zeros(0)
+    return JointState.model_construct(header=Header.model_construct(stamp=stamp, frame_id=""), name=[], position=values.copy(), velocity=none, effort=none)

@@ -48,13 +48,15 @@ class TeleoperationParams(Params):
         description="whether the tip keeps its orientation or turns with the hand; default: hold with `law: pose`, follow with `law: velocity`",
         validate_default=True,
     )
-    view: Literal["base", "camera"] = Field(
+    view: Literal["base", "camera", "display"] = Field(
         default="base",
-        description="what the hand's frame is registered to: the arm's base frame, or the picture of the camera in whose frame `base_in_view` is, so that"
-        " right, up and away on the desk (x away, y left, z up) are right, up and away in the picture",
+        description="what the hand's frame is registered to: the arm's base frame; the picture of the camera in whose frame `base_in_view` is, so that"
+        " right, up and away on the desk (x away, y left, z up) are right, up and away in the picture; or the display, whose axes stand for those of the"
+        " camera's frame, as the masters of a dVRK tell their poses",
     )
     registration: UnitQuaternion = Field(
-        default=(0.0, 0.0, 0.0, 1.0), description="orientation of the master's frame in the arm's base frame or, with `view: camera`, in the desk's"
+        default=(0.0, 0.0, 0.0, 1.0),
+        description="orientation of the master's frame in the arm's base frame or, with `view: camera`, in the desk's, with `view: display` in the display's",
     )
     endoscope: ecm.Endoscope = Field(default="straight", description="with `view: camera`: as the ECM has it")
     tip_frame: ecm.TipFrame = Field(default="kinematic", description="with `view: camera`: as the ECM in whose frame `base_in_view` is has it")

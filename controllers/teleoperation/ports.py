@@ -18,7 +18,7 @@ _JOINT_STATE, _NUMBER, _STRING = "sensor_msgs/msg/JointState", "std_msgs/msg/Flo
 
 def teleoperation_ports(params: TeleoperationParams) -> tuple[Port, ...]:
     """Return the ports of a hand that leads an arm as `params` say."""
-    return (*_hand(params), *_arm(params), *_jaw(params), *_told(params))
+    return (*_hand(params), *_arm(params), *_jaw(params), *_streams(params), *_told(params))
 
 
 def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
@@ -42,6 +42,11 @@ def _hand(p: TeleoperationParams) -> tuple[Port, ...]:
             description="of the hand, 0 closed .. 1 open; negative: none, the button leads the jaw",
         ),
         Port(name="scale", causality="input", type=_NUMBER, start=(p.scale,), description="metres of the tip per metre of the hand, over 0 to 1"),
+        *(
+            Port(name=f"lock_{what}", causality="input", type="std_msgs/msg/Bool", variability="event", description=f"whether the tip keeps its {kept}")
+            for what, kept in (("rotation", "orientation"), ("translation", "position"))
+            if p.law == "pose"
+        ),
     )
 
 
@@ -49,8 +54,11 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
     base, names = f"{p.arm}_base", tuple(joint.name for joint in p.chain.joints)
     at_rest = p.start + (0.0,) * (2 * len(names))
     fields = ("position", "velocity", "effort")
-    seen = p.view == "camera"
-    meaning = "where the command starts, at the first step and whenever the arm gets ready; of a motion controller better its setpoint_js"
+    seen = p.view != "base"
+    meaning = (
+        "where the command starts: at the first step, whenever the arm gets ready and, of an arm that tells its operating state, whenever the hand takes"
+        " over; of a motion controller its setpoint_js"
+    )
     return (
         Port(name="measured_js", causality="input", type=_JOINT_STATE, names=names, fields=fields, start=at_rest, description=meaning),
         Port(
@@ -58,7 +66,7 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
             causality="input",
             type="crtk_msgs/msg/OperatingState",
             variability="event",
-            description="of the arm: it follows while ENABLED and homed",
+            description="of the arm: it follows while ENABLED and homed; an arm that tells it may have other masters while it does not follow",
         ),
         Port(
             name="base_in_view",
@@ -66,7 +74,7 @@ def _arm(p: TeleoperationParams) -> tuple[Port, ...]:
             type=_POSE,
             frame=_CAMERA if seen else "",
             start=None if seen else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-            description="of the arm's base frame in the camera's, for `view: camera`: the motion controller's SUJ/<arm>/measured_cp",
+            description="of the arm's base frame in the camera's, unless `view: base`: the motion controller's SUJ/<arm>/measured_cp",
         ),
         Port(name="tip_wrench", causality="input", type=_WRENCH, frame=base, start=(0.0,) * 6, description="of tissue on the instrument, at the tip"),
         Port(name="rigid_wrench", causality="input", type=_WRENCH, frame=base, start=(0.0,) * 6, description="of rigid things on the instrument, at the tip"),
@@ -86,6 +94,12 @@ def _jaw(p: TeleoperationParams) -> tuple[Port, ...]:
         Port(name="jaw/measured_js", causality="input", type=_JOINT_STATE, names=names, fields=fields, start=at_rest, description=meaning),
         Port(name="jaw/servo_jp", causality="output", type=_JOINT_STATE, names=names, description="command to the jaw; what rolls a needle in it stays"),
     )
+
+
+def _streams(p: TeleoperationParams) -> tuple[Port, ...]:
+    names = [f"{p.arm}/servo_jp", *([f"{p.arm}/jaw/servo_jp"] if p.tool.jaw_joints else [])]
+    meaning = "the command to the arm's motion controller, at every step while it follows; else nothing, so that others may move the arm"
+    return tuple(Port(name=name, causality="output", type=_JOINT_STATE, variability="event", description=meaning) for name in names)
 
 
 def _told(p: TeleoperationParams) -> tuple[Port, ...]:

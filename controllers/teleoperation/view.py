@@ -7,7 +7,10 @@ ECM's tip frame, in which `base_in_view` is told; and the *view*, the frame of t
     R_base<-hand = R_camera<-base^T  R_camera<-view  R_view<-desk  R_desk<-hand,
 
 so that a motion to the right on the desk is one to the right in the picture; on the real system both consoles' and arms' base frames are set to the
-same effect (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are told in the camera's frame).
+same effect (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are told in the camera's frame). Its masters tell their
+poses in the display's frame, whose axes stand for those of the camera's: with `view: display`
+
+    R_base<-hand = R_camera<-base^T  R_display<-hand.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ class View:
     def __init__(self, params: TeleoperationParams) -> None:
         """Take what the hand's frame is registered to."""
         self._registration = np.array(params.registration)
-        self._hand_in_camera: Vector | None = None
+        self._hand_in_camera: Vector | None = self._registration if params.view == "display" else None
         if params.view == "camera":
             camera, view = (ecm.tip(params.endoscope, frame)[:3, :3] for frame in (params.tip_frame, "view"))  # both in the roll link
             self._hand_in_camera = rotation.product(rotation.from_matrix(camera.T @ view @ _DESK_IN_VIEW), self._registration)
@@ -40,7 +43,7 @@ class View:
         """Return the orientation of the hand's frame in the arm's base frame, quaternion (x, y, z, w).
 
         Args:
-            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; not looked at unless `view: camera`.
+            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; not looked at with `view: base`.
         """
         if self._hand_in_camera is None:
             return self._registration

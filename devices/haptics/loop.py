@@ -61,10 +61,10 @@ class HapticLoop:
         self._planes, self._stamp_ns, self._arrived = valid, stamp_ns, arrived
         return True
 
-    def tick(self, now: float, position: Vector3, velocity: Vector3, *, permitted: bool) -> Vector3:
+    def tick(self, now: float, position: Vector3, velocity: Vector3, *, permitted: bool, ready: bool = True) -> Vector3:
         """Return the force (N) on the hand from now, in s of a clock that only goes forward, until the next tick.
 
-        `position` (m) and `velocity` (m/s) are the hand's. `permitted`: the dead-man is held, the device calibrated and well.
+        `position` (m) and `velocity` (m/s) are the hand's. `permitted`: the dead-man is held. `ready`: the device is calibrated and well.
         """
         dt = now - self._now if self._now > -inf else 0.0
         self._now = now
@@ -77,7 +77,7 @@ class HapticLoop:
             self._chain.soften(hypot(*wanted))
         if self._passivity is not None:
             wanted = self._passivity.correct(wanted, position, velocity, dt)
-        given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt)
+        given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt, ready=ready)
         if self._passivity is not None:
             self._passivity.gave(given)
         if self._chain.condition is Condition.INVALID:

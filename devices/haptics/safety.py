@@ -51,17 +51,19 @@ class SafetyChain:
         if size > limits.calm_force:
             self._gain = min(self._gain, limits.calm_force / min(size, limits.force))
 
-    def tick(self, wanted: Vector3, velocity: Vector3, *, age: float, permitted: bool, dt: float) -> Vector3:
+    def tick(self, wanted: Vector3, velocity: Vector3, *, age: float, permitted: bool, dt: float, ready: bool = True) -> Vector3:
         """Return the force (N) that the hand is given until the next tick.
 
         `wanted` is the force that the contact asks for (N), `velocity` the hand's (m/s), `age` the time since a contact model arrived (s; infinite if none
-        did), `dt` the time since the last tick (s). `permitted`: the dead-man is held, the device calibrated and well.
+        did), `dt` the time since the last tick (s). `permitted`: the dead-man is held. `ready`: the device is calibrated and well; that it is not is no
+        letting go, which alone ends the lock of a hand that was too fast.
         """
         limits = self._limits
         size = hypot(*wanted)
         speed = hypot(*velocity)
         if not permitted:
             self._too_fast = False
+        if not (permitted and ready):
             return self._off(Condition.OFF)
         if not isfinite(size + speed + dt):
             return self._off(Condition.INVALID)

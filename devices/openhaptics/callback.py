@@ -24,7 +24,7 @@ class Servo:
         self._by_handle = {stylus.handle: [stylus] for stylus in styluses}
         self._ending, self._ended = False, threading.Event()
         self._callback = SERVO_CALLBACK(self._call)
-        self._schedule = 0
+        self._schedule: int | None = None
         self._known = False
         self.failure = ""
         """What the callback raised."""
@@ -39,7 +39,7 @@ class Servo:
         """Give the hands a last frame without force, and the devices back; nothing if it was not started."""
         hd = self._hd
         self._ending = True
-        if not self._schedule:
+        if self._schedule is None:  # 0 may be a schedule
             return
         self._ended.wait(_LAST_FRAME_S)
         hd.hdStopScheduler()
@@ -56,9 +56,8 @@ class Servo:
                 self._release(now)
                 self._ended.set()
                 return CALLBACK_DONE
-            for stylus in self._styluses:
-                stylus.frame(now)
-            for code, handle in errors(self._hd):
+            complaints = [complaint for stylus in self._styluses for complaint in stylus.frame(now)]
+            for code, handle in complaints + errors(self._hd):
                 for stylus in self._by_handle.get(handle, self._styluses):
                     stylus.note(code, now)
             for stylus in self._styluses:

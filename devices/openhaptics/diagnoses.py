@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from devices.diagnosis import Level
 from devices.haptics.diagnoses import FORCE_DIAGNOSES
 from devices.haptics.safety import Condition
@@ -12,7 +14,7 @@ from devices.openhaptics.stylus import Phase
 __all__ = ["FOUND", "lost", "present"]
 
 _AGAIN = "it is tried again by itself"
-_CALIBRATE = {
+_CALIBRATE: Mapping[int, str] = {
     Style.INKWELL: "put the stylus into the inkwell",
     Style.ENCODER_RESET: "hold the stylus in its reset position and press its button",
 }
@@ -39,8 +41,8 @@ def present(state: State, refusal: str) -> tuple[Level, str]:
     if phase is Phase.SETTLING:
         return Level.STALE, "it gives no valid frames; if that lasts, switch it off and on"
     if phase is Phase.UNCALIBRATED:
-        do = _CALIBRATE.get(Style(state.code), "") if state.code else ""
-        return Level.WARN, f"it is not calibrated: {do or 'calibrate it with the setup program of its vendor'}"
+        do = _CALIBRATE.get(state.code, "calibrate it with the setup program of its vendor")
+        return Level.WARN, f"it is not calibrated: {do}"
     if phase is Phase.WARNED:
         cool = "; let its motors cool" if state.code == Code.WARM_MOTORS else ""
         return Level.WARN, f"no force: the device warns of {Code.text(state.code)}{cool}"

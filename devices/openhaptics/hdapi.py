@@ -53,7 +53,6 @@ class Get:
 
     BUTTONS = 0x2000
     SAFETY_SWITCH = 0x2001
-    INKWELL_SWITCH = 0x2002
     VELOCITY = 0x2051
     """mm/s, smoothed by the driver."""
     TRANSFORM = 0x2052

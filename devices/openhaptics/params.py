@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, StringConstraints
+from pydantic import Field, StringConstraints, model_validator
 
 from devices.haptics.params import SafetyParams
 from devices.openhaptics.stylus import Spec
@@ -14,14 +14,14 @@ from schemas.quantity import Duration, Length
 
 __all__ = ["StylusParams", "TouchParams"]
 
-_DEAD_MAN = "what is to be held for force: the index of a button, the safety switch of the stylus, or the stylus itself (out of its inkwell)"
+_DEAD_MAN = "what is to be held for force: the index of a button, or the safety switch of the stylus"
 
 
 class StylusParams(Params):
     """One stylus."""
 
     device: Annotated[str | None, Field(min_length=1, description="its name in the vendor's setup program; default: the default device")] = None
-    dead_man: Annotated[Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch", "inkwell"], Field(description=_DEAD_MAN)] = 0
+    dead_man: Annotated[Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch"], Field(description=_DEAD_MAN)] = 0
     tip_offset: Annotated[Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")] = 0.039
     """The default is that of sawSensablePhantom (mtsSensableHD.cpp)."""
     safety: SafetyParams = SafetyParams()
@@ -39,3 +39,13 @@ class TouchParams(Params):
         dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], StylusParams], Field(min_length=1, description="by name: right, left")
     ]
     max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = 100_000_000
+
+    @model_validator(mode="after")
+    def _each_has_its_own(self) -> Self:
+        owners: dict[str | None, str] = {}
+        for name, stylus in self.styluses.items():
+            other = owners.setdefault(stylus.device, name)
+            if other != name:
+                what = "the default device" if stylus.device is None else f"'{stylus.device}'"
+                raise ValueError(f"'{other}' and '{name}' are both {what}; give each a 'device', the name that the vendor's setup program has for it")
+        return self

@@ -65,7 +65,7 @@ class Spec:
     device: str | None
     """Name of the device in the vendor's configuration; None: the default device."""
     dead_man: int | str
-    """Index of a button, `safety-switch`, or `inkwell`: held while the stylus is out of it."""
+    """Index of a button, or `safety-switch`. Not the inkwell's switch: a stylus that was dropped is out of it, too."""
     tip_offset: float
     """From the centre of the gimbal to the tip, m."""
 
@@ -93,8 +93,8 @@ class Stylus:
         """Let force be given, within `limits`."""
         self._loop = HapticLoop(limits, passivity=passivity)
 
-    def frame(self, now: float) -> None:
-        """Do one frame, which begins at `now` (s of time.perf_counter)."""
+    def frame(self, now: float) -> list[tuple[int, int]]:
+        """Do one frame, which begins at `now` (s of time.perf_counter); return those errors (code, handle) of this tick that HDAPI no longer has."""
         hd = self._hd
         hd.hdBeginFrame(self.handle)
         hd.hdGetDoublev(Get.TRANSFORM, self._transform)
@@ -102,23 +102,23 @@ class Stylus:
         hd.hdGetIntegerv(Get.BUTTONS, self._buttons)
         self._permitted = self._dead_man()
         moved = self._tip.move(self._transform[:], self._velocity[:], now)
-        self._look()
+        complaints = self._look()
         self._judge(now, valid=moved)
         self._send(self._render(now))
+        return complaints
 
     def note(self, code: int, now: float) -> None:
         """Take note of an error that HDAPI has on its stack after the frame at `now`.
 
         Only a fault of the device (0x3xx) ends its use. Any other takes the force away, and lets it come back: a warning is meant so (0x2xx), and after a
-        complaint about the frame nobody knows what force was sent.
+        complaint about the frame nobody knows what force was sent. A stylus that is not calibrated has none to take away.
         """
-        self._code = code
         if Code.is_busy(code):
-            self.phase = Phase.BUSY
+            self.phase, self._code = Phase.BUSY, code
         elif Code.is_fault(code):
-            self.phase = Phase.FAULT
-        else:
-            self._warned = now
+            self.phase, self._code = Phase.FAULT, code
+        elif self._calibrated:
+            self._warned, self._code = now, code
 
     def tell(self, now: float) -> None:
         """Write the state of the frame at `now`."""
@@ -138,24 +138,25 @@ class Stylus:
         dead_man = self._spec.dead_man
         if isinstance(dead_man, int):
             return bool(self._buttons.value >> dead_man & 1)
-        held = dead_man == "safety-switch"
-        self._hd.hdGetBooleanv(Get.SAFETY_SWITCH if held else Get.INKWELL_SWITCH, self._switch)
-        return bool(self._switch.value) is held
+        self._hd.hdGetBooleanv(Get.SAFETY_SWITCH, self._switch)
+        return bool(self._switch.value)
 
-    def _look(self) -> None:
-        """Look at the calibration, and update it where that can be done. Force output is on only while it stands."""
+    def _look(self) -> list[tuple[int, int]]:
+        """Look at the calibration, and update it where that can be done; return what HDAPI complained of before. Force output is on only while it stands."""
         hd = self._hd
         calibration = hd.hdCheckCalibration()
         if (calibration == _CALIBRATED) is not self._calibrated:
             self._calibrated = not self._calibrated
             (hd.hdEnable if self._calibrated else hd.hdDisable)(FORCE_OUTPUT)
         if self._calibrated:
-            return
+            return []
         self._style = self._style or self._best_style()
         in_place = self._style != Style.ENCODER_RESET or self._buttons.value  # where a person has to put it, the person says so
-        if calibration == Calibration.NEEDS_UPDATE and in_place:
-            hd.hdUpdateCalibration(self._style)
-        errors(hd)  # of an update that the device did not want now
+        if not (calibration == Calibration.NEEDS_UPDATE and in_place):
+            return []
+        complaints = errors(hd)  # also of the styluses whose frames came before
+        hd.hdUpdateCalibration(self._style)
+        return complaints + [error for error in errors(hd) if Code.is_fault(error[0])]  # the others say that the device does not want it now
 
     def _best_style(self) -> int:
         self._hd.hdGetIntegerv(Get.CALIBRATION_STYLE, self._styles)
@@ -193,7 +194,7 @@ class Stylus:
             return ZERO
         for record in self._models.read():
             loop.receive(planes_in(record), int(record[1]), record[0])
-        return loop.tick(now, self._tip.position, self._tip.linear, permitted=self._permitted and self.phase is _READY)
+        return loop.tick(now, self._tip.position, self._tip.linear, permitted=self._permitted, ready=self.phase is _READY)
 
     def _send(self, force: Vector3) -> None:
         """Set the force (N, base frame) and end the frame."""

@@ -22,6 +22,9 @@ _HUB_DAYS = 397
 _PARTICIPANT_DAYS = 30
 """There is no list of certificates that are revoked: one that is lost must not be worth much for long."""
 
+_LEAST_DAYS, _MOST_DAYS = 0.01, 3650
+"""A quarter of an hour, for a try; the authority's own ten years."""
+
 Directory = Annotated[Path | None, typer.Option("--dir", metavar="DIR", file_okay=False, help="Where the certificates are; by default this user's own.")]
 Hosts = Annotated[list[str] | None, typer.Argument(metavar="HOST", help="A name or an address by which other machines reach this one.")]
 
@@ -33,7 +36,12 @@ def _directory(given: Path | None) -> Path:
 
 
 @app.command()
-def init(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[float, typer.Option(help="How long the hub's is valid.")] = _HUB_DAYS) -> None:
+def init(
+    hosts: Hosts = None,
+    *,
+    directory: Directory = None,
+    days: Annotated[float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the hub's is valid.")] = _HUB_DAYS,
+) -> None:
     """Make an authority and the certificate of this machine's hub: once, on the machine where the hub runs."""
     _needs_cryptography()
     from hub.certs import found, names_of_this_machine
@@ -45,7 +53,12 @@ def init(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[fl
 
 
 @app.command()
-def renew(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[float, typer.Option(help="How long it is valid.")] = _HUB_DAYS) -> None:
+def renew(
+    hosts: Hosts = None,
+    *,
+    directory: Directory = None,
+    days: Annotated[float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long it is valid.")] = _HUB_DAYS,
+) -> None:
     """Make a new certificate for the hub, with the same names unless others are given."""
     _needs_cryptography()
     from hub.certs import renew as make
@@ -57,18 +70,19 @@ def renew(hosts: Hosts = None, *, directory: Directory = None, days: Annotated[f
 
 @app.command()
 def issue(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A participant that the scenario places with `host: remote`; `observer` may look at the status.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A participant with `host: remote`; `observer` reads the status, `console` is for ROS programs.")],
     *,
     directory: Directory = None,
-    days: Annotated[float, typer.Option(help="How long it is valid.")] = _PARTICIPANT_DAYS,
+    days: Annotated[float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long it is valid.")] = _PARTICIPANT_DAYS,
 ) -> None:
     """Make the certificate of one participant, for another machine; an older one stays valid as long as it is."""
     _needs_cryptography()
     from hub.certs import issue as make
-    from hub.credentials import OBSERVER
+    from hub.credentials import CONSOLE, OBSERVER
 
     file = make(_directory(directory), name, days)
-    use = "trocar ls --connect tls/HUB:7447" if name == OBSERVER else f"trocar device {name} --connect tls/HUB:7447"
+    uses = {OBSERVER: "trocar ls --connect tls/HUB:7447", CONSOLE: "in the Zenoh settings of the ROS programs, to connect to tls/HUB:7447 (docs/ros.md)"}
+    use = uses.get(name, f"trocar device {name} --connect tls/HUB:7447")
     console.print(f"wrote {file}, all that the other machine needs. Copy it there, by a way that nobody else can read, to one of", soft_wrap=True)
     console.print("    ~/.config/trocar/certs/            (Linux)\n    %APPDATA%\\trocar\\certs\\           (Windows)")
     console.print("    ~/Library/Application Support/trocar/certs/  (macOS)", soft_wrap=True)
@@ -78,7 +92,7 @@ def issue(
 @app.command()
 def show(*, directory: Directory = None) -> None:
     """List the certificates of this machine, until when they are valid and for what."""
-    from hub.credentials import HUB, OBSERVER, examine, load
+    from hub.credentials import CONSOLE, HUB, OBSERVER, examine, load
 
     place = _directory(directory)
     rows: list[tuple[str, str, str]] = []
@@ -90,7 +104,7 @@ def show(*, directory: Directory = None) -> None:
         except ConnectError as error:
             rows.append((file.stem, "not valid", str(error)))
             continue
-        role = {HUB: f"a hub at {', '.join(certificate.hosts)}", OBSERVER: "reading the status of sessions"}
+        role = {HUB: f"a hub at {', '.join(certificate.hosts)}", OBSERVER: "reading the status of sessions", CONSOLE: "ROS programs"}
         left = certificate.until - datetime.now(UTC)
         rows.append((file.stem, f"{certificate.until:%Y-%m-%d %H:%M} UTC ({left.days} days)", role.get(certificate.name, f"participant {certificate.name}")))
     Console(highlight=False).print(table(rows, "file", "valid until", "for") if rows else f"there is no certificate in {place}")

@@ -43,6 +43,9 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
 
 
 LATENCY_COLUMNS = ("latency", "stream", "count", "p50", "p99", "largest")
+_TIMES = ("p50_s", "p99_s", "largest_s")
+_MOST_STREAMS = 8
+"""Of one device that are shown one by one: a gateway to ROS has dozens. `--json` has them all."""
 
 
 def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Iterator[tuple[object, ...]]:
@@ -50,8 +53,13 @@ def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> It
     if latency.keys() <= {"grant to state"}:
         return
     for way, streams in latency.items():
+        of_device: dict[str, dict[str, Mapping[str, float]]] = {}
         for stream, row in streams.items():
-            yield way, stream, row["count"], *(f"{1e3 * row[name]:.3f} ms" for name in ("p50_s", "p99_s", "largest_s"))
+            of_device.setdefault(stream.rpartition(" -> ")[2].partition(".")[0], {})[stream] = row
+        for device, rows in of_device.items():
+            shown = rows if len(rows) <= _MOST_STREAMS else {f"{device}, the slowest of {len(rows)}": max(rows.values(), key=lambda row: row["p99_s"])}
+            for stream, row in shown.items():
+                yield way, stream, round(row["count"]), *(f"{1e3 * row[name]:.3f} ms" for name in _TIMES)
 
 
 def _readable(name: str, value: Any) -> tuple[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import Annotated, Any
 
@@ -38,14 +39,18 @@ def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json 
 
 def _print_plan(plan: Plan) -> None:
     """Print every participant with its ports, and who feeds its inputs."""
-    feeds = {(link.target, link.target_port): f"{link.source}.{link.source_port}" for link in plan.links}
-    feeds |= {(inlet.target, inlet.target_port): f"{inlet.device}.{inlet.device_port}" for inlet in plan.inlets}
-    feeds |= {(outlet.device, outlet.device_port): f"{outlet.source}.{outlet.source_port}" for outlet in plan.outlets}
+    feeds: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
+    for link in plan.links:
+        feeds[link.target, link.target_port].append(f"{link.source}.{link.source_port}")
+    for inlet in plan.inlets:
+        feeds[inlet.target, inlet.target_port].append(f"{inlet.device}.{inlet.device_port}")
+    for outlet in plan.outlets:
+        feeds[outlet.device, outlet.device_port].append(f"{outlet.source}.{outlet.source_port}")
     for member in plan.members.values():
         console.print(f"[bold]{member.name}[/] ({member.role} of kind {member.kind}) on host {member.host}")
         for port in member.ports:
             detail = " ".join(part for part in (port.type, port.unit, port.frame and f"in {port.frame}") if part)
-            source = feeds.get((member.name, port.name))
+            source = ", ".join(feeds.get((member.name, port.name), ()))
             console.print(
                 f"    {'->' if port.causality == 'output' else '<-'} {port.name}  [dim]{detail}[/]{f'  from {source}' if source else ''}", soft_wrap=True
             )

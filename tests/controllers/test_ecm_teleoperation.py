@@ -142,6 +142,14 @@ def test_scale_is_of_both_motions():
     assert session.step("position").velocity[2] == pytest.approx(0.04)
 
 
+def test_a_scale_that_would_turn_the_camera_the_other_way_is_refused_once():
+    session = Session(scale=0.5)
+    session.twist[3] = 0.2
+    session.scale[0] = -2.0
+    assert session.step(count=3).velocity[3] == pytest.approx(0.1)
+    assert session.warnings == ["scale -2 is refused, it must be above 0; it stays 0.5"]
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(["orientation", "position", "stale"]), *[st.floats(-4, 4)] * 6), min_size=1, max_size=12))
 def test_no_joint_is_ever_too_fast_or_out_of_its_range(moves):

@@ -114,7 +114,7 @@ def _press(world: HdWorld, hands: Hands, *styluses: str) -> None:
 
 
 def test_it_keeps_the_contract_of_a_device(library: Path, world: HdWorld) -> None:
-    params = {"library": str(library), "styluses": {"right": {"dead_man": "inkwell"}, "left": {"device": "left", "safety": {"force": "1 N"}}}}
+    params = {"library": str(library), "styluses": {"right": {"dead_man": "safety-switch"}, "left": {"device": "left", "safety": {"force": "1 N"}}}}
     check_device(lambda: Touch("touch", TouchParams.model_validate(params)))
 
 
@@ -298,6 +298,11 @@ def test_limits_above_those_of_the_device_are_refused(world: HdWorld, hands: Cal
 def test_no_scenario_raises_a_limit(change: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         TouchParams.model_validate({"styluses": {"right": {"safety": change}}})
+
+
+def test_two_styluses_are_two_devices() -> None:
+    with pytest.raises(ValidationError, match="'right' and 'left' are both the default device; give each a 'device'"):
+        TouchParams.model_validate({"styluses": {"right": {}, "left": {}}})
 
 
 def test_a_wrong_library_is_an_error(tmp_path: Path) -> None:

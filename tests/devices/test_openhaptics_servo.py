@@ -17,10 +17,11 @@ from hypothesis import Phase as HypothesisPhase
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from devices.diagnosis import Level
 from devices.haptics.contact import Plane
 from devices.haptics.limits import Limits
 from devices.haptics.safety import Condition
-from devices.openhaptics import hdapi
+from devices.openhaptics import diagnoses, hdapi
 from devices.openhaptics.callback import Servo
 from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, State, device_ends, model_doubles, servo_ends
 from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, INVALID_HANDLE, Code
@@ -223,9 +224,49 @@ def test_a_stylus_that_loses_its_calibration_gives_neither_pose_nor_force(rig: C
     assert (state.force, one.world.devices[0].force_output) == ((0.0, 0.0, 0.0), 0)
 
 
+@pytest.mark.parametrize("code", [Code.EXCEEDED_MAX_FORCE, Code.COMM_ERROR])
+def test_a_stylus_that_waits_for_its_calibration_does_not_hide_what_another_complains_of(rig: Callable[..., Rig], code: Code) -> None:
+    one = rig()
+    one.press()
+    one.world.devices[1].calibration, one.world.devices[1].styles = NEEDS_UPDATE, 0  # asks, tick by tick, and is refused
+    assert one.run(200, touching=True).force[2] > 1.0
+    assert Phase(one.state(1).phase) is Phase.UNCALIBRATED
+    one.world.devices[0].error, one.world.devices[0].error_frames = code, 1
+    state = one.run(2, touching=True)
+    assert (state.code, state.force) == (code, (0.0, 0.0, 0.0))
+
+
+def test_a_stylus_that_is_unplugged_while_it_is_not_calibrated_is_lost(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    one.world.devices[0].calibration, one.world.devices[0].styles = NEEDS_UPDATE, 0
+    one.run()
+    one.world.devices[0].error, one.world.devices[0].error_frames = Code.COMM_ERROR, 1
+    assert Phase(one.run(2).phase) is Phase.FAULT
+
+
+def test_a_complaint_of_a_stylus_that_is_not_calibrated_leaves_what_to_do_about_that(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    device = one.world.devices[0]
+    device.calibration, device.error, device.error_frames = NEEDS_MANUAL_INPUT, Code.WARM_MOTORS, 100
+    assert diagnoses.present(one.run(50), "") == (Level.WARN, "it is not calibrated: put the stylus into the inkwell")
+
+
+def test_a_warning_is_no_letting_go_for_a_hand_that_was_too_fast(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    one.press()
+    device = one.world.devices[0]
+    device.velocity[1] = -5.0
+    one.run(2, touching=True)
+    device.error, device.error_frames, device.target[1] = Code.EXCEEDED_MAX_VELOCITY, 1, 0.03
+    one.run(1200, touching=True)
+    device.target[1] = -0.005
+    state = one.run(1500, touching=True)
+    assert (Phase(state.phase), tuple(Condition)[state.cause], state.force) == (Phase.READY, Condition.TOO_FAST, (0.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize(
     ("dead_man", "field", "held"),
-    [(0, "buttons", 1), (1, "buttons", 2), ("safety-switch", "safety_switch", 1), ("inkwell", "inkwell", 0)],
+    [(0, "buttons", 1), (1, "buttons", 2), ("safety-switch", "safety_switch", 1)],
 )
 def test_what_is_held_permits_force(rig: Callable[..., Rig], dead_man: int | str, field: str, held: int) -> None:
     one = rig(dead_man=dead_man)
@@ -309,7 +350,7 @@ def test_whatever_happens_the_force_keeps_its_limits(library: Path, tmp_path_fac
 
 
 def test_a_clean_run_leaves_no_error_in_the_library(rig: Callable[..., Rig]) -> None:
-    one = rig(dead_man="inkwell")
+    one = rig(dead_man="safety-switch")
     assert Phase(one.run(300).phase) is Phase.READY
     assert Phase(one.state(1).phase) is Phase.READY
     assert hdapi.errors(one.hd) == []

@@ -126,6 +126,7 @@ def test_the_command_line_makes_and_shows_them(tmp_path):
     assert run(app, ["init", "hub.example", *place]).exit_code == 0
     assert run(app, ["issue", "touch", *place]).exit_code == 0
     assert run(app, ["issue", "observer", "--days", "2", *place]).exit_code == 0
+    assert run(app, ["issue", "touch", "--days", "0", *place]).exit_code == 2  # and the one that works stays
     assert run(app, ["renew", *place]).exit_code == 0
     shown = run(app, ["show", *place]).output
     for word in ("hub.example", "participant touch", "(29 days)", "(1 days)", "(396 days)", "reading the status"):

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from hub.command_line import main
+from hub.command_line.display import latency_rows
 from hub.endpoint import free_endpoint
 from hub.scenario_file import installed_scenarios
 
@@ -158,3 +159,11 @@ def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
         out, _ = hub.communicate(timeout=60)
     assert (engine.returncode, hub.returncode) == (0, 0)
     assert json.loads(out)["steps"] == 50
+
+
+def test_of_a_device_with_many_streams_the_slowest_is_shown():
+    row = {"count": 5, "p50_s": 0.001, "p99_s": 0.002, "largest_s": 0.003}
+    streams = {f"console.PSM1/{index}": row | {"p99_s": 1e-3 * index} for index in range(9)}
+    rows = list(latency_rows({"grant to state": {"all participants": row}, "device to grant": {"hand.pose": row} | streams}))
+    assert [stream for _, stream, *_ in rows] == ["all participants", "hand.pose", "console, the slowest of 9"]
+    assert rows[-1][4] == "8.000 ms"

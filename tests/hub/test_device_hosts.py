@@ -168,9 +168,11 @@ def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
     with ExitStack() as stack:
         for signal in (SIGKILL, SIGTERM):
             with subprocess.Popen(command, stderr=subprocess.DEVNULL) as hub:
-                until(lambda: live_sessions([endpoint]))
-                if signal == SIGKILL:
-                    stack.enter_context(player(endpoint, tmp_path / "player.log"))
-                until(is_followed)
-                hub.send_signal(signal)
+                try:
+                    until(lambda: live_sessions([endpoint]))
+                    if signal == SIGKILL:
+                        stack.enter_context(player(endpoint, tmp_path / "player.log"))
+                    until(is_followed)
+                finally:
+                    hub.send_signal(signal)
     assert (tmp_path / "player.log").read_text().count("takes part") == 2

@@ -194,6 +194,14 @@ def test_a_message_made_of_a_signal_has_stamp_frame_and_names():
     assert (second.position.tolist(), second.header.stamp.nanosec) == ([1.0, 1e-3], 2 * MS)
 
 
+def test_an_event_port_hears_all_of_its_sources_in_the_order_of_the_connections():
+    inbox = Inbox("inbox", unit="s")
+    scenario = {"name": "two", "step": "1 ms", "duration": "2 ms", "connections": ["slow.out -> inbox.in", "quick.out -> inbox.in"]}
+    scenario["participants"] = {"slow": {"period": "2 ms"}}
+    run_in_process(scenario, {"slow": Ramp("slow"), "quick": Ramp("quick"), "inbox": inbox})
+    assert [[message.data[0] for message in messages] for messages in inbox.seen] == [[pytest.approx(2e-3), pytest.approx(1e-3)], [pytest.approx(2e-3)]]
+
+
 @pytest.mark.parametrize(("algorithm", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
 def test_a_neighbour_in_this_process_sees_values_of_the_right_step(algorithm, late):
     probe = Probe("probe")

@@ -58,6 +58,14 @@ def test_an_input_is_fed_once():
         plan_of(Part("a", out(), out("other")), Part("b", into()), connections=[*FROM_A_TO_B, "a.other -> b.in"])
 
 
+def test_a_queue_of_events_may_have_several_sources():
+    parts = Part("a", out(), out("other")), Part("b", into(variability="event"))
+    plan = plan_of(*parts, connections=[*FROM_A_TO_B, "a.other -> b.in"])
+    assert [link.source_port for link in plan.links] == ["out", "other"]
+    with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'"):
+        plan_of(*parts, connections=FROM_A_TO_B * 2)
+
+
 def test_a_connection_is_named_once():
     with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'") as raised:
         plan_of(Part("a", out()), Part("b", into()), connections=FROM_A_TO_B * 2)

@@ -128,3 +128,8 @@ def test_a_certificate_is_not_lent(authority):
 def test_the_way_to_mend_it_comes_with_the_error(authority):
     with pytest.raises(ConnectError, match=r"cannot reach the hub at tls/127\.0\.0\.1:\d+: nobody listens there"):
         reach(f"tls/127.0.0.1:{free_port()}", "touch", authority.issued("touch").file)
+
+
+def test_a_hub_of_this_machine_that_does_not_run_is_said_to_be_none():
+    with pytest.raises(ConnectError, match=r"cannot reach the hub at tcp/127\.0\.0\.1:\d+: nobody listens there\. Is it running\? trocar ls"):
+        reach(f"tcp/127.0.0.1:{free_port()}", "touch")

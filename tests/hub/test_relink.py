@@ -130,17 +130,19 @@ def test_on_the_command_line(prepare, monkeypatch, capfd):
         trocar("link", "player", "--preset", "300 ms", "--json")
         trocar("link", "player", "--outage", "3 s")
         trocar("link", "player", "--preset", "150 ms")
+        trocar("link", "player", "--loss", "1")
         until(lambda: live_sessions([session.endpoint])[0].latencies)
         until(lambda: live_sessions([session.endpoint])[0].devices)
         trocar("ls", "--json")
         trocar("ls")
 
     during(session, act)
-    as_json, outage, wrong, listed, shown = seen
+    as_json, outage, wrong, refused, listed, shown = seen
     assert json.loads(as_json[1])["link"]["preset"] == "300000000 ns"
     assert "from now on: 300 ms each way, up to 1 ms more, nothing at all for 3 s" in " ".join(outage[2].split())
     assert wrong[0] == 2
     assert "150 ms is no preset" in wrong[2]
+    assert refused[2].strip() == "error: loss: Input should be less than 1 (got 1.0)"
     (row,) = json.loads(listed[1])
     assert row["devices"][0]["device"] == "player"
     assert {one["way"] for one in row["latency"]} == {"device to grant", "grant to state", "state to force"}

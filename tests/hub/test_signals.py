@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from time import monotonic, sleep
 
 import pytest
 
 from hub.endpoint import free_endpoint
+from hub.interrupt import Interrupt
 from hub.recording import Recording
 from hub.recover import recover
 from tests.hub.processes import hosts, processes
@@ -145,3 +147,14 @@ def test_a_failed_session_is_exit_code_1(hub):
     code, errors = hub(FAILING).end()
     assert code == 1
     assert "participant 'here' failed at step 5: ArithmeticError: the rope is torn" in errors
+
+
+def test_an_interrupt_that_got_lost_in_a_callback_comes_again():
+    with Interrupt() as interrupt:
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGTERM)
+            sleep(10.0)
+        with pytest.raises(KeyboardInterrupt):
+            interrupt.check()
+        interrupt.disarm()
+        interrupt.check()

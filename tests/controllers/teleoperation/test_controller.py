@@ -11,7 +11,7 @@ from robots import rotation
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
 from schemas.errors import StateError
-from schemas.ros import Joy
+from schemas.ros import BoolMessage, Joy
 from schemas.vectors import VectorCodec, has_vector
 from tests.controllers.teleoperation.rig import H, Session
 
@@ -22,7 +22,7 @@ def test_every_output_fits_its_port_from_the_start():
     session = Session()
     for _ in range(2):
         for port in session.teleoperation.ports:
-            if port.causality == "output" and has_vector(port.type):
+            if port.causality == "output" and port.variability == "signal" and has_vector(port.type):
                 VectorCodec(port).checked(session.outputs[port.name])
         session.step()
 
@@ -185,6 +185,7 @@ def test_whatever_happens_the_arm_holds_or_follows_within_its_limits(mode, days,
         arm = {"off": ("PAUSED", True), "on": ("ENABLED", True)}.get(day)
         ready = ready if arm is None else arm[0] == "ENABLED"
         before = session.command
+        session.measured[: len(before)] = before  # the setpoint of its controller
         session.step(*events, stale=day == "silent", arm=arm)
         moved = np.abs(session.command - before)
         assert all(np.isfinite(session.outputs[name]).all() for name in ("servo_jp", "goal_cp"))
@@ -272,3 +273,65 @@ def test_contact_is_told_at_its_own_period():
         stamps.append(session.outputs["contact"].header.stamp.ns // H)
     assert stamps == [0, 0, 0, 4, 4, 4, 4, 8, 8]
     assert next(port for port in session.teleoperation.ports if port.name == "contact").period_ns == 4 * H
+
+
+def test_the_arms_controller_is_told_commands_only_while_the_arm_follows():
+    session = Session(instrument="400006")
+    session.step()
+    ((command,), (jaw,)) = session.outputs["PSM1/servo_jp"], session.outputs["PSM1/jaw/servo_jp"]
+    assert np.array_equal(command.position, session.outputs["servo_jp"])
+    assert np.array_equal(jaw.position, session.outputs["jaw/servo_jp"])
+    assert command.header.stamp.ns == session.t
+    session.step([1, 0])
+    assert session.outputs["PSM1/servo_jp"] == session.outputs["PSM1/jaw/servo_jp"] == ()
+
+
+def test_an_arm_that_others_move_meanwhile_is_led_on_from_there():
+    session = Session(orientation="follow")
+    session.step(arm=("ENABLED", True))
+    session.step([1])
+    session.measured[:6] = [0.3, 0.2, 0.12, 0.5, -0.4, 0.3]
+    session.step(count=3)
+    session.step([0])
+    assert session.follows
+    assert np.allclose(session.command, session.measured[:6], atol=1e-12)
+    session.measured[:6] = 0.0  # what it does while it follows is its servo's business
+    session.step(count=3)
+    assert np.allclose(session.command, [0.3, 0.2, 0.12, 0.5, -0.4, 0.3], atol=1e-12)
+
+
+def test_an_arm_without_a_controller_is_held_by_the_command():
+    session = Session()
+    before = (session.step(), session.command)[1]
+    session.step([1])
+    session.measured[:6] += 0.01  # it sags
+    session.step(count=3)
+    session.step([0])
+    assert np.array_equal(session.command, before)
+
+
+def test_a_lock_keeps_position_or_orientation_and_lets_go_without_a_jump():
+    session = Session(orientation="follow", scale=1.0)
+    session.step(count=5)
+    start, turn = session.tip, session.turn
+
+    def lead(**locks):
+        session.inputs._events = {f"lock_{what}": (BoolMessage(data=lock),) for what, lock in locks.items()}
+        for _ in range(20):
+            session.hand[:3] += [1e-5, 2e-5, -1e-5]
+            session.turn_hand([1e-3, 0.0, -1e-3])
+            before = session.command
+            session.outputs = session.teleoperation.step(session.t, H, session.inputs)
+            session.t += H
+            session.inputs._events = {}
+            assert (np.abs(session.command - before) <= session.chain.velocity * 1e-3).all()
+        return session.tip, session.turn
+
+    position, orientation = lead(translation=True)
+    assert np.allclose(position, start, atol=1e-9)
+    assert not np.allclose(orientation, turn, atol=1e-3)
+    moved, kept = lead(translation=False, rotation=True)
+    assert np.allclose(kept, orientation, atol=1e-9)
+    assert np.allclose(moved - position, 19 * np.array([1e-5, 2e-5, -1e-5]), atol=1e-8)
+    _, turned = lead(rotation=False)
+    assert not np.allclose(turned, kept, atol=1e-3)

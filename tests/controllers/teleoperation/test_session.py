@@ -111,10 +111,9 @@ def watched():
         connections += [
             f"hands.{side}/pose -> {side}.master",
             f"hands.{side}/buttons -> {side}.buttons",
-            f"{side}.servo_jp -> motion.{arm}/servo_jp",
-            f"{side}.jaw/servo_jp -> motion.{arm}/jaw/servo_jp",
-            f"motion.{arm}/measured_js -> {side}.measured_js",
-            f"motion.{arm}/jaw/measured_js -> {side}.jaw/measured_js",
+            f"{side}.{arm}/* -> motion.{arm}/*",
+            f"motion.{arm}/setpoint_js -> {side}.measured_js",
+            f"motion.{arm}/jaw/setpoint_js -> {side}.jaw/measured_js",
             f"motion.{arm}/operating_state -> {side}.operating_state",
             f"motion.SUJ/{arm}/measured_cp -> {side}.base_in_view",
             f"motion.{arm}/measured_cp -> watcher.{side}",

@@ -99,3 +99,9 @@ def test_a_turned_stylus_is_registered_to_the_desk():
     base_in_view = np.array([0.1, 0.2, 0.3, *rotation.exp(np.array([0.5, -1.0, 0.3]))])
     straight, turned = (View(TeleoperationParams(view="camera", registration=tuple(q))).hand_in_base(base_in_view) for q in (np.array([0, 0, 0, 1.0]), turn))
     assert np.allclose(turned, rotation.product(straight, turn))
+
+
+def test_a_master_that_tells_its_pose_in_the_displays_frame_moves_the_tip_along_the_cameras_axes():
+    base_in_view = np.array([0.1, 0.0, 0.2, *rotation.exp(np.array([0.3, -0.8, 0.5]))])
+    to_base = View(TeleoperationParams.model_validate({"view": "display"})).hand_in_base(base_in_view)
+    assert np.allclose(rotation.matrix(base_in_view[3:]) @ rotation.matrix(to_base), np.eye(3), atol=1e-12)

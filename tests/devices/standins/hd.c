@@ -68,7 +68,7 @@ static struct {
     unsigned long handle;
     int live;
 } callbacks[CALLBACKS];
-static unsigned long next_callback = 1;
+static unsigned long next_callback; /* the first schedule is 0: no documentation says that it is not */
 static pthread_t thread;
 static volatile int running;
 static unsigned long rate = 1000;

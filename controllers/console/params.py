@@ -1,0 +1,36 @@
+"""What a scenario may say about the console of a dVRK. SI units, radians."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from hub.participant import Params
+from robots.dvrk.setup_joints import CartArm
+
+__all__ = ["ComponentName", "ConsoleParams"]
+
+ComponentName = Annotated[str, Field(pattern=r"^MTM[LR]_PSM[123]$")]
+"""A master and the arm that it leads: `MTMR_PSM1`."""
+
+
+class ConsoleParams(Params):
+    """Which arms there are, and which master may lead which of them."""
+
+    arms: tuple[CartArm, ...] = Field(min_length=1, description="simulated arms that `system/power_on`, `power_off` and `home` are for")
+    teleoperations: tuple[ComponentName, ...] = Field(
+        default=(), description="a master and the arm that it leads, such as MTMR_PSM1; of those that share a master or an arm the first is selected at time 0"
+    )
+    scale: float = Field(default=0.2, gt=0.0, le=1.0, description="metres of the tip per metre of the master at time 0")
+    enabled: bool = Field(default=False, description="whether teleoperation is enabled at time 0; on the real system nobody is led until somebody asks for it")
+    align_mtm: bool = Field(default=True, description="masters are turned by their motors as the tips are before they lead; false for styluses")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if len(set(self.teleoperations)) < len(self.teleoperations):
+            raise ValueError(f"a teleoperation is named twice: {', '.join(self.teleoperations)}")
+        for name in self.teleoperations:
+            if (arm := name.partition("_")[2]) not in self.arms:
+                raise ValueError(f"'{name}' leads {arm}, which is not among the arms: {', '.join(self.arms)}")
+        return self

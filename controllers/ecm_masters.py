@@ -1,0 +1,194 @@
+"""Both masters drag the picture: the endoscope as the camera pedal of a dVRK lets surgeons lead it.
+
+The law of jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationECM.cpp (RunEnabled). With c the middle between the masters in the display's frame and u the
+normal of the plane through both and the display's origin, each against what it was when the pedal went down:
+
+    a = -angle about y of c,  b = angle about x of c,  i = s (|c0| - |c|),  r = -angle about z of u,    g = q0_roll + r
+    q = q0 + (a cos g - b sin g,  b cos g + a sin g,  i,  r)
+
+The masters are held at their distance by springs, rubbed, and turned against the picture, so that hands feel one thing that they hold. The reference is
+taken from the endoscope's setpoint, so the first step moves nothing.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, cast
+
+import numpy as np
+from pydantic import Field
+
+from hub.inputs import Inputs
+from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
+from robots import rotation
+from robots.dvrk import ecm
+from schemas.crtk import OperatingState
+from schemas.errors import StateError
+from schemas.ports import Port
+from schemas.quantity import Duration
+from schemas.ros import BoolMessage, Header, JointState, Joy, Quaternion, StringMessage, Time, Vector3, Wrench, WrenchStamped
+from schemas.vectors import Vector
+
+__all__ = ["EcmMasters", "EcmMastersParams"]
+
+_MASTERS = ("MTML", "MTMR")
+_MEASURED: tuple[Literal["position", "velocity", "effort"], ...] = ("position", "velocity", "effort")
+_X, _Y, _Z = np.eye(3)
+_SPRING = 150.0
+"""N/m between a master and where it was relative to the other one (distanceForceCoeff)."""
+_RUB = np.array([-10.0, -10.0, -40.0])
+"""N s/m along the axes of the display (frictionForceCoeff)."""
+_FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
+
+
+class EcmMastersParams(Params):
+    """How two masters lead the endoscope."""
+
+    scale: float = Field(default=1.0, gt=0.0, description="metres of insertion per metre that the masters are pulled")
+    max_age: Duration = Field(default=100_000_000, gt=0, description="the camera holds when a master has been silent for longer")
+
+
+class EcmMasters(Stepped):
+    """Two masters, one endoscope: it follows while button 0 is held, the arm is ready and both masters are heard."""
+
+    params_model: ClassVar[type[Params]] = EcmMastersParams
+    params: EcmMastersParams
+
+    def __init__(self, name: str, params: EcmMastersParams) -> None:
+        """Take the participant's name and its parameters."""
+        super().__init__(name, params)
+        self._chain = ecm.chain()
+        self._state = np.zeros(25)
+        parts = np.split(self._state, [1, 2, 3, 6, 9, 11, 15, 19, 23])
+        self._pressed, self._ready, self._follows, self._middle, self._up, self._span, self._start, *turns, _ = parts
+        self._turns = dict(zip(_MASTERS, turns, strict=True))
+        self._ready[0] = 1.0
+        self._commands = [f"{master}/{name}" for master in _MASTERS for name in _COMMANDS]
+        self._silent: dict[str, Value] = {"ECM/servo_jp": (), "warning": (), **dict.fromkeys(self._commands, ())}
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """The masters, the pedal and the endoscope's setpoint in; its commands, and those to the masters, out."""
+        age, pose, twist = self.params.max_age, "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TwistStamped"
+        still = ecm.HOME + (0.0,) * 8
+        joints, told = "sensor_msgs/msg/JointState", "of a motion controller, whose setpoint_js it is"
+        return (
+            *(Port(name=f"{master}/measured_cp", causality="input", type=pose, max_age_ns=age) for master in _MASTERS),
+            *(Port(name=f"{master}/measured_cv", causality="input", type=twist, start=(0.0,) * 6) for master in _MASTERS),
+            Port(name="buttons", causality="input", type=Joy.ros_type, variability="event", description="button 0: follows while it is held"),
+            Port(name="measured_js", causality="input", type=joints, names=ecm.JOINT_NAMES, fields=_MEASURED, start=still, description=told),
+            Port(name="operating_state", causality="input", type=OperatingState.ros_type, variability="event", description="of the ECM"),
+            Port(name="ECM/servo_jp", causality="output", type=joints, variability="event", description="while it follows"),
+            *(Port(name=f"{master}/{name}", causality="output", type=type_, variability="event") for master in _MASTERS for name, type_ in _COMMANDS.items()),
+            Port(name="following", causality="output", type=BoolMessage.ros_type, description="whether the endoscope follows"),
+            Port(name="warning", causality="output", type=StringMessage.ros_type, variability="event", description="why it does not"),
+        )
+
+    def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
+        """Start with the pedal up."""
+        return self._silent | {"following": _HOLDS}
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Follow the masters while the pedal is down."""
+        for joy in cast("tuple[Joy, ...]", inputs.events("buttons")):
+            if joy.buttons.size:
+                self._pressed[0] = joy.buttons[0] != 0
+        for state in cast("tuple[OperatingState, ...]", inputs.events("operating_state")):
+            self._ready[0] = state.state == "ENABLED" and state.is_homed
+        silent = [master for master in _MASTERS if inputs.stale(f"{master}/measured_cp")]
+        before, self._follows[0] = self._follows[0], self._pressed[0] and self._ready[0] and not silent
+        outputs = self._silent | {"following": _FOLLOWS if self._follows[0] else _HOLDS}
+        if before and not self._follows[0]:
+            outputs |= {f"{master}/body/servo_cf": (WrenchStamped(),) for master in _MASTERS}
+            if self._pressed[0]:
+                reason = f"{silent[0]} is silent" if silent else "it is not ENABLED and homed"
+                outputs["warning"] = (StringMessage(data=f"ECM holds: {reason}"),)
+        if self._follows[0]:
+            left, right = (inputs[f"{master}/measured_cp"] for master in _MASTERS)
+            if not before:
+                self._engage(left, right, inputs["measured_js"])
+                for master in _MASTERS:
+                    outputs |= {f"{master}/{name}": (_FOLLOWS,) for name in ("use_gravity_compensation", "body/set_cf_orientation_absolute")}
+            outputs |= self._lead(left[:3], right[:3], Time.from_ns(t + h))
+            outputs |= self._hold_together(left[:3], right[:3], inputs)
+        return outputs
+
+    def _engage(self, left: Vector, right: Vector, endoscope: Vector) -> None:
+        """Take the reference."""
+        self._middle[:], self._up[:], side = _picture(left[:3], right[:3])
+        between = right[:3] - left[:3]
+        self._span[:] = 0.5 * (side @ between), 0.5 * (self._middle @ between) / np.linalg.norm(self._middle)
+        self._start[:] = np.clip(endoscope[:4], self._chain.lower, self._chain.upper)
+        for master, pose in zip(_MASTERS, (left, right), strict=True):
+            self._turns[master][:] = pose[3:]
+
+    def _lead(self, left: Vector, right: Vector, stamp: Time) -> dict[str, Value]:
+        """Return the command to the endoscope, and how the masters are turned against it."""
+        middle, up, _ = _picture(left, right)
+        a, b, r = -_angle(_Y, self._middle, middle), _angle(_X, self._middle, middle), -_angle(_Z, self._up, up)
+        i = self.params.scale * float(np.linalg.norm(self._middle) - np.linalg.norm(middle))
+        cos, sin = np.cos(self._start[3] + r), np.sin(self._start[3] + r)
+        goal = np.clip(self._start + np.array([a * cos - b * sin, b * cos + a * sin, i, r]), self._chain.lower, self._chain.upper)
+        back = rotation.conjugate(rotation.product(_turned(goal), rotation.conjugate(_turned(self._start))))
+        locks: dict[str, Value] = {f"{m}/lock_orientation": (_quaternion(rotation.product(back, turn)),) for m, turn in self._turns.items()}
+        return locks | {"ECM/servo_jp": (JointState(header=Header(stamp=stamp), position=goal),)}
+
+    def _hold_together(self, left: Vector, right: Vector, inputs: Inputs) -> dict[str, Value]:
+        """Return the forces on the masters: springs to where each is relative to the other, and friction."""
+        middle, _, side = _picture(left, right)
+        reach = self._span[0] * side + self._span[1] * middle / np.linalg.norm(middle)
+        forces: dict[str, Value] = {}
+        for master, goal, at in (("MTML", middle - reach, left), ("MTMR", middle + reach, right)):
+            force = _SPRING * (goal - at) + _RUB * inputs[f"{master}/measured_cv"][:3]
+            wrench = Wrench(force=Vector3(**dict(zip("xyz", force.tolist(), strict=True))))
+            forces[f"{master}/body/servo_cf"] = (WrenchStamped(wrench=wrench),)
+        return forces
+
+    def state_hash(self) -> int:
+        """Return the hash of the pedal and the reference."""
+        return state_hash(self._state)
+
+    def save(self) -> bytes:
+        """Return what is hashed."""
+        return self._state.tobytes()
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state. Raises StateError if it has the wrong size."""
+        if len(state) != self._state.nbytes:
+            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {self._state.nbytes}; was it saved elsewhere?")
+        self._state[:] = np.frombuffer(state)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+_COMMANDS = {
+    "use_gravity_compensation": BoolMessage.ros_type,
+    "body/set_cf_orientation_absolute": BoolMessage.ros_type,
+    "body/servo_cf": WrenchStamped.ros_type,
+    "lock_orientation": Quaternion.ros_type,
+}
+"""To each master: type."""
+
+
+def _picture(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the middle between the masters, the way up in the picture that they hold, and the way to its right."""
+    middle = 0.5 * (left + right)
+    up = np.cross(right - left, middle)
+    up /= np.linalg.norm(up)
+    side = np.cross(middle, up)
+    return middle, up, side / np.linalg.norm(side)
+
+
+def _angle(axis: Vector, one: Vector, other: Vector) -> float:
+    """Return the angle (rad) about `axis` from `one` to `other`, as seen along it."""
+    one, other = one - (axis @ one) * axis, other - (axis @ other) * axis
+    return float(np.arctan2(axis @ np.cross(one, other), one @ other))
+
+
+def _turned(q: Vector) -> Vector:
+    """Return how the picture is turned at joint positions `q`: roll about z, yaw about y, pitch about x, as a quaternion."""
+    return rotation.product(rotation.product(rotation.exp(q[3] * _Z), rotation.exp(q[0] * _Y)), rotation.exp(q[1] * _X))
+
+
+def _quaternion(value: Vector) -> Quaternion:
+    return Quaternion(**dict(zip("xyzw", (value / np.linalg.norm(value)).tolist(), strict=True)))

@@ -1,0 +1,1 @@
+"""Gateways to ROS: the simulated arms, consoles and cameras as programs of the real system know them."""

@@ -1,0 +1,54 @@
+"""The command `trocar ros`: which gateways run, who is connected to them, and what goes through."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from hub.command_line.display import table
+from hub.command_line.scenarios import Json
+from schemas.trocar_msgs import GatewayStatus
+
+__all__ = ["app"]
+
+app = typer.Typer()
+
+
+@app.command()
+def ros(
+    *,
+    connect: Annotated[list[str] | None, typer.Option(metavar="ENDPOINT", help="Where a hub of this machine listens; by default all are asked.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Show which gateways to ROS run in which session, which programs are connected to them, and the rates of all topics."""
+    from devices.ros.watch import running_gateways
+    from hub.endpoint import listening_endpoints
+
+    gateways = running_gateways(connect or listening_endpoints())
+    if as_json:
+        typer.echo(json.dumps([{"session": session, "gateway": name} | status.model_dump() for (session, name), status in gateways.items()], indent=2))
+        return
+    out = Console(highlight=False)
+    if not gateways:
+        out.print("no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`: trocar run ros", soft_wrap=True)
+    for (session, name), status in gateways.items():
+        _print(out, session, name, status)
+
+
+def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None:
+    clients = ", ".join(f"{client.name}{f' ({client.address})' if client.address else ''}" for client in status.clients)
+    out.print(f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'nobody'}", soft_wrap=True)
+    shown = table(_rows(status), "topic", "direction", "per second", "messages", "refused", "why the last one")
+    shown.columns[0].min_width = max((len(topic.topic) for topic in status.topics), default=0)  # nobody can read half a name
+    out.print(shown)
+
+
+def _rows(status: GatewayStatus) -> Iterable[tuple[Any, ...]]:
+    words = {"publish": "told", "subscribe": "heard", "serve": "answered"}
+    for topic in sorted(status.topics, key=lambda topic: topic.topic):
+        yield topic.topic, words[topic.way], f"{topic.rate:.1f}", topic.messages, topic.refused or "", escape(topic.reason)

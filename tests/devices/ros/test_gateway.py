@@ -1,0 +1,388 @@
+from __future__ import annotations
+
+from collections.abc import Generator
+from itertools import pairwise
+from pathlib import Path
+from time import sleep, time_ns
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from devices.ros import commander as commander_module
+from devices.ros.params import GatewayParams
+from hub.testing import check_device
+from schemas.codec import encode
+from schemas.crtk import ForwardKinematicsRequest, OperatingState, StringStamped
+from schemas.errors import DeviceError, MessageError
+from schemas.message import Message
+from schemas.ros import EmptyMessage, Float64MultiArray, Header, Image, JointState, PoseStamped, StringMessage, TFMessage, Time
+from schemas.trocar_msgs import GatewayStatus
+from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise, sample
+from tests.devices.ros.memory import MemoryGateway, MemoryPeer
+
+SMALL: dict[str, Any] = {"arms": {"PSM1": {"instrument": "LARGE_NEEDLE_DRIVER_400006"}, "ECM": {}}, "listen": ["MTML"]}
+
+
+def make(params: dict[str, Any] = SMALL) -> MemoryGateway:
+    return MemoryGateway("ros", GatewayParams.model_validate(params))
+
+
+@pytest.fixture
+def gateway(tmp_path: Path) -> Generator[MemoryGateway]:
+    with make() as gateway:
+        gateway.open(tmp_path)
+        yield gateway
+
+
+def commands(gateway: MemoryGateway) -> list[tuple[str, Message]]:
+    return [(sample.port, sample.message) for sample in gateway.read(0) if sample.port != "gateway"]
+
+
+def words(gateway: MemoryGateway, topic: str) -> list[str]:
+    return [message.data for message in gateway.transport.heard(topic) if isinstance(message, StringMessage)]
+
+
+def joints(*positions: float) -> JointState:
+    return JointState(position=np.array(positions))
+
+
+def test_every_row_of_the_table(tmp_path: Path) -> None:
+    with make(WHOLE) as gateway:
+        gateway.open(tmp_path)
+        peer = MemoryPeer(gateway.transport)
+        peer.join(gateway.rows)
+        exercise(gateway, peer)
+        check_late_joiner(gateway, MemoryPeer(gateway.transport))
+
+
+def test_it_keeps_the_contract_of_a_device() -> None:
+    check_device(make)
+
+
+def test_a_second_time_it_begins_anew(tmp_path: Path) -> None:
+    with make() as gateway:
+        gateway.open(tmp_path)
+        first = gateway.transport
+        gateway.write("PSM1/status", StringMessage(data="one"))
+        gateway.close()
+        assert first.closed == 1
+        gateway.open(tmp_path)
+        assert gateway.transport.heard("/PSM1/status") == []
+
+
+def test_latched_words_from_before_it_was_open_are_told(tmp_path: Path) -> None:
+    with make() as gateway:
+        gateway.write("PSM1/operating_state", OperatingState(state="DISABLED"))
+        gateway.write("PSM1/operating_state", OperatingState(state="ENABLED"))
+        gateway.write("endoscope/left/image_raw", Image())
+        gateway.open(tmp_path)
+        (told,) = gateway.transport.heard("/PSM1/operating_state")
+        assert isinstance(told, OperatingState)
+        assert told.state == "ENABLED"
+        assert gateway.transport.heard("/endoscope/left/image_raw") == []
+
+
+def test_an_unknown_port_is_told_with_a_near_miss(gateway: MemoryGateway) -> None:
+    with pytest.raises(MessageError, match="Did you mean 'PSM1/measured_js'"):
+        gateway.write("PSM1/measured_jx", np.zeros(18))
+
+
+def test_states_are_published_at_its_own_rate_whatever_the_simulation_does(tmp_path: Path) -> None:
+    with make(SMALL | {"publish_period": "4 ms"}) as gateway:
+        gateway.open(tmp_path)
+        gateway.write("PSM1/measured_js", np.arange(18.0))
+        sleep(0.2)
+        told = gateway.transport.heard("/PSM1/measured_js")
+    stamps = [message.header.stamp.ns for message in told if isinstance(message, JointState)]
+    assert len(stamps) >= 10
+    assert all(one < other for one, other in pairwise(stamps))
+    assert np.median(np.diff(stamps)) == pytest.approx(4e6, rel=0.5)
+    assert gateway.transport.published["/ECM/measured_js"] == []  # nobody has told it
+
+
+def test_a_state_that_is_old_is_told_no_more(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("devices.ros.outgoing._SILENT_NS", 50_000_000)
+    gateway.write("PSM1/measured_js", np.arange(18.0))
+    sleep(0.2)
+    count = len(gateway.transport.published["/PSM1/measured_js"])
+    sleep(0.1)
+    assert 0 < count == len(gateway.transport.published["/PSM1/measured_js"])
+
+
+def test_stamps_increase_though_the_clock_is_set_back(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = iter([10**18, 10**18, 5 * 10**17])
+    monkeypatch.setattr("devices.ros.stamps.time_ns", lambda: next(times))
+    for _ in range(3):
+        gateway.write("PSM1/operating_state", OperatingState(header=Header(stamp=Time(sec=3)), state="ENABLED"))
+    stamps = [message.header.stamp.ns - 10**18 for message in gateway.transport.heard("/PSM1/operating_state") if isinstance(message, OperatingState)]
+    assert stamps == [0, 1, 2]
+
+
+def test_frames_from_the_cart_to_tips_and_camera(tmp_path: Path) -> None:
+    with make(SMALL | {"mounting": "cart"}) as gateway:
+        gateway.open(tmp_path)
+        for name in ("SUJ/PSM1/local/measured_cp", "PSM1/local/measured_cp", "SUJ/ECM/local/measured_cp", "ECM/local/measured_cp"):
+            gateway.write(name, np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]))
+        sleep(0.1)
+        told = gateway.transport.heard("/tf")[-1]
+    assert isinstance(told, TFMessage)
+    edges = {(one.header.frame_id, one.child_frame_id) for one in told.transforms}
+    assert edges == {("Cart", "PSM1_base"), ("PSM1_base", "PSM1"), ("Cart", "ECM_base"), ("ECM_base", "ECM"), ("ECM", "endoscope_left_optical")}
+    assert len({child for _, child in edges}) == len(edges)
+    assert len({one.header.stamp.ns for one in told.transforms}) == 1
+    for one in told.transforms[:4]:
+        assert one.transform.model_dump() == {"translation": {"x": 1.0, "y": 2.0, "z": 3.0}, "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+def test_joint_states_of_all_arms(gateway: MemoryGateway) -> None:
+    gateway.write("PSM1/measured_js", np.arange(18.0))
+    gateway.write("PSM1/jaw/measured_js", np.array([0.5, 0.6, 0.7]))
+    gateway.write("ECM/measured_js", np.arange(12.0))
+    sleep(0.05)
+    told = gateway.transport.heard("/joint_states")[-1]
+    assert isinstance(told, JointState)
+    assert told.name == [f"PSM1_{name}" for name in ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw", "jaw")] + [
+        f"ECM_{name}" for name in ("yaw", "pitch", "insertion", "roll")
+    ]
+    assert told.position.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.5, 0.0, 1.0, 2.0, 3.0]
+    assert told.velocity.tolist() == [6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 0.6, 4.0, 5.0, 6.0, 7.0]
+
+
+def test_a_description_is_latched(tmp_path: Path) -> None:
+    file = tmp_path / "dvrk.urdf"
+    file.write_text('<robot name="dvrk"><mesh filename="assets/tip.obj" /><mesh filename="package://dvrk/tip.obj" /></robot>')
+    with make(SMALL | {"robot_description": str(file)}) as gateway:
+        gateway.open(tmp_path)
+        (told,) = words(gateway, "/robot_description")
+        assert told == f'<robot name="dvrk"><mesh filename="{tmp_path.as_uri()}/assets/tip.obj" /><mesh filename="package://dvrk/tip.obj" /></robot>'
+        assert gateway.transport.rows["/robot_description"].latched
+
+
+def test_a_description_that_is_none(tmp_path: Path) -> None:
+    file = tmp_path / "dvrk.urdf"
+    file.write_text("solid tip")
+    with make(SMALL | {"robot_description": str(file)}) as gateway, pytest.raises(DeviceError, match="is no URDF"):
+        gateway.open(tmp_path)
+
+
+def test_a_service_without_a_session_says_so(gateway: MemoryGateway) -> None:
+    peer = MemoryPeer(gateway.transport)
+    answer = peer.call(gateway.transport.rows["/PSM1/forward_kinematics"], ForwardKinematicsRequest(jp=np.zeros(6)))
+    assert "is the session running" in getattr(answer, "message", "")
+
+
+BAD: list[tuple[str, Message | bytes, str]] = [
+    ("servo_jp", joints(*[0.0] * 5), "5 values in position, expected 6"),
+    ("servo_jp", joints(*[0.0] * 1000), "1000 values in position, expected 6"),
+    ("servo_jp", JointState(), "no position is stated, expected 6"),
+    ("servo_jp", JointState(position=np.zeros(6), velocity=np.zeros(2)), "2 values in velocity"),
+    ("servo_jp", JointState(name=["a"], position=np.zeros(6)), "1 values in name"),
+    ("servo_jf", joints(*[0.0] * 6), "no effort is stated"),
+    ("jaw/move_jp", joints(0.1, 0.2), "2 values in position, expected 1"),
+    ("servo_cp", PoseStamped.model_validate({"pose": {"orientation": {"w": 0.0}}}), "norm 0, expected 1"),
+    ("move_cp", PoseStamped.model_validate({"pose": {"orientation": {"w": 2.0}}}), "norm 2, expected 1"),
+    ("servo_jp", encode(joints(*[1e300] * 6)).replace(b"\x9c\x75\x00\x88\x3c\xe4\x37\x7e", b"\x00" * 6 + b"\xf8\x7f"), "finite"),
+    ("servo_jp", b"", "no such message"),
+    ("servo_jp", b"\x00\x01\x00\x00\xff", "no such message"),
+    ("servo_jp", encode(joints(0.0))[:-3], "no such message"),
+]
+
+
+@pytest.mark.parametrize(("name", "message", "reason"), BAD)
+def test_what_is_no_command_is_an_error_on_the_arms_topic(gateway: MemoryGateway, name: str, message: Message | bytes, reason: str) -> None:
+    gateway.transport.send(f"/PSM1/{name}", message)
+    assert commands(gateway) == []
+    (told,) = words(gateway, "/PSM1/error")
+    assert told.startswith(f"PSM1: {name} refused: ")
+    assert reason in told
+    assert words(gateway, "/PSM1/warning") == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(positions=st.lists(st.floats(), max_size=8), velocities=st.lists(st.floats(), max_size=8))
+def test_only_six_finite_positions_move_an_arm(positions: list[float], velocities: list[float]) -> None:
+    gateway = _opened()
+    raw = _cdr(positions, velocities)
+    gateway.transport.send("/PSM1/servo_jp", raw)
+    good = len(positions) == 6 and len(velocities) in (0, 6) and bool(np.isfinite([*positions, *velocities]).all())
+    assert len(commands(gateway)) == good
+
+
+@settings(max_examples=60, deadline=None)
+@given(q=st.tuples(*[st.floats(-2.0, 2.0)] * 4))
+def test_only_unit_quaternions_are_orientations(q: tuple[float, ...]) -> None:
+    gateway = _opened()
+    pose = PoseStamped.model_validate({"pose": {"orientation": dict(zip("xyzw", q, strict=True))}})
+    good = abs(float(np.linalg.norm(q)) - 1.0) <= 1e-3
+    for topic in ("/PSM1/servo_cp", "/PSM1/move_cp"):
+        gateway.transport.send(topic, pose)
+    assert len(commands(gateway)) == 2 * good
+    assert len(words(gateway, "/PSM1/error")) == 2 * (not good)
+
+
+@settings(max_examples=60, deadline=None)
+@given(payload=st.binary(max_size=200))
+def test_no_bytes_bring_it_down(payload: bytes) -> None:
+    gateway = _opened()
+    for topic in ("/PSM1/servo_jp", "/PSM1/servo_cs", "/PSM1/state_command", "/MTML/measured_js"):
+        gateway.transport.send(topic, payload)
+        gateway.transport.send(topic, b"\x00\x01\x00\x00" + payload)
+    for _, message in commands(gateway):
+        encode(message)
+
+
+_KEPT: list[MemoryGateway] = []
+
+
+def _opened() -> MemoryGateway:
+    """Return an open gateway that no other example has sent anything, without making a new one each time."""
+    if not _KEPT:
+        _KEPT.append(make())
+    gateway = _KEPT[0]
+    gateway.open(Path.cwd())
+    return gateway
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _closed() -> Generator[None]:
+    yield
+    for gateway in _KEPT:
+        gateway.close()
+
+
+def _cdr(positions: list[float], velocities: list[float]) -> bytes:
+    """Return a JointState with any numbers, which our own models refuse to write."""
+    marks = [float(i + 1) * 1.2345e-7 for i in range(len(positions) + len(velocities))]
+    raw = encode(JointState(position=np.array(marks[: len(positions)]), velocity=np.array(marks[len(positions) :])))
+    for mark, number in zip(marks, [*positions, *velocities], strict=True):
+        raw = raw.replace(np.float64(mark).tobytes(), np.float64(number).tobytes(), 1)
+    return raw
+
+
+def test_the_console_has_warnings_only(gateway: MemoryGateway) -> None:
+    gateway.transport.send("/console/teleop/set_scale", b"nonsense")
+    (told,) = words(gateway, "/console/warning")
+    assert told.startswith("console: teleop/set_scale refused: std_msgs/msg/Float64")
+
+
+def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> None:
+    old, now = (StringStamped(header=Header(stamp=Time.from_ns(stamp)), string="home") for stamp in (time_ns() - 10**11, time_ns()))
+    gateway.transport.send("/PSM1/state_command", old)
+    assert commands(gateway) == []
+    (told,) = words(gateway, "/PSM1/warning")
+    assert "before this gateway was there" in told
+    gateway.transport.send("/PSM1/state_command", now)
+    gateway.transport.send("/PSM1/state_command", StringStamped(string="enable"))  # from `ros2 topic pub`
+    assert commands(gateway) == [("PSM1/state_command", now), ("PSM1/state_command", StringStamped(string="enable"))]
+
+
+def test_a_command_that_a_connection_brings_again_is_not_heeded_again(gateway: MemoryGateway) -> None:
+    command = StringStamped(header=Header(stamp=Time.from_ns(time_ns())), string="home")
+    for _ in range(2):
+        gateway.transport.send("/PSM1/state_command", command)
+    assert len(commands(gateway)) == 1
+    (told,) = words(gateway, "/PSM1/warning")
+    assert "heeded before" in told
+
+
+def test_one_program_at_a_time_commands_an_arm(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0]
+    monkeypatch.setattr(commander_module, "monotonic_ns", lambda: now[0])
+    gateway.transport.send("/PSM1/servo_jp", joints(*[0.1] * 6), "/one")
+    gateway.transport.send("/PSM1/jaw/servo_jp", joints(0.1), "/other")
+    gateway.transport.send("/PSM1/move_jp", joints(*[0.2] * 6), "/other")
+    gateway.transport.send("/PSM1/hold", EmptyMessage(), "/other")
+    gateway.transport.send("/ECM/servo_jp", joints(*[0.1] * 4), "/other")
+    assert [port for port, _ in commands(gateway)] == ["PSM1/servo_jp", "PSM1/hold", "ECM/servo_jp"]
+    assert all("/other is not heeded while /one commands the arm" in told for told in words(gateway, "/PSM1/warning"))
+    now[0] = 1_000_000_001
+    gateway.transport.send("/PSM1/move_jp", joints(*[0.2] * 6), "/other")
+    assert [port for port, _ in commands(gateway)] == ["PSM1/move_jp"]
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True, is_busy=True))
+    now[0] = 9_000_000_000
+    gateway.transport.send("/PSM1/servo_jp", joints(*[0.1] * 6), "/one")
+    assert commands(gateway) == []  # the move of the other one goes on
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True, is_busy=False))
+    gateway.transport.send("/PSM1/servo_jp", joints(*[0.1] * 6), "/one")
+    assert [port for port, _ in commands(gateway)] == ["PSM1/servo_jp"]
+
+
+def test_a_flood_is_thinned_out_and_told_once(gateway: MemoryGateway) -> None:
+    payload = encode(joints(*[0.1] * 6))
+    for _ in range(3000):
+        gateway.transport.send("/PSM1/servo_jp", payload)
+    assert 150 <= len(commands(gateway)) < 2500
+    (told,) = words(gateway, "/PSM1/warning")
+    assert "more than 1500 messages per second from /console" in told
+
+
+def test_ever_new_mistakes_are_not_quoted_for_ever(gateway: MemoryGateway) -> None:
+    for count in range(20, 60):
+        gateway.transport.send("/PSM1/servo_jp", joints(*[0.0] * count))
+    assert len(words(gateway, "/PSM1/error")) == 8
+
+
+def test_the_same_mistake_is_told_again_later_with_how_often_it_came(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [10**12]
+    monkeypatch.setattr("devices.ros.refusals.monotonic_ns", lambda: now[0])
+    for _ in range(5):
+        gateway.transport.send("/PSM1/servo_jp", joints(0.0))
+    now[0] += 2_000_000_000
+    gateway.transport.send("/PSM1/servo_jp", joints(0.0))
+    once, again = words(gateway, "/PSM1/error")
+    assert "times" not in once
+    assert again.endswith("(5 times)")
+
+
+def test_what_a_real_arm_says_comes_in_as_the_signals_are(gateway: MemoryGateway) -> None:
+    stamp = Header(stamp=Time.from_ns(time_ns()))
+    gateway.transport.send("/MTML/gripper/measured_js", JointState(header=stamp, position=np.array([0.3])))
+    gateway.transport.send("/MTML/measured_js", JointState(header=stamp, name=list("abcdefg"), position=np.zeros(7), velocity=np.zeros(7), effort=np.zeros(7)))
+    gateway.transport.send("/MTML/measured_cp", PoseStamped())  # stamp 0: invalid
+    (_, gripper), (_, measured) = commands(gateway)
+    assert isinstance(gripper, JointState)
+    assert (gripper.name, gripper.position.tolist(), gripper.velocity.tolist()) == (["gripper"], [0.3], [0.0])
+    assert isinstance(measured, JointState)
+    assert measured.name[0] == "outer_yaw"
+
+
+def test_commands_go_to_a_real_arm(gateway: MemoryGateway) -> None:
+    gateway.write("MTML/body/servo_cf", sample(gateway.transport.rows["/MTML/body/servo_cf"]))
+    assert len(gateway.transport.heard("/MTML/body/servo_cf")) == 1
+
+
+def test_the_status_tells_clients_and_rates(gateway: MemoryGateway) -> None:
+    gateway.write("PSM1/measured_js", np.arange(18.0))
+    gateway.transport.send("/PSM1/servo_jp", joints(0.0))
+    first, *_ = [found.message for found in gateway.read(0) if found.port == "gateway"]
+    assert isinstance(first, GatewayStatus)
+    assert [found for found in gateway.read(500_000_000) if found.port == "gateway"] == []
+    sleep(0.1)
+    second = gateway.read(1_000_000_000)[-1].message
+    assert isinstance(second, GatewayStatus)
+    topics = {topic.topic: topic for topic in second.topics}
+    assert 20 < topics["/PSM1/measured_js"].rate < 200
+    assert (topics["/PSM1/servo_jp"].messages, topics["/PSM1/servo_jp"].refused) == (1, 1)
+    assert "expected 6" in topics["/PSM1/servo_jp"].reason
+    encode(second)
+
+
+def test_a_transport_that_fails_is_told_where_the_device_is_read(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(value: object) -> bytes:
+        raise OSError("the wire is cut")
+
+    monkeypatch.setattr(gateway._states["PSM1/measured_js"], "cdr", fail)
+    sleep(0.1)
+    with pytest.raises(DeviceError, match="the wire is cut"):
+        gateway.read(0)
+
+
+def test_multi_arrays_pass(gateway: MemoryGateway) -> None:
+    gateway.transport.send("/system/beep", Float64MultiArray(data=np.array([440.0, 0.2])))
+    ((port, message),) = commands(gateway)
+    assert port == "system/beep"
+    assert isinstance(message, Float64MultiArray)
+    assert message.data.tolist() == [440.0, 0.2]

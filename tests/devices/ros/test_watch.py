@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Generator
+
+import pytest
+from typer.testing import CliRunner
+
+from devices.ros.command_line import app
+from hub.endpoint import free_endpoint
+from hub.wire import open_session
+from schemas.codec import encode
+from schemas.keys import Keys
+from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
+
+STATUS = GatewayStatus(
+    kind="ros2-dds",
+    clients=[GatewayClient(name="/console", address="10.0.0.7")],
+    topics=[
+        GatewayTopic(topic="/PSM1/servo_jp", way="subscribe", rate=0.0, messages=3, refused=1, reason="5 values in position, expected 6"),
+        GatewayTopic(topic="/PSM1/measured_js", way="publish", rate=99.97, messages=1000),
+    ],
+)
+
+
+@pytest.fixture
+def endpoint() -> Generator[str]:
+    """A hub with a gateway that tells every tenth of a second, and with one that tells nonsense."""
+    endpoint, over = free_endpoint(range(1)), threading.Event()
+
+    def tell() -> None:
+        while not over.wait(0.1):
+            hub.put(Keys("surgery").output("device", "ros", "gateway"), encode(STATUS))
+            hub.put(Keys("surgery").output("device", "broken", "gateway"), b"nonsense")
+
+    with open_session("router", listen=[endpoint]) as hub:
+        teller = threading.Thread(target=tell)
+        teller.start()
+        yield endpoint
+        over.set()
+        teller.join()
+
+
+def test_people_see_who_is_connected_and_what_goes_through(endpoint: str) -> None:
+    shown = CliRunner().invoke(app, ["--connect", endpoint], env={"COLUMNS": "160"}).stdout
+    assert "ros (ros2-dds) in session 'surgery', connected: /console (10.0.0.7)" in shown
+    lines = [line.split() for line in shown.splitlines()]
+    assert ["/PSM1/measured_js", "told", "100.0", "1000"] in lines
+    assert "5 values in position, expected 6" in shown
+    assert "broken" not in shown
+
+
+def test_programs_get_json(endpoint: str) -> None:
+    (found,) = json.loads(CliRunner().invoke(app, ["--connect", endpoint, "--json"]).stdout)
+    assert found == {"session": "surgery", "gateway": "ros"} | STATUS.model_dump()
+
+
+def test_nobody_there() -> None:
+    result = CliRunner().invoke(app, ["--connect", free_endpoint(range(1))])
+    assert result.exit_code == 0
+    assert "no gateway to ROS is running" in result.stdout
