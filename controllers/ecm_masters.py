@@ -18,11 +18,10 @@ import numpy as np
 from pydantic import Field
 
 from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
 from robots import rotation
 from robots.dvrk import ecm
 from schemas.crtk import OperatingState
-from schemas.errors import StateError
 from schemas.ports import Port
 from schemas.quantity import Duration
 from schemas.ros import BoolMessage, Header, JointState, Joy, Quaternion, StringMessage, Time, Vector3, Wrench, WrenchStamped
@@ -153,9 +152,7 @@ class EcmMasters(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it has the wrong size."""
-        if len(state) != self._state.nbytes:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {self._state.nbytes}; was it saved elsewhere?")
-        self._state[:] = np.frombuffer(state)
+        restore_arrays(self.name, (self._state,), state)
 
     def close(self) -> None:
         """Nothing is held."""

@@ -22,13 +22,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
 from robots import rotation
 from robots.dvrk import ecm
 from robots.dvrk.parameters import EcmPositions, check_start
 from robots.serial_chain import SerialChain
 from schemas.crtk import OperatingState
-from schemas.errors import StateError, did_you_mean
+from schemas.errors import did_you_mean
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.quantity import Duration
@@ -236,9 +236,7 @@ class EcmTeleoperation(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it has the wrong size."""
-        if len(state) != self._state.nbytes:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {self._state.nbytes}; was it saved elsewhere?")
-        self._state[:] = np.frombuffer(state)
+        restore_arrays(self.name, (self._state,), state)
 
     def close(self) -> None:
         """Nothing is held."""

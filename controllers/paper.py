@@ -17,10 +17,9 @@ from pydantic import Field
 
 from controllers.motion.params import Arms, EcmParams, PsmParams, SetupJoints
 from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
 from robots.dvrk import setup_joints
 from robots.dvrk.setup_joints import CartArm
-from schemas.errors import StateError
 from schemas.ports import Port
 from schemas.ros import BoolMessage, JointState, StringMessage
 from schemas.vectors import Vector
@@ -95,13 +94,7 @@ class Paper(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it has the wrong size."""
-        size = sum(arm.state.nbytes for arm in self._arms)
-        if len(state) != size:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
-        values, at = np.frombuffer(state), 0
-        for arm in self._arms:
-            arm.state[:] = values[at : at + arm.state.size]
-            at += arm.state.size
+        restore_arrays(self.name, (arm.state for arm in self._arms), state)
 
     def close(self) -> None:
         """Nothing is held."""

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
+import numpy as np
 import zenoh
 from pydantic import BaseModel, ConfigDict
 
@@ -23,7 +24,7 @@ from schemas.message import Message
 from schemas.ports import BondSide, Port
 from schemas.vectors import Vector
 
-__all__ = ["BondPlan", "Correction", "Device", "Outputs", "Params", "Sample", "Setup", "Stepped", "Value", "state_hash"]
+__all__ = ["BondPlan", "Correction", "Device", "Outputs", "Params", "Sample", "Setup", "Stepped", "Value", "restore_arrays", "state_hash"]
 
 Value = Vector | Message | tuple[Message, ...]
 """A signal with a fixed layout is a vector, any other signal a message, an event port a tuple of messages."""
@@ -163,3 +164,15 @@ def state_hash(*parts: bytes | Vector) -> int:
     for part in parts:
         digest.update(part if isinstance(part, bytes) else part.tobytes())
     return int.from_bytes(digest.digest(), "little")
+
+
+def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:
+    """Write `state`, the bytes of `arrays` one after the other, back into them. Raises StateError if it has another size."""
+    held = tuple(arrays)
+    size = sum(array.nbytes for array in held)
+    if len(state) != size:
+        raise StateError(f"participant '{participant}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
+    values, at = np.frombuffer(state), 0
+    for array in held:
+        array[...] = values[at : at + array.size].reshape(array.shape)
+        at += array.size

@@ -16,9 +16,9 @@ from controllers.console.ports import PEDALS, console_ports
 from controllers.console.readiness import Readiness
 from controllers.console.voice import Voice
 from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
 from schemas.crtk import StringStamped
-from schemas.errors import StateError, did_you_mean
+from schemas.errors import did_you_mean
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Float64Message, Joy, StringMessage
 
@@ -191,13 +191,7 @@ class Console(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it has the wrong size."""
-        size = sum(array.nbytes for array in self._state)
-        if len(state) != size:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
-        values, at = np.frombuffer(state), 0
-        for array in self._state:
-            array[...] = values[at : at + array.size].reshape(array.shape)
-            at += array.size
+        restore_arrays(self.name, self._state, state)
 
     def close(self) -> None:
         """Nothing is held."""

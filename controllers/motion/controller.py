@@ -5,15 +5,13 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from controllers.motion.frames import CART_FRAME, base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
 from controllers.motion.setup_joints import SetupJoints, joint_names
 from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
-from schemas.errors import MissingExtraError, StateError
+from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from schemas.errors import MissingExtraError
 from schemas.ports import Port
 from schemas.vectors import Vector
 
@@ -96,13 +94,7 @@ class MotionController(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it has the wrong size."""
-        size = sum(array.nbytes for array in self._state())
-        if len(state) != size:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
-        values, at = np.frombuffer(state), 0
-        for array in self._state():
-            array[...] = values[at : at + array.size].reshape(array.shape)
-            at += array.size
+        restore_arrays(self.name, self._state(), state)
         for arm in self._arms.values():
             arm.restored()
 

@@ -15,10 +15,9 @@ from controllers.teleoperation.pose_law import PoseLaw
 from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
 from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
 from robots import rotation
 from schemas.crtk import OperatingState
-from schemas.errors import StateError
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Header, JointState, Joy, StringMessage, Time
 from schemas.trocar_msgs import ContactModel
@@ -210,13 +209,7 @@ class Teleoperation(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it has the wrong size."""
-        size = sum(array.nbytes for array in self._state)
-        if len(state) != size:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
-        values, at = np.frombuffer(state), 0
-        for array in self._state:
-            array[...] = values[at : at + array.size]
-            at += array.size
+        restore_arrays(self.name, self._state, state)
 
     def close(self) -> None:
         """Nothing is held."""
