@@ -1,0 +1,207 @@
+"""What ROS programs get through a gateway: rates, losses and ages, the way of a command to the joint, moves and homing without end.
+
+    python bench/ros.py [ros2-zenoh] [bare session servo moves cycles] [--output figures.json]
+
+`bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x 288 at 60 Hz; `session`: the same in a session of
+motion controller and MuJoCo, H = 2 ms, in real time. The pictures are noise that nobody draws: what is measured is the gateway. `servo`: from a `servo_jp` to
+the joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable, enable, home. The console is always a process of its own, and its ages are from stamp
+to receipt (one machine, one clock). Times depend on the machine and on who else uses it: its load stands beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any
+
+from ros_figures import cpu_s, host_process
+
+from hub.endpoint import free_endpoint
+from hub.launch import launch
+from hub.scenario_file import load
+from hub.session import Session
+from hub.wire import open_session
+
+HERE = Path(__file__).parent
+ARMS = {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400006"}, "ECM": {"start": ["0 deg", "0 deg", "50 mm", "0 deg"]}}
+STATES = ("PSM1/measured_js", "PSM1/jaw/measured_js", "PSM2/measured_js", "PSM2/jaw/measured_js", "ECM/measured_js")
+PICTURES = ("endoscope/left/image_raw", "endoscope/right/image_raw")
+LISTENED = [[f"/{name}", "sensor_msgs/msg/JointState"] for name in STATES] + [[f"/{name}", "sensor_msgs/msg/Image"] for name in PICTURES]
+GATEWAY = {"arms": ARMS, "mounting": "cart", "publish_period": "4545 us"}
+
+SCENARIO: dict[str, Any] = {
+    "name": "ros_figures",
+    "step": "2 ms",
+    "pace": "realtime",
+    "participants": {
+        "motion": {"kind": "motion", "mounting": "cart", "arms": ARMS, "publish_period": "4 ms"},
+        "robot": {"kind": "mujoco", "mounting": "cart", "arms": ARMS, "looks": False, "publish_period": "10 ms"},
+        "ros": {"kind": "ros2-zenoh", "host": "ros", **GATEWAY},
+    },
+    "order": ["motion", "robot"],
+    "connections": ["ros.* -> motion.*", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*"],
+}
+
+
+class Console:
+    """A ROS program in a process of its own."""
+
+    def __init__(self, kind: str, where: str, python: str, task: str, arguments: dict[str, Any]) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(HERE.parent)}
+        command = [python, str(HERE / "ros_client.py"), kind, where, task, json.dumps(arguments)]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+        _expect(self.process, "ready")
+
+    def go(self) -> None:
+        _tell(self.process)
+
+    def result(self) -> dict[str, Any]:
+        return _answer(self.process)
+
+
+def _expect(process: subprocess.Popen[str], word: str) -> None:
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert line.strip() == word, f"{process.args} said {line!r}"
+
+
+def _tell(process: subprocess.Popen[str]) -> None:
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
+
+
+def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
+    assert process.stdout is not None
+    return json.loads(process.stdout.readline())
+
+
+def bare(kind: str, python: str, seconds: float) -> dict[str, Any]:
+    """Measure a gateway alone."""
+    endpoint = free_endpoint(range(1))
+    with open_session("router", listen=[endpoint]):
+        command = [sys.executable, str(HERE / "ros_bare.py"), kind, endpoint, json.dumps(GATEWAY), str(seconds + 4.0)]
+        gateway = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE.parent)})
+        _expect(gateway, "ready")
+        console = Console(kind, endpoint, python, "listen", {"topics": LISTENED, "seconds": seconds})
+        _tell(gateway)
+        console.go()
+        cost = _answer(gateway)
+        console.go()
+        heard = console.result()
+        _tell(gateway)
+        gateway.wait(10.0)
+    received, told = heard.pop("received"), cost["told"]
+    lost = {topic: told[topic] - received[topic] for topic, _ in LISTENED}
+    return {"gateway_cpu_percent": cost["cpu_percent"], "lost_of_all": lost, "topics": heard, **_machine()}
+
+
+def in_session(kind: str, python: str, task: str, arguments: dict[str, Any], connections: list[str], parts: dict[str, Any]) -> dict[str, Any]:
+    """Run a session, and in it a console with its task."""
+    scenario = json.loads(json.dumps(SCENARIO))
+    scenario["participants"]["ros"]["kind"] = kind
+    scenario["participants"] |= parts
+    scenario["order"] += [name for name in parts if "host" not in parts[name]]
+    scenario["connections"] += connections
+    with tempfile.TemporaryDirectory() as directory:
+        file = Path(directory, "ros.yaml")
+        file.write_text(json.dumps(scenario))
+        session = launch(load(str(file)), endpoint=free_endpoint(range(1)))
+        result: dict[str, Any] = {}
+        thread = Thread(target=_beside, args=(session, result, lambda: Console(kind, session.endpoint, python, task, arguments)))
+        thread.start()
+        summary = session.run()
+        thread.join()
+    result |= {"real_time_factor": round(summary.real_time_factor, 4), "steps": summary.steps, "late_steps": summary.late_steps}
+    way = summary.latency["state to force"]
+    result["hub_to_gateway_ms"] = {name.partition(" -> ")[2]: [round(1e3 * row[p], 2) for p in ("p50_s", "p99_s")] for name, row in way.items() if "js" in name or "image" in name}
+    return result | _machine()
+
+
+def _beside(session: Session, result: dict[str, Any], console: Callable[[], Console]) -> None:
+    """Let a console do its task while a session runs, and end the session."""
+    try:
+        sleep(6.0)  # hosts start
+        program = console()
+        gateway = host_process("ros")
+        program.go()
+        program.go()  # ends what it listens to as soon as its time is over
+        before, begun = (cpu_s(), cpu_s(gateway)), monotonic()
+        result |= program.result()
+        seconds = monotonic() - begun
+        result["hub_cpu_percent"], result["gateway_cpu_percent"] = (
+            round(100 * (after - one) / seconds, 1) for one, after in zip(before, (cpu_s(), cpu_s(gateway)), strict=True)
+        )
+    finally:
+        session.state.shutdown()
+
+
+def _machine() -> dict[str, Any]:
+    return {"load": Path("/proc/loadavg").read_text().split()[0], "cores": os.cpu_count()}
+
+
+def session(kind: str, python: str, seconds: float, *, everything: bool = False) -> dict[str, Any]:
+    """Measure rates, losses and ages in a session; `everything`: all states of the arms are published beside, not their joints alone."""
+    parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
+    states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
+    connections = [*states, *(f"camera.{eye}/image_raw -> ros.endoscope/{eye}/image_raw" for eye in ("left", "right"))]
+    result = in_session(kind, python, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts)
+    del result["received"]
+    return result
+
+
+def servo(kind: str, python: str, count: int) -> dict[str, Any]:
+    """Measure the way of `servo_jp` to the joint."""
+    with tempfile.TemporaryDirectory() as directory:
+        output = Path(directory, "times.json")
+        parts = {"watch": {"kind": "ros_parts:Stopwatch", "output": str(output)}}
+        watched = ["ros.PSM1/servo_jp -> watch.servo_jp", "motion.drive/PSM1/servo_jp -> watch.setpoint", "robot.PSM1/measured_js -> watch.measured"]
+        result = in_session(kind, python, "servo", {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*", *watched], parts)
+        from ros_client import percentiles
+
+        return {f"in_session_{name}": percentiles(times) for name, times in json.loads(output.read_text()).items()} | result
+
+
+def endless(kind: str, python: str, task: str, count: int) -> dict[str, Any]:
+    """Count hangs and missed edges."""
+    return in_session(kind, python, task, {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*"], {})
+
+
+def main() -> None:
+    """Measure what is asked for, and print or write the result."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    measures: dict[str, Callable[[argparse.Namespace], dict[str, Any]]] = {
+        "bare": lambda a: bare(a.kind, a.python, a.seconds),
+        "session": lambda a: session(a.kind, a.python, a.seconds),
+        "face": lambda a: session(a.kind, a.python, a.seconds, everything=True),
+        "servo": lambda a: servo(a.kind, a.python, a.pulses),
+        "moves": lambda a: endless(a.kind, a.python, "moves", a.moves),
+        "cycles": lambda a: endless(a.kind, a.python, "cycles", a.cycles),
+    }
+    parser.add_argument("kind", nargs="?", default="ros2-zenoh")
+    parser.add_argument("what", nargs="*", choices=[[], *measures], help="all by default; `face`: as `session`, with all states published")
+    parser.add_argument("--python", default=sys.executable, help="the interpreter that has the console's client library")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--pulses", type=int, default=100)
+    parser.add_argument("--moves", type=int, default=1000)
+    parser.add_argument("--cycles", type=int, default=200)
+    parser.add_argument("--output", type=Path, help="also write the JSON to this file")
+    arguments = parser.parse_args()
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+    figures = {name: measures[name](arguments) for name in arguments.what or measures}
+    text = json.dumps({arguments.kind: figures}, indent=2)
+    if arguments.output:
+        arguments.output.write_text(text + "\n")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
