@@ -33,7 +33,12 @@ step: 2 ms
 duration: {duration}
 pace: {pace}
 participants:
-  motion: &arms {{kind: motion, mounting: cart, publish_period: 10 ms, power_time: 20 ms, arms: &psm {{PSM1: {{instrument: "400006", start: [0, 0, 120 mm, 0, 0, 0]}}}}}}
+  motion:
+    kind: motion
+    mounting: cart
+    publish_period: 10 ms
+    power_time: 20 ms
+    arms: &psm {{PSM1: {{instrument: "400006", start: [0, 0, 120 mm, 0, 0, 0]}}}}
   robot: {{kind: mujoco, mounting: cart, publish_period: 10 ms, looks: false, arms: *psm}}
   ros: {device}
 order: [motion, robot]
