@@ -9,6 +9,7 @@ jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst). All eve
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import get_args
 
 from devices.ros.params import GatewayParams, Real
@@ -115,7 +116,7 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         Row("/joint_states", _JOINT_STATE, "publish", periodic=True),
         Row("/robot_description", _STRING, "publish", latched=True),
     )
-    return tuple(_named(row, params.namespace) for row in rows) + tuple(row for name in params.listen for row in _listened(name))
+    return tuple(_named(row, params.namespace) for row in rows) + tuple(replace(row, is_real=True) for name in params.listen for row in _listened(name))
 
 
 def _reference(arm: CartArm, params: GatewayParams) -> str:

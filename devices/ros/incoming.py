@@ -43,9 +43,12 @@ class Incoming:
         """Stamps of the newest state commands."""
         self._allowance, self._counted_ns = float(_BURST), monotonic_ns()
 
-    def take(self, payload: bytes, client: str) -> None:
+    def take(self, payload: bytes, client: str, /, *, kept: bool = False) -> None:
         """Hand on a message, or refuse it."""
         self._count.messages += 1
+        if kept and not self._row.is_real:
+            self._refuse("warning", f"kept by {client} from before it was connected: if it is meant, give it again")
+            return
         if not self._has_allowance():
             self._refuse("warning", f"more than {_MOST_PER_S} messages per second from {client}: those beyond are not heeded")
             return
