@@ -1,8 +1,10 @@
 """Bags both ways: a session that a program has driven becomes a bag with ROS names, and the bag drives a new session, to the same bits."""
 
 import json
+import subprocess
 import threading
 import time
+from base64 import b64encode
 
 import numpy as np
 import pytest
@@ -21,8 +23,11 @@ from hub.verify import verify
 from schemas.codec import message_type, validated
 from schemas.errors import RecordingError
 from schemas.vectors import VectorCodec
+from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.test_zenoh_gateway import JOINTS, STATE_TYPE, joints, until
 from tests.devices.ros.zenoh_peer import TYPES, Peer, built
+
+__all__ = ["rclpy_python"]
 
 pytest.importorskip("mujoco")
 pytest.importorskip("ruckig")
@@ -182,6 +187,31 @@ def test_the_command_writes_it(driven, tmp_path):
     assert (out["gateway"], out["bag"]) == ("ros", str(tmp_path / "bag"))
     with AnyReader([tmp_path / "bag"]) as reader:
         assert (reader.message_count, len(reader.connections)) == (out["messages"], out["topics"])
+
+
+READER = """
+import json, sys
+from base64 import b64decode
+from importlib import import_module
+from rclpy.serialization import deserialize_message
+
+for line in sys.stdin:
+    name, payload = json.loads(line)
+    package, kind, type_ = name.split("/")
+    message = deserialize_message(b64decode(payload), getattr(import_module(f"{package}.{kind}"), type_))
+    print(json.dumps(list(message.position) if type_ == "JointState" else message.state if type_ == "OperatingState" else None))
+"""
+
+
+def test_ros_reads_it(bag, rclpy_python):
+    """Every message, by the type support that `ros2 bag play` and its listeners have."""
+    with AnyReader([bag]) as reader:
+        told = [(c.msgtype, payload, reader.deserialize(payload, c.msgtype)) for c, _, payload in reader.messages()]
+    lines = "".join(json.dumps((type_, b64encode(payload).decode())) + "\n" for type_, payload, _ in told)
+    read = subprocess.run([rclpy_python, "-c", READER], input=lines, capture_output=True, text=True, timeout=60, check=False)
+    assert read.returncode == 0, read.stderr
+    said = [m.position.tolist() if type_ == JOINTS else m.state if type_ == STATE_TYPE else None for type_, _, m in told]
+    assert [json.loads(line) for line in read.stdout.splitlines()] == said
 
 
 def test_what_cannot_be_written_is_said(driven, bag, tmp_path):
