@@ -77,7 +77,8 @@ def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
     kinds = {member.name: registry.load(member.kind) for member in plan.members.values() if member.role == "device"}
     there = [device for device, kind in kinds.items() if issubclass(kind, Gateway)]
     if name is None and len(there) != 1:
-        found = f"{len(there)} gateways to ROS ({', '.join(there)}): say which by --gateway" if there else "no gateway to ROS, which says what its topics are"
+        none = "no gateway to ROS, which would say what its topics are: put one into the scenario, with `motion.* -> ros.*`, and record again"
+        found = f"{len(there)} gateways to ROS ({', '.join(there)}): say which by --gateway" if there else none
         raise RecordingError(f"session '{recording.session()}' in '{recording.file}' has {found}")
     if name is not None and name not in there:
         raise RecordingError(f"session '{recording.session()}' in '{recording.file}' has no gateway '{name}'.{did_you_mean(name, there)}")
