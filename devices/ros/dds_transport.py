@@ -7,6 +7,7 @@ type) and ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (enclave of a
 from __future__ import annotations
 
 import logging
+
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
