@@ -7,7 +7,7 @@ import socket
 import threading
 from collections.abc import Iterable
 from functools import partial
-from time import monotonic
+from time import monotonic, time_ns
 
 from devices.ros.ros1_api import Program
 from devices.ros.ros1_connection import Connection, Fields, Incoming, header_frame
@@ -24,8 +24,8 @@ log = logging.getLogger(__name__)
 _CONNECT_S = 2.0
 _SOONEST_S, _LATEST_S = 0.5, 30.0
 """How long it takes until a connection that failed is tried again, at first and at last; rospy has the same."""
-_KEPT_S = 0.1
-"""What a publisher has kept for those who come later follows its header at once; what comes later than this is meant now."""
+_KEPT_S = 0.05
+"""What a publisher has kept for those who come later follows its header at once, within a few milliseconds; what comes later than this is meant now."""
 _NO_MESSAGE = b"\xff\xff"
 """Stands before bytes that could not be made CDR, which it cannot begin with."""
 
@@ -53,13 +53,13 @@ class Subscription:
         if fields.get("md5sum", "*") not in (self._md5, "*"):
             raise MessageError(f"{self.topic} has MD5 {self._md5}, not {fields['md5sum']}: its messages are of another version")
 
-    def hear(self, message: bytes, program: str, *, kept: bool) -> None:
+    def hear(self, message: bytes, program: str, *, linked_ns: int) -> None:
         """Hand on a message as CDR, or as bytes that are none."""
         try:
             cdr = self._wire.cdr(message)
         except MessageError:
             cdr = _NO_MESSAGE + message
-        self._take(cdr, program, kept=kept)
+        self._take(cdr, program, linked_ns=linked_ns)
 
 
 class _Link:
@@ -83,14 +83,14 @@ class _Link:
         """Take the header of the publisher."""
         self.subscription.check(fields)
         self.delay = 0.0
-        kept_until = monotonic() + _KEPT_S if self.there_before and fields.get("latching") == "1" else 0.0
+        keeps = self.there_before and fields.get("latching") == "1"
         self.there_before = True  # when it is made again, what was kept has been heard
-        first = True
+        kept_until, linked_ns = monotonic() + _KEPT_S, time_ns()
 
         def heard(message: bytes) -> None:
-            nonlocal first
-            kept, first = first and monotonic() < kept_until, False
-            self.subscription.hear(message, connection.program, kept=kept)
+            nonlocal keeps
+            maybe_kept, keeps = keeps and monotonic() < kept_until, False
+            self.subscription.hear(message, connection.program, linked_ns=linked_ns if maybe_kept else 0)
 
         return heard
 

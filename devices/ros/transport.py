@@ -21,8 +21,11 @@ Publisher = Callable[[bytes], None]
 class Taker(Protocol):
     """Takes messages of one topic. Never raises, never blocks; may be called from any thread."""
 
-    def __call__(self, payload: bytes, client: str, /, *, kept: bool = False) -> None:
-        """Take one message (CDR) and the name of the client that sent it; `kept`: it was sent before the client was connected, and kept for who comes later."""
+    def __call__(self, payload: bytes, client: str, /, *, linked_ns: int = 0) -> None:
+        """Take one message (CDR) and the name of the client that sent it.
+
+        `linked_ns`: wall time at which the client was connected, where this may be a message from before that the client has kept; else 0.
+        """
         ...
 
 

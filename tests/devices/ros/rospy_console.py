@@ -1,7 +1,7 @@
 """A ROS 1 program on real rospy that shares nothing with the gateway; run by the Python that has rospy, not by ours.
 
-As a program it takes orders from standard input, one JSON list a line, and answers each with a line: `["answer", ...]` or `["error", "why"]`. As a module it has
-`Arm`, a client of CRTK as crtk_python_client is one (written from its behaviour), for whoever measures with it.
+As a program it takes orders from standard input, one JSON list a line, and answers each with a line: `["answer", ...]` or `["error", "why"]`. As a module
+it has `Arm`, a client of CRTK as crtk_python_client is one (written from its behaviour), for whoever measures with it.
 """
 
 import json
@@ -102,6 +102,11 @@ def filled(message, fields):
         else:
             setattr(message, name, bytes(given) if isinstance(now, bytes) else given)
     return message
+
+
+def raw(kind, octets):
+    """Return what rospy takes for a message of a kind and sends as these bytes."""
+    return type("Raw", (kind,), {"serialize": lambda self, buffer: buffer.write(bytes(octets))})()
 
 
 class Arm:
@@ -220,9 +225,7 @@ class Console:
     def raw(self, topic, octets):
         """Publish bytes as they are."""
         publisher = self.publishers[topic]
-        message = publisher.data_class()
-        message.serialize = lambda buffer: buffer.write(bytes(octets))
-        publisher.publish(message)
+        publisher.publish(raw(publisher.data_class, octets))
 
     def heard(self, topic, seconds):
         try:
@@ -239,6 +242,9 @@ class Console:
         heard = self.heard_of[topic]
         return [heard.get().header.seq for _ in range(heard.qsize())]
 
+    def checksums(self, types):
+        return [(service_class if "/srv/" in type_ else message_class)(type_)._md5sum for type_ in types]
+
     def call(self, topic, fields):
         service = self.services[topic]
         return flat(service(filled(service.request_class(), fields)))
@@ -246,10 +252,8 @@ class Console:
     def refused_call(self, topic, octets):
         """Return what is said to a request of these bytes."""
         service = self.services[topic]
-        request = service.request_class()
-        request.serialize = lambda buffer: buffer.write(bytes(octets))
         try:
-            service(request)
+            service(raw(service.request_class, octets))
         except rospy.ServiceException as error:
             return str(error)
         return ""
