@@ -122,7 +122,9 @@ def in_session(kind: str, python: str, task: str, arguments: dict[str, Any], con
         thread.join()
     result |= {"real_time_factor": round(summary.real_time_factor, 4), "steps": summary.steps, "late_steps": summary.late_steps}
     way = summary.latency["state to force"]
-    result["hub_to_gateway_ms"] = {name.partition(" -> ")[2]: [round(1e3 * row[p], 2) for p in ("p50_s", "p99_s")] for name, row in way.items() if "js" in name or "image" in name}
+    result["hub_to_gateway_ms"] = {
+        name.partition(" -> ")[2]: [round(1e3 * row[p], 2) for p in ("p50_s", "p99_s")] for name, row in way.items() if "js" in name or "image" in name
+    }
     return result | _machine()
 
 

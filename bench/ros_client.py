@@ -158,9 +158,7 @@ def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
                     stamped[topic].append(arm.joints[topic][2] - sent_ns)
                 else:
                     never += 1
-    return {"never_seen": never} | {
-        f"to_{topic}": {"at_console": percentiles(times[topic]), "as_stamped": percentiles(stamped[topic])} for topic in times
-    }
+    return {"never_seen": never} | {f"to_{topic}": {"at_console": percentiles(times[topic]), "as_stamped": percentiles(stamped[topic])} for topic in times}
 
 
 def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:

@@ -5,10 +5,8 @@ It runs in whatever environment has that library, so nothing but the standard li
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable
-from time import monotonic, sleep, time_ns
+from time import time_ns
 from typing import Any
 
 Take = Callable[[Any, "int | None"], None]

@@ -29,11 +29,11 @@ class Pictures(Stepped):
 
     ports = tuple(Port(name=f"{eye}/image_raw", causality="output", type=Image.ros_type, variability="event") for eye in EYES)
 
-    def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
+    def configure(self, setup: Setup) -> Outputs:
         self._pictures, self._count = [picture(number) for number in range(8)], np.zeros(1)
         return {port.name: () for port in self.ports}
 
-    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         self._count += 1
         return {port.name: (self._pictures[int(self._count[0]) % 8],) for port in self.ports}
 
@@ -61,13 +61,13 @@ class Stopwatch(Stepped):
         Port(name="measured", causality="input", type=JointState.ros_type, size=6, fields=("position", "velocity", "effort")),
     )
 
-    def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
+    def configure(self, setup: Setup) -> Outputs:
         self._sent_ns: int | None = None
         self._before = self._now = np.zeros(2)
         self._times: dict[str, list[int]] = {"heeded": [], "moving": []}
         return {}
 
-    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         now_ns, before = time_ns(), self._now
         self._now = np.array([inputs["setpoint"][0], inputs["measured"][0]])
         for message in inputs.events("servo_jp"):

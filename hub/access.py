@@ -76,8 +76,9 @@ def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
     """Return the rights of one remote participant."""
     name, role, hub = member.name, member.key_role, keys.alive("hub", "hub")
     links = [keys.output("engine", link.source, link.source_port) for link in plan.links if link.target == name]
-    outlets = [keys.feed(outlet.source, outlet.source_port) for outlet in plan.outlets if outlet.device == name]
-    heard = list(dict.fromkeys(links + outlets))
+    outlets = [outlet for outlet in plan.outlets if outlet.device == name]
+    feeds = [keys.feed(outlet.source, outlet.source_port) for outlet in outlets] + [keys.signals(outlet.source, name) for outlet in outlets]
+    heard = list(dict.fromkeys(links + feeds))
     listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]  # as the hub does, to all participants at once
     return [
         _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),

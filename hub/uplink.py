@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
@@ -12,6 +13,7 @@ import zenoh
 from pydantic import ValidationError
 from zenoh.handlers import Callback
 
+from hub.bundle import bundled, unpacked
 from hub.cells import INITIAL
 from hub.clock_offset import ClockOffset
 from hub.device_loop import DeviceLoop
@@ -57,22 +59,41 @@ class DeviceUplink:
         self._publishers = {port.name: _publisher(session, run.keys.output("device", member.name, port.name), port) for port in outputs}
         self._lines = {port.name: self._link.line(port) for port in outputs}
         self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR)
-        outlets = [outlet for outlet in run.plan.outlets if outlet.device == member.name]
-        self._inflows = [_Inflow(outlet, run, self._link, loop, drops, self._latencies, offset) for outlet in outlets]
-        self._arrived: SimpleQueue[tuple[_Inflow, zenoh.Sample] | None] = SimpleQueue()
+        self._inflows: list[_Inflow] = []
+        self._arrived: SimpleQueue[tuple[_Feed, zenoh.Sample] | None] = SimpleQueue()
         self._taker = Thread(target=self._take, name=f"inflow {member.name}", daemon=True)
         self._taker.start()
-        self._subscribers = [session.declare_subscriber(inflow.key, Callback(partial(self._put, inflow), indirect=False)) for inflow in self._inflows]
+        self._subscribers = [session.declare_subscriber(feed.key, Callback(partial(self._put, feed), indirect=False)) for feed in self._feeds()]
         self._subscribers.append(session.declare_subscriber(run.keys.link(member.name), Callback(self._relink, indirect=True)))
 
-    def _put(self, inflow: _Inflow, sample: zenoh.Sample) -> None:
-        self._arrived.put((inflow, sample))
+    def _feeds(self) -> Iterator[_Feed]:
+        """Yield what is to be listened to: the bundle of each participant's signals, and each event port."""
+        plan, keys, name = self._run.plan, self._run.keys, self._member.name
+        outlets = [outlet for outlet in plan.outlets if outlet.device == name]
+        for source in dict.fromkeys(outlet.source for outlet in outlets):
+            signals = bundled(plan, source, name)
+            if signals:
+                yield _Feed(keys.signals(source, name), [self._inflow(outlet) for outlet in signals], whole=False)
+            for outlet in outlets:
+                if outlet.source == source and outlet not in signals:
+                    yield _Feed(keys.feed(source, outlet.source_port), [self._inflow(outlet)], whole=True)
+
+    def _inflow(self, outlet: Outlet) -> _Inflow:
+        inflow = _Inflow(outlet, self._run, self._link, self._loop, self._drops, self._latencies, self._offset)
+        self._inflows.append(inflow)
+        return inflow
+
+    def _put(self, feed: _Feed, sample: zenoh.Sample) -> None:
+        self._arrived.put((feed, sample))
 
     def _take(self) -> None:
         """Take what arrives, all in one thread: with one for each of a hundred ports the simulation would wait for every one of them in turn."""
         while (arrived := self._arrived.get()) is not None:
-            inflow, sample = arrived
-            inflow.take(sample)
+            feed, sample = arrived
+            try:
+                feed.take(sample, self._run.number)
+            except MessageError as error:
+                self._drops.count(sample, error)
 
     def exchange(self, t: int, samples: list[Sample]) -> None:
         """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link."""
@@ -129,31 +150,44 @@ def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
     return session.declare_publisher(key, encoding=zenoh.Encoding.APPLICATION_CDR, priority=urgency, congestion_control=choked, express=True)
 
 
+@dataclass(frozen=True)
+class _Feed:
+    """What comes under one key."""
+
+    key: str
+    inflows: Sequence[_Inflow]
+    whole: bool
+    """Whether a message is the value of the only inflow; otherwise it is a bundle."""
+
+    def take(self, sample: zenoh.Sample, run: int) -> None:
+        """Hand on what a message holds. Raises MessageError if it is none of this run, or no value."""
+        tag = Tag.of(sample)
+        if tag.run != run:
+            raise MessageError(f"belongs to run {tag.run:x}, this is run {run:x}")
+        if not tag.count:  # no events in this step
+            return
+        payload = sample.payload.to_bytes()
+        for index, value in [(0, payload)] if self.whole else unpacked(payload):
+            if index >= len(self.inflows):
+                raise MessageError(f"a bundle has value {index} of {len(self.inflows)}")
+            self.inflows[index].take(tag, value)
+
+
 class _Inflow:
     """What one connection brings to the device."""
 
     def __init__(self, outlet: Outlet, run: Run, link: Link, loop: DeviceLoop, drops: Drops, latencies: Latencies, offset: ClockOffset | None) -> None:
         source, target = run.plan.members[outlet.source], run.plan.members[outlet.device].port(outlet.device_port)
-        self.key = run.keys.feed(outlet.source, outlet.source_port)
         self._codec = PortCodec(source.port(outlet.source_port).model_copy(update={"variability": target.variability}))
         self._port, self._stream = target.name, f"{outlet.source}.{outlet.source_port} -> {outlet.device}.{target.name}"
-        self._run, self._link, self._loop, self._drops, self._latencies, self._offset = run, link, loop, drops, latencies, offset
+        self._link, self._loop, self._drops, self._latencies, self._offset = link, loop, drops, latencies, offset
         self._line: Line = link.line(target)
         self._timed = not source.host.startswith("remote/")  # the clock of a third machine is nobody's here
         self._newest = (INITIAL - 1, 0)
 
-    def take(self, sample: zenoh.Sample) -> None:
-        """Take a value as it comes from the wire."""
-        try:
-            tag = Tag.of(sample)
-            if tag.run != self._run.number:
-                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run.number:x}")
-            if not tag.count:  # no events in this step
-                return
-            value = self._codec.decode(sample.payload.to_bytes())
-        except MessageError as error:
-            self._drops.count(sample, error)
-            return
+    def take(self, tag: Tag, payload: bytes) -> None:
+        """Take a value as it comes from the wire. Raises MessageError if it is none."""
+        value = self._codec.decode(payload)
         if self._link.idle:
             self._write(tag, value)
         else:
@@ -167,13 +201,13 @@ class _Inflow:
     def _write(self, tag: Tag, value: Value) -> None:
         if (tag.step, tag.index) <= self._newest:
             if tag.step > INITIAL:  # the value at time 0 is repeated until every host has it
-                self._drops.refuse(self.key, f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here before it")
+                self._drops.refuse(self._stream, f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here before it")
             return
         self._newest = tag.step, tag.index
         try:
             self._loop.write(self._port, value)
         except MessageError as error:
-            self._drops.refuse(self.key, error)
+            self._drops.refuse(self._stream, error)
             return
         now_ns = monotonic_ns()
         best = None if self._offset is None else self._offset.best(now_ns)
