@@ -94,7 +94,7 @@ class Connection:
         if not self._closed:
             self._loop.watch(self._socket, self, writing=writing)
 
-    def send(self, frame: bytes) -> None:
+    def send(self, frame: bytes | bytearray) -> None:
         """Send, or keep until there is room; from any thread."""
         with self._writing:
             if self._closed:

@@ -34,7 +34,7 @@ class Publication:
         }
         self._keep = _STATES_KEPT if row.periodic or row.type in _PICTURES else _EVENTS_KEPT
         self._readers: list[Connection] = []
-        self._last: bytes | None = None
+        self._last: bytearray | None = None
         self._count = 0
         self._publishing = threading.Lock()
 

@@ -76,16 +76,16 @@ class Wire:
         fields = self._store.fielddefs[type_][1]
         self._counted = bool(fields) and fields[0][1][1] == _HEADER
 
-    def frame(self, cdr: bytes, count: int) -> bytes:
+    def frame(self, cdr: bytes, count: int) -> bytearray:
         """Return the frame of a message of ours; `count` goes into its header, if it has one, as the publishers of ROS 1 do it."""
-        message = self._store.cdr_to_ros1(cdr, self._type)
+        message = self._store.cdr_to_ros1(memoryview(cdr), self._type)
         frame = bytearray(_LENGTH.size + len(message))
         frame[_LENGTH.size :] = message
         if self._counted:
             _LENGTH_AND_COUNT.pack_into(frame, 0, len(message), count & 0xFFFFFFFF)
         else:
             _LENGTH.pack_into(frame, 0, len(message))
-        return bytes(frame)
+        return frame
 
     def cdr(self, message: bytes) -> bytes:
         """Return a message of ROS 1, without its length, as CDR. Raises MessageError if the bytes are no such message."""
