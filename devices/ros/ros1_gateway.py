@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import socket
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlsplit
 
-from pydantic import Field, IPvAnyAddress
+from pydantic import Field, field_validator
 
 from devices.ros.gateway import Gateway
 from devices.ros.params import GatewayParams
@@ -27,11 +28,18 @@ class Ros1Params(GatewayParams):
     master: Annotated[str, Field(pattern=r"^http://[^/:\s]+:\d+/?$")] | None = Field(
         default=None, description=f"address of the ROS master; by default ROS_MASTER_URI of the gateway's environment, or {_MASTER}"
     )
-    ip: IPvAnyAddress | None = Field(
+    ip: IPv4Address | None = Field(
         default=None,
         description="address of this machine at which programs reach the gateway, which listens there only; by default that from which the master is reached: "
         "127.0.0.1 for one on this machine. ROS 1 asks nobody who he is: whoever reaches another address than 127.0.0.1 may command the arms",
     )
+
+    @field_validator("ip")
+    @classmethod
+    def _reachable(cls, ip: IPv4Address | None) -> IPv4Address | None:
+        if ip is not None and ip.is_unspecified:
+            raise ValueError(f"{ip} is no address that a program could connect to; expected that of one of this machine's networks")
+        return ip
 
 
 class Ros1Gateway(Gateway):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import socket
+import sys
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -17,6 +18,7 @@ log = logging.getLogger(__name__)
 _BACKLOG = 512
 """Connections that may come at once: a console that wants all topics makes several hundred."""
 _PAUSE_S = 1.0
+_FILES = 16384
 
 
 class Listener:
@@ -24,6 +26,7 @@ class Listener:
 
     def __init__(self, loop: Loop, host: str, came: Callable[[socket.socket], None]) -> None:
         """Take the address to listen at, and what takes each connection."""
+        _allow_many()
         self._loop, self._came = loop, came
         self._socket = socket.create_server((host, 0), backlog=_BACKLOG)
         self._socket.setblocking(False)
@@ -58,3 +61,13 @@ class Listener:
         """Listen no more; in the loop's thread."""
         self._loop.forget(self._socket)
         self._socket.close()
+
+
+def _allow_many() -> None:
+    """Let this process open as many files as the system grants it, within reason: in ROS 1 each topic of each program is one."""
+    if sys.platform != "win32":
+        import resource
+
+        allowed, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = _FILES if most == resource.RLIM_INFINITY else min(most, _FILES)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(allowed, wanted), most))

@@ -18,6 +18,9 @@ log = logging.getLogger(__name__)
 _LOOK_S = 1.0
 """How often it is looked whether the master still knows us: programs of ROS 1 do not register again by themselves, and find nobody after a restart."""
 
+_AT_ONCE = 100
+"""Things told in one call: a master is to answer within seconds."""
+
 
 @dataclass(frozen=True)
 class Thing:
@@ -81,18 +84,16 @@ class Registration:
         elif there.value != self._uri:
             self._known = 0
             self._yield(str(there.value))
-        fresh = self._things[self._known :]
-        if not fresh:
-            return
-        answers = self._master.call_all([thing.registering(self._uri) for thing in fresh])
-        for thing, answer in zip(fresh, answers, strict=True):
-            if answer.code != 1:
-                raise DeviceError(f"{self._master.uri} does not take {thing.kind.lower()} '{thing.name}': {answer.word}")
-            if thing.told is not None:
-                thing.told(answer.value)
-        if self._known == 0:
-            log.info("ROS 1: '%s' is known to the master at %s", self._node, self._master.uri)
-        self._known += len(fresh)
+        if self._things and not self._known:
+            log.info("ROS 1: '%s' makes itself known to the master at %s", self._node, self._master.uri)
+        while fresh := self._things[self._known : self._known + _AT_ONCE]:
+            answers = self._master.call_all([thing.registering(self._uri) for thing in fresh])
+            for thing, answer in zip(fresh, answers, strict=True):
+                if answer.code != 1:
+                    raise DeviceError(f"{self._master.uri} does not take {thing.kind.lower()} '{thing.name}': {answer.word}")
+                if thing.told is not None:
+                    thing.told(answer.value)
+            self._known += len(fresh)
 
     def _yield(self, uri: str) -> None:
         """Leave its name to another node that lives: a master has the elder of two of one name shut down. Raises DeviceError if there is one."""

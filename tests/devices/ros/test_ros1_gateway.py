@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import time
+import xmlrpc.client
 from contextlib import contextmanager
 
 import numpy as np
@@ -15,6 +16,7 @@ from schemas.crtk import OperatingState
 from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
 from tests.devices.ros.rospy_peer import Program, TablePeer, master, needs_rospy, until
+from tests.hub.authorities import free_port
 
 pytestmark = needs_rospy
 
@@ -249,6 +251,18 @@ def test_two_gateways_of_one_name(ros, psm, tmp_path, console, caplog):
         assert console.wait_for_peers(f"/other{COMMAND}")
         console.send(f"/other{COMMAND}", joints())
         assert came_in(other, COMMAND)
+
+
+def test_the_place_of_one_that_was_killed_is_taken(ros, tmp_path, console, caplog):
+    with xmlrpc.client.ServerProxy(ros.uri) as known:
+        assert known.registerPublisher("/trocar_ros", STATE, JOINTS.replace("/msg", ""), f"http://127.0.0.1:{free_port()}/")[0] == 1
+        console.listen(STATE, JOINTS)
+        with showing(ros, tmp_path, **ARM) as psm:
+            assert until(lambda: clients(psm) == ["/console"])
+            psm.write(STATE[1:], np.zeros(18))
+            assert console.heard(STATE, 5.0)
+        assert "another program" not in caplog.text
+        assert known.lookupNode("/test", "/trocar_ros")[0] != 1, "at its end it is not known any more"
 
 
 def test_a_master_that_comes_later_and_one_that_starts_again(tmp_path, caplog):

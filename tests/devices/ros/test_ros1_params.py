@@ -57,7 +57,7 @@ def test_addresses_that_cannot_be_are_told(tmp_path, params, words):
         it.open(tmp_path)
 
 
-@pytest.mark.parametrize("params", [{"master": "127.0.0.1:11311"}, {"master": "http://here"}, {"ip": "here"}])
+@pytest.mark.parametrize("params", [{"master": "127.0.0.1:11311"}, {"master": "http://here"}, {"ip": "here"}, {"ip": "0.0.0.0"}, {"ip": "::1"}])
 def test_addresses_that_are_none_are_refused(params):
     with pytest.raises(ValidationError):
         gateway(**params)
