@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import socket
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Literal
 from weakref import WeakValueDictionary
 from xml.sax.saxutils import quoteattr
@@ -16,11 +19,19 @@ __all__ = ["Discovery", "configuration", "domain"]
 
 Discovery = Literal["localhost", "subnet"]
 
-_MOST_PROGRAMS = 32
-"""Participants on one machine that are looked for where there is no multicast, as in rmw_fastrtps and rmw_cyclonedds."""
+_LOOPBACK_ONLY = '<Interfaces><NetworkInterface name="lo"/></Interfaces><MaxMessageSize>65000B</MaxMessageSize><FragmentSize>64000B</FragmentSize>'
+"""Packets as large as UDP takes, as nothing on the way is smaller."""
 
-_NEVER_WAIT = "<WhcHigh>1GB</WhcHigh><WhcHighInit>1GB</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
-"""Cyclone DDS makes a writer wait for slow readers by how many bytes they owe it; ours keep only the last messages, which is limit enough."""
+_ANNOUNCED = "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><SPDPInterval>1s</SPDPInterval>"
+"""Participants on one machine that are looked for where there is no multicast, as many as rmw_fastrtps and rmw_cyclonedds look for, and how often: a program with
+the default range does not look for others in this way, and waits for that."""
+
+_NEVER_WAIT = (
+    "<Watermarks><WhcHigh>1GB</WhcHigh><WhcHighInit>1GB</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks>"
+    "<WriterLingerDuration>0s</WriterLingerDuration>"
+)
+"""Cyclone DDS makes a writer wait for slow readers by how many bytes they have not acknowledged; ours keep only the last messages, which is limit enough.
+And a writer that is deleted waits for them, one after the other."""
 
 
 class _Settled(Domain):
@@ -43,6 +54,8 @@ def domain(number: int, settings: str) -> Domain:
     if found is None:
         try:
             found = _domains[number] = _Settled(number, settings)
+            if _LOOPBACK_ONLY in settings:
+                _confine(number)
         except DDSException as error:
             raise DeviceError(f"DDS cannot take part in domain {number}: {error.msg}") from error
     return found
@@ -53,14 +66,30 @@ def configuration(discovery: Discovery, peers: Sequence[str]) -> str:
 
     Nothing leaves the loopback interface unless `discovery` or `peers` ask for it.
     """
-    loopback = discovery == "localhost" and not peers
-    interfaces = '<Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces><FragmentSize>64000B</FragmentSize>' if loopback else ""
-    sizes = "<MaxMessageSize>65000B</MaxMessageSize>" if loopback else ""
-    multicast = f"<AllowMulticast>{'true' if discovery == 'subnet' else 'false'}</AllowMulticast>"
+    general = f"<AllowMulticast>{'true' if discovery == 'subnet' else 'false'}</AllowMulticast>"
+    if discovery == "localhost" and not peers:
+        general += _LOOPBACK_ONLY
     sought = [*(["localhost"] if discovery == "localhost" else []), *peers]
     found = f"<Peers>{''.join(f'<Peer address={quoteattr(peer)}/>' for peer in sought)}</Peers>" if sought else ""
-    index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{_MOST_PROGRAMS}</MaxAutoParticipantIndex>"
-    return (
-        f"<CycloneDDS><Domain><General>{interfaces}{multicast}{sizes}</General><Discovery>{index}{found}</Discovery>"
-        f"<Internal><Watermarks>{_NEVER_WAIT}</Watermarks></Internal></Domain></CycloneDDS>"
-    )
+    return f"<CycloneDDS><Domain><General>{general}</General><Discovery>{_ANNOUNCED}{found}</Discovery><Internal>{_NEVER_WAIT}</Internal></Domain></CycloneDDS>"
+
+
+def _confine(number: int) -> None:
+    """Let nothing reach the domain's sockets but what comes over the loopback interface: Cyclone DDS binds them to all, whatever it is told to use.
+
+    Linux only (SO_BINDTODEVICE); elsewhere a firewall has to do it.
+    """
+    ports = range(_FIRST_PORT + number * _PORTS, _FIRST_PORT + (number + 1) * _PORTS)
+    for entry in _OPEN_FILES.iterdir() if _OPEN_FILES.is_dir() else ():
+        try:
+            ours = socket.socket(fileno=os.dup(int(entry.name)))
+        except OSError:  # no socket, or closed meanwhile
+            continue
+        with ours:
+            if ours.family == socket.AF_INET and ours.type == socket.SOCK_DGRAM and ours.getsockname()[1] in ports:
+                ours.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
+
+
+_OPEN_FILES = Path("/proc/self/fd")
+_FIRST_PORT, _PORTS = 7400, 250
+"""UDP ports of a domain: OMG DDSI-RTPS 2.5, 9.6.2.3."""
