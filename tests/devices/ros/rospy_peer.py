@@ -25,7 +25,7 @@ def rospy_python():
     for python, path in ((shutil.which("python3", path="/usr/bin"), ""), (shutil.which("python3", path="/usr/bin"), NOETIC), (sys.executable, "")):
         if python is None:
             continue
-        wanted = "import rospy, rosmaster, roslib.message, sensor_msgs.msg, geometry_msgs.msg, std_msgs.msg"
+        wanted = "import rospy, rosmaster, rostopic, roslib.message, sensor_msgs.msg, geometry_msgs.msg, std_msgs.msg"
         if subprocess.run([python, "-c", wanted], env=environment(path), capture_output=True, timeout=60, check=False).returncode == 0:
             return python, path
     return None
@@ -33,11 +33,11 @@ def rospy_python():
 
 def environment(path, **more):
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "PYTHON"))}
-    return kept | {"PYTHONPATH": path, "ROS_IP": "127.0.0.1"} | more
+    return kept | {"PATH": f"{kept['PATH']}:/opt/ros/noetic/bin", "PYTHONPATH": path, "ROS_IP": "127.0.0.1"} | more
 
 
 needs_rospy = pytest.mark.skipif(
-    rospy_python() is None, reason="needs rospy: apt install python3-rospy python3-rosmaster python3-sensor-msgs python3-geometry-msgs python3-std-msgs"
+    rospy_python() is None, reason="needs rospy: apt install python3-rospy python3-rosmaster python3-rostopic python3-{sensor,geometry,std}-msgs"
 )
 
 
