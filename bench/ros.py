@@ -1,6 +1,6 @@
 """What ROS programs get through a gateway: rates, losses and ages, the way of a command to the joint, moves and homing without end.
 
-    python bench/ros.py [ros2-zenoh] [bare session servo moves cycles] [--output figures.json]
+    python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face servo moves cycles] [--output figures.json]
 
 `bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x 288 at 60 Hz; `session`: the same in a session of
 motion controller and MuJoCo, H = 2 ms, in real time. The pictures are noise that nobody draws: what is measured is the gateway. `servo`: from a `servo_jp` to
@@ -22,7 +22,9 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
+from ros_client import percentiles
 from ros_figures import cpu_s, host_process
+from ros_places import PLACES, Place
 
 from hub.endpoint import free_endpoint
 from hub.launch import launch
@@ -54,9 +56,10 @@ SCENARIO: dict[str, Any] = {
 class Console:
     """A ROS program in a process of its own."""
 
-    def __init__(self, kind: str, where: str, python: str, task: str, arguments: dict[str, Any]) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(HERE.parent)}
-        command = [python, str(HERE / "ros_client.py"), kind, where, task, json.dumps(arguments)]
+    def __init__(self, kind: str, place: Place, endpoint: str, task: str, arguments: dict[str, Any]) -> None:
+        paths = [str(HERE.parent), *filter(None, [place.environment.get("PYTHONPATH")])]
+        environment = place.environment | {"PYTHONPATH": os.pathsep.join(paths)}
+        command = [place.python, HERE / "ros_client.py", kind, endpoint, task, json.dumps(arguments)]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
         _expect(self.process, "ready")
 
@@ -84,14 +87,14 @@ def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
     return json.loads(process.stdout.readline())
 
 
-def bare(kind: str, python: str, seconds: float) -> dict[str, Any]:
+def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
     """Measure a gateway alone."""
     endpoint = free_endpoint(range(1))
     with open_session("router", listen=[endpoint]):
-        command = [sys.executable, str(HERE / "ros_bare.py"), kind, endpoint, json.dumps(GATEWAY), str(seconds + 4.0)]
+        command = [sys.executable, str(HERE / "ros_bare.py"), kind, endpoint, json.dumps(GATEWAY | place.params), str(seconds + 4.0)]
         gateway = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE.parent)})
         _expect(gateway, "ready")
-        console = Console(kind, endpoint, python, "listen", {"topics": LISTENED, "seconds": seconds})
+        console = Console(kind, place, endpoint, "listen", {"topics": LISTENED, "seconds": seconds})
         _tell(gateway)
         console.go()
         cost = _answer(gateway)
@@ -104,10 +107,10 @@ def bare(kind: str, python: str, seconds: float) -> dict[str, Any]:
     return {"gateway_cpu_percent": cost["cpu_percent"], "lost_of_all": lost, "topics": heard, **_machine()}
 
 
-def in_session(kind: str, python: str, task: str, arguments: dict[str, Any], connections: list[str], parts: dict[str, Any]) -> dict[str, Any]:
+def in_session(kind: str, place: Place, task: str, arguments: dict[str, Any], connections: list[str], parts: dict[str, Any]) -> dict[str, Any]:
     """Run a session, and in it a console with its task."""
     scenario = json.loads(json.dumps(SCENARIO))
-    scenario["participants"]["ros"]["kind"] = kind
+    scenario["participants"]["ros"] |= {"kind": kind, **place.params}
     scenario["participants"] |= parts
     scenario["order"] += [name for name in parts if "host" not in parts[name]]
     scenario["connections"] += connections
@@ -116,7 +119,7 @@ def in_session(kind: str, python: str, task: str, arguments: dict[str, Any], con
         file.write_text(json.dumps(scenario))
         session = launch(load(str(file)), endpoint=free_endpoint(range(1)))
         result: dict[str, Any] = {}
-        thread = Thread(target=_beside, args=(session, result, lambda: Console(kind, session.endpoint, python, task, arguments)))
+        thread = Thread(target=_beside, args=(session, result, lambda: Console(kind, place, session.endpoint, task, arguments)))
         thread.start()
         summary = session.run()
         thread.join()
@@ -150,47 +153,44 @@ def _machine() -> dict[str, Any]:
     return {"load": Path("/proc/loadavg").read_text().split()[0], "cores": os.cpu_count()}
 
 
-def session(kind: str, python: str, seconds: float, *, everything: bool = False) -> dict[str, Any]:
+def session(kind: str, place: Place, seconds: float, *, everything: bool = False) -> dict[str, Any]:
     """Measure rates, losses and ages in a session; `everything`: all states of the arms are published beside, not their joints alone."""
     parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
     connections = [*states, *(f"camera.{eye}/image_raw -> ros.endoscope/{eye}/image_raw" for eye in ("left", "right"))]
-    result = in_session(kind, python, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts)
+    result = in_session(kind, place, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts)
     del result["received"]
     return result
 
 
-def servo(kind: str, python: str, count: int) -> dict[str, Any]:
+def servo(kind: str, place: Place, count: int) -> dict[str, Any]:
     """Measure the way of `servo_jp` to the joint."""
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory, "times.json")
         parts = {"watch": {"kind": "ros_parts:Stopwatch", "output": str(output)}}
         watched = ["ros.PSM1/servo_jp -> watch.servo_jp", "motion.drive/PSM1/servo_jp -> watch.setpoint", "robot.PSM1/measured_js -> watch.measured"]
-        result = in_session(kind, python, "servo", {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*", *watched], parts)
-        from ros_client import percentiles
-
+        result = in_session(kind, place, "servo", {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*", *watched], parts)
         return {f"in_session_{name}": percentiles(times) for name, times in json.loads(output.read_text()).items()} | result
 
 
-def endless(kind: str, python: str, task: str, count: int) -> dict[str, Any]:
+def endless(kind: str, place: Place, task: str, count: int) -> dict[str, Any]:
     """Count hangs and missed edges."""
-    return in_session(kind, python, task, {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*"], {})
+    return in_session(kind, place, task, {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*"], {})
 
 
 def main() -> None:
     """Measure what is asked for, and print or write the result."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    measures: dict[str, Callable[[argparse.Namespace], dict[str, Any]]] = {
-        "bare": lambda a: bare(a.kind, a.python, a.seconds),
-        "session": lambda a: session(a.kind, a.python, a.seconds),
-        "face": lambda a: session(a.kind, a.python, a.seconds, everything=True),
-        "servo": lambda a: servo(a.kind, a.python, a.pulses),
-        "moves": lambda a: endless(a.kind, a.python, "moves", a.moves),
-        "cycles": lambda a: endless(a.kind, a.python, "cycles", a.cycles),
+    measures: dict[str, Callable[[str, Place, argparse.Namespace], dict[str, Any]]] = {
+        "bare": lambda kind, place, a: bare(kind, place, a.seconds),
+        "session": lambda kind, place, a: session(kind, place, a.seconds),
+        "face": lambda kind, place, a: session(kind, place, a.seconds, everything=True),
+        "servo": lambda kind, place, a: servo(kind, place, a.pulses),
+        "moves": lambda kind, place, a: endless(kind, place, "moves", a.moves),
+        "cycles": lambda kind, place, a: endless(kind, place, "cycles", a.cycles),
     }
-    parser.add_argument("kind", nargs="?", default="ros2-zenoh")
+    parser.add_argument("kind", choices=PLACES)
     parser.add_argument("what", nargs="*", choices=[[], *measures], help="all by default; `face`: as `session`, with all states published")
-    parser.add_argument("--python", default=sys.executable, help="the interpreter that has the console's client library")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--pulses", type=int, default=100)
     parser.add_argument("--moves", type=int, default=1000)
@@ -198,7 +198,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, help="also write the JSON to this file")
     arguments = parser.parse_args()
     os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
-    figures = {name: measures[name](arguments) for name in arguments.what or measures}
+    with PLACES[arguments.kind]() as place:
+        figures = {name: measures[name](arguments.kind, place, arguments) for name in arguments.what or measures}
     text = json.dumps({arguments.kind: figures}, indent=2)
     if arguments.output:
         arguments.output.write_text(text + "\n")

@@ -2,8 +2,8 @@
 
     python bench/ros_client.py KIND WHERE TASK '{"...": ...}'
 
-Says `ready` once all is declared, and reads a line on stdin before it begins; to end what it listens to, another one. Its client logic is that of a CRTK client: a move is over when a state that
-is busy and newer than the command has come, and then one that is not.
+Says `ready` once all is declared, and reads a line on stdin before it begins; to end what it listens to, another one. Its client logic is that of a CRTK
+client: a move is over when a state that is busy and newer than the command has come, and then one that is not.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import json
 import random
 import sys
 import threading
+from itertools import pairwise
 from time import monotonic, sleep, time_ns
 from typing import Any
 
 from ros_middleware import JOINT_STATE, MIDDLEWARE, OPERATING_STATE, STRING_STAMPED
 
-MOVED_RAD = 1e-5
-"""An arm that holds still trembles by less than 1e-7 rad; the first step of a following one goes 15.7 rad/s^2 (2 ms)^2 = 6e-5 rad."""
+MOVED_RAD = 1e-7
+"""An arm that holds still does not move by 1e-13 rad; the drives move the yaw by some 1e-7 rad in the first step of 2 ms."""
 EDGE_S, END_S = 1.0, 10.0
 """How long the busy edge and the end of a move or of homing may take; more is a hang."""
 
@@ -55,7 +56,7 @@ class Heard:
         if len(seen) < 2:
             return {"count": len(seen)}
         stamps, numbers = [row[0] for row in seen], [row[2] for row in seen]
-        gaps = [after - before for before, after in zip(stamps, stamps[1:], strict=False)]
+        gaps = [after - before for before, after in pairwise(stamps)]
         rate = (len(seen) - 1) / (stamps[-1] - stamps[0]) * 1e9
         lost = None if None in numbers else numbers[-1] - numbers[0] + 1 - len(numbers)
         return {"rate_hz": round(rate, 2), "lost": lost, "longest_gap_ms": round(max(gaps) / 1e6, 2), "age": percentiles([row[1] for row in seen])}
@@ -146,14 +147,14 @@ def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     home(arm)
     goal, never = list(arm.joints["setpoint_js"][0]), 0
     for index in range(count):
-        sleep(pause.uniform(0.1, 0.12))
+        sleep(pause.uniform(0.3, 0.32))
         with arm.news:
             before = {topic: joints[0][0] for topic, joints in arm.joints.items()}
         goal[0] += 2e-3 if index % 2 else -2e-3
         sent_ns = arm.send("servo_jp", goal)
         for topic in times:
             with arm.news:
-                if arm.news.wait_for(lambda topic=topic: abs(arm.joints[topic][0][0] - before[topic]) > MOVED_RAD, 1.0):
+                if arm.news.wait_for(lambda topic=topic, before=before: abs(arm.joints[topic][0][0] - before[topic]) > MOVED_RAD, 1.0):
                     times[topic].append(arm.joints[topic][1] - sent_ns)
                     stamped[topic].append(arm.joints[topic][2] - sent_ns)
                 else:

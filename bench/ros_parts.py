@@ -7,6 +7,7 @@ from pathlib import Path
 from time import time_ns
 
 import numpy as np
+from ros_client import MOVED_RAD
 
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, state_hash
@@ -15,7 +16,6 @@ from schemas.ros import Header, Image, JointState
 
 HEIGHT, WIDTH = 288, 320
 EYES = ("left", "right")
-MOVED_RAD = 1e-5
 
 
 def picture(number: int) -> Image:

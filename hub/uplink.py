@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -32,6 +33,8 @@ from schemas.trocar_msgs import DeviceStatus
 __all__ = ["DeviceUplink", "Run"]
 
 _STATUS_NS = 1_000_000_000
+_MOST_WAITING = 8
+"""Bundles of signals; a host that is busy beyond that misses the oldest ones, as what it has should be new."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class DeviceUplink:
         self._lines = {port.name: self._link.line(port) for port in outputs}
         self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR)
         self._inflows: list[_Inflow] = []
-        self._arrived: SimpleQueue[tuple[_Feed, zenoh.Sample] | None] = SimpleQueue()
+        self._arrived: SimpleQueue[_Feed | None] = SimpleQueue()
         self._taker = Thread(target=self._take, name=f"inflow {member.name}", daemon=True)
         self._taker.start()
         self._subscribers = [session.declare_subscriber(feed.key, Callback(partial(self._put, feed), indirect=False)) for feed in self._feeds()]
@@ -84,19 +87,21 @@ class DeviceUplink:
         return inflow
 
     def _put(self, feed: _Feed, sample: zenoh.Sample) -> None:
-        self._arrived.put((feed, sample))
+        feed.waiting.append(sample)
+        self._arrived.put(feed)
 
     def _take(self) -> None:
         """Take what arrives, all in one thread: with one for each of a hundred ports the simulation would wait for every one of them in turn."""
-        while (arrived := self._arrived.get()) is not None:
-            feed, sample = arrived
-            try:
-                feed.take(sample, self._run.number)
-            except MessageError as error:
-                self._drops.count(sample, error)
+        while (feed := self._arrived.get()) is not None:
+            if feed.waiting:  # otherwise newer signals have taken its place
+                sample = feed.waiting.popleft()
+                try:
+                    feed.take(sample, self._run.number)
+                except MessageError as error:
+                    self._drops.count(sample, error)
 
-    def exchange(self, t: int, samples: list[Sample]) -> None:
-        """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link."""
+    def exchange(self, t: int, samples: list[Sample]) -> bool:
+        """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link; return whether there is a link."""
         self._link.settle(t)
         now_ns, idle = monotonic_ns(), self._link.idle
         for sample in samples:
@@ -114,13 +119,14 @@ class DeviceUplink:
                 inflow.arrive(t)
         if now_ns - self._told_ns >= _STATUS_NS:
             self._told_ns = now_ns
-            self._status.put(encode(self._report(now_ns)))
+            self._status.put(encode(self._report()))
+        return not idle
 
     def _publish(self, port: str, payload: bytes, stamp: bytes) -> None:
         self._publishers[port].put(payload, attachment=stamp)
 
-    def _report(self, now_ns: int) -> DeviceStatus:
-        best = None if self._offset is None else self._offset.best(now_ns)
+    def _report(self) -> DeviceStatus:
+        best = None if self._offset is None else self._offset.best
         offset_ns, round_trip_ns = (0, -1) if best is None else (best.offset_ns, best.round_trip_ns)
         latencies = self._latencies.messages()
         return DeviceStatus(device=self._member.name, offset_ns=offset_ns, round_trip_ns=round_trip_ns, link=in_words(self._link.spec), latencies=latencies)
@@ -134,7 +140,7 @@ class DeviceUplink:
     def close(self) -> None:
         """Tell the hub a last time how it was, and send and take no more."""
         self._loop.attach(None)
-        self._status.put(encode(self._report(monotonic_ns())))
+        self._status.put(encode(self._report()))
         for entity in (*self._subscribers, *self._publishers.values(), self._status):
             entity.undeclare()
         self._arrived.put(None)
@@ -150,14 +156,14 @@ def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
     return session.declare_publisher(key, encoding=zenoh.Encoding.APPLICATION_CDR, priority=urgency, congestion_control=choked, express=True)
 
 
-@dataclass(frozen=True)
 class _Feed:
     """What comes under one key."""
 
-    key: str
-    inflows: Sequence[_Inflow]
-    whole: bool
-    """Whether a message is the value of the only inflow; otherwise it is a bundle."""
+    def __init__(self, key: str, inflows: Sequence[_Inflow], *, whole: bool) -> None:
+        """`whole`: a message is the value of the only inflow; otherwise it is a bundle."""
+        self.key, self._inflows, self._whole = key, inflows, whole
+        self.waiting: deque[zenoh.Sample] = deque(maxlen=None if whole else _MOST_WAITING)
+        """What has come and is not yet taken."""
 
     def take(self, sample: zenoh.Sample, run: int) -> None:
         """Hand on what a message holds. Raises MessageError if it is none of this run, or no value."""
@@ -167,10 +173,10 @@ class _Feed:
         if not tag.count:  # no events in this step
             return
         payload = sample.payload.to_bytes()
-        for index, value in [(0, payload)] if self.whole else unpacked(payload):
-            if index >= len(self.inflows):
-                raise MessageError(f"a bundle has value {index} of {len(self.inflows)}")
-            self.inflows[index].take(tag, value)
+        for index, value in [(0, payload)] if self._whole else unpacked(payload):
+            if index >= len(self._inflows):
+                raise MessageError(f"a bundle has value {index} of {len(self._inflows)}")
+            self._inflows[index].take(tag, value)
 
 
 class _Inflow:
@@ -210,6 +216,6 @@ class _Inflow:
             self._drops.refuse(self._stream, error)
             return
         now_ns = monotonic_ns()
-        best = None if self._offset is None else self._offset.best(now_ns)
+        best = None if self._offset is None else self._offset.best
         if self._timed and (self._offset is None or best is not None):
             self._latencies.add("state to force", self._stream, now_ns + (0 if best is None else best.offset_ns) - tag.sent_ns)
