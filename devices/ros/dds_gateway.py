@@ -43,9 +43,12 @@ class DdsGateway(Gateway):
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
         """Join the domain. Raises MissingExtraError without Cyclone DDS, DeviceError if the domain cannot be joined."""
         try:
+            from devices.ros.dds_calls import Calls
             from devices.ros.dds_domain import configuration, domain
             from devices.ros.dds_transport import DdsTransport
         except ModuleNotFoundError as error:
             raise MissingExtraError(f"device '{self.name}'", "ros2-dds", "cyclonedds") from error
         where = self._where
-        return DdsTransport(domain(where.domain, configuration(where.discovery, where.peers)), where.domain)
+        joined = domain(where.domain, configuration(where.discovery, where.peers))
+        hosts = ("127.0.0.1", *where.peers) if where.discovery == "localhost" else where.peers
+        return DdsTransport(joined, where.domain, Calls(where.domain, multicast=where.discovery == "subnet", hosts=hosts))

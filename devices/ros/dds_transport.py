@@ -15,6 +15,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from devices.ros.dds_arrivals import Arrivals
+from devices.ros.dds_calls import FAST_DDS, Calls
 from devices.ros.dds_graph import INFO_TOPIC, INFO_TYPE, entities_info
 from devices.ros.dds_programs import Programs
 from devices.ros.dds_types import Payload, payload_type, request_type
@@ -50,9 +51,9 @@ class DdsTransport(Transport):
     Nothing that is published waits for a reader: each topic keeps its last messages for whoever is slow. Messages and requests are taken in a thread each.
     """
 
-    def __init__(self, domain: Domain, number: int) -> None:
-        """Join `domain`, whose number is `number`."""
-        self._domain = domain
+    def __init__(self, domain: Domain, number: int, calls: Calls) -> None:
+        """Join `domain`, whose number is `number`, with what answers programs with rmw_fastrtps there."""
+        self._domain, self._calls = domain, calls
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
         self._id = self._participant.guid.bytes
         self._messages, self._requests = (Arrivals(self._participant, f"DDS {what}") for what in ("messages", "requests"))
@@ -88,7 +89,7 @@ class DdsTransport(Transport):
         self._writers.append(writer)
 
         def asked(sample: Payload) -> None:
-            if not isinstance(sample, Payload):
+            if not isinstance(sample, Payload) or self._programs.participant(sample.sample_info.publication_handle).startswith(FAST_DDS):
                 return
             try:
                 response = handle(sample.cdr[: _HEADER.start] + sample.cdr[_HEADER.stop :])
@@ -98,6 +99,7 @@ class DdsTransport(Transport):
             writer.write(response_type(response[: _HEADER.start] + sample.cdr[_HEADER] + response[_HEADER.start :]))
 
         self._requests.add(self._reader(f"rq{row.topic}Request", request_type(f"{row.type}_Request")), asked)
+        self._calls.serve(row.topic, row.type, handle)
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
         return self._programs.clients(self._topics)
@@ -107,6 +109,7 @@ class DdsTransport(Transport):
             self._closed = True
             self._messages.close()
             self._requests.close()
+            self._calls.close()
             self._participant.__del__()  # now, with all that is on it, and not when somebody lets go of the last part
 
     def _writer(self, topic: str, type_: type[Payload], quality: Qos, ros_type: str = "") -> DataWriter[Payload]:
