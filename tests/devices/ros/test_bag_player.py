@@ -1,6 +1,7 @@
 """What a bag of any kind brings into a session, and what of it is refused."""
 
 import logging
+import subprocess
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from schemas.codec import encode, typestore
 from schemas.crtk import StringStamped
 from schemas.errors import RecordingError
 from schemas.ros import BoolMessage, EmptyMessage, Header, JointState, Joy, Pose, PoseStamped, Quaternion, StringMessage, Time
+from tests.devices.ros.rospy_peer import environment, needs_rospy, rospy_python
 
 SECOND = 10**9
 EPOCH = 1_700_000_000 * SECOND
@@ -103,6 +105,29 @@ def test_bags_of_every_kind_say_the_same(form, tmp_path):
     assert samples[0].message.string == "home"
     assert samples[1].message.position.tolist() == [0.1, 0.2, 0.12, 0.0, 0.0, 0.0]
     assert [stamp(sample) for sample in samples[:3]] == [0.5, 1.0, 1.5]
+
+
+ROSBAG = """
+import sys
+import rosbag, rospy
+from sensor_msgs.msg import JointState
+
+with rosbag.Bag(sys.argv[1], "w", compression="bz2") as bag:
+    message = JointState(position=[0.1] * 6)
+    message.header.stamp = rospy.Time(1700000000)
+    bag.write("/PSM1/servo_jp", message, rospy.Time(1700000000))
+    bag.write("/PSM1/servo_jp", message, rospy.Time(1700000001, 500000000))
+"""
+
+
+@needs_rospy
+def test_a_bag_that_ros_1_itself_has_written(tmp_path):
+    python, path = rospy_python()
+    ran = subprocess.run([python, "-c", ROSBAG, tmp_path / "one.bag"], env=environment(path), capture_output=True, text=True, timeout=60, check=False)
+    if "No module named 'rosbag'" in ran.stderr:
+        pytest.skip("needs rosbag: apt install python3-rosbag")
+    assert ran.returncode == 0, ran.stderr
+    assert [(sample.port, stamp(sample)) for sample in played(tmp_path / "one.bag")] == [("PSM1/servo_jp", 0.0), ("PSM1/servo_jp", 1.5)]
 
 
 def test_ports_are_those_of_a_gateway_that_the_bag_has_something_for(bag):

@@ -2,9 +2,11 @@
 
 import json
 import subprocess
+import sys
 import threading
 import time
 from base64 import b64encode
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from schemas.codec import message_type, validated
 from schemas.errors import RecordingError
 from schemas.vectors import VectorCodec
 from tests.devices.ros.rclpy_environment import rclpy_python
+from tests.devices.ros.rospy_peer import environment, needs_rospy, rospy_python
 from tests.devices.ros.test_zenoh_gateway import JOINTS, STATE_TYPE, joints, until
 from tests.devices.ros.zenoh_peer import TYPES, Peer, built
 
@@ -212,6 +215,31 @@ def test_ros_reads_it(bag, rclpy_python):
     assert read.returncode == 0, read.stderr
     said = [m.position.tolist() if type_ == JOINTS else m.state if type_ == STATE_TYPE else None for type_, _, m in told]
     assert [json.loads(line) for line in read.stdout.splitlines()] == said
+
+
+ROSBAG = """
+import json, sys
+import rosbag
+
+with rosbag.Bag(sys.argv[1]) as bag:
+    latched = [c.topic for c in bag._get_connections() if c.header.get("latching") == b"1"]
+    print(json.dumps([sorted(latched), [list(m.position) for _, m, _ in bag.read_messages("/PSM1/measured_js")]]))
+"""
+
+
+@needs_rospy
+def test_ros_1_reads_it_once_it_is_converted(bag, tmp_path):
+    converter = Path(sys.executable).with_name("rosbags-convert")
+    subprocess.run([converter, "--src", bag, "--dst", tmp_path / "one.bag"], check=True)
+    python, path = rospy_python()
+    read = subprocess.run([python, "-c", ROSBAG, tmp_path / "one.bag"], env=environment(path), capture_output=True, text=True, timeout=60, check=False)
+    if "No module named 'rosbag'" in read.stderr:
+        pytest.skip("needs rosbag: apt install python3-rosbag")
+    assert read.returncode == 0, read.stderr
+    latched, positions = json.loads(read.stdout)
+    assert "/PSM1/operating_state" in latched
+    assert "/PSM1/measured_js" not in latched
+    assert positions == [message.position.tolist() for _, _, message in messages(bag, "/PSM1/measured_js")]
 
 
 def test_what_cannot_be_written_is_said(driven, bag, tmp_path):
