@@ -37,14 +37,16 @@ ARMS = {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400006"}, "ECM
 STATES = ("PSM1/measured_js", "PSM1/jaw/measured_js", "PSM2/measured_js", "PSM2/jaw/measured_js", "ECM/measured_js")
 PICTURES = ("endoscope/left/image_raw", "endoscope/right/image_raw")
 LISTENED = [[f"/{name}", "sensor_msgs/msg/JointState"] for name in STATES] + [[f"/{name}", "sensor_msgs/msg/Image"] for name in PICTURES]
-GATEWAY = {"arms": ARMS, "mounting": "cart", "publish_period": "4545 us"}
+GATEWAY = {"arms": ARMS, "mounting": "cart"}
+FAST = {"publish_period": "4545 us"}
+"""220 Hz, of states that the motion controller tells at 250 Hz."""
 
 SCENARIO: dict[str, Any] = {
     "name": "ros_figures",
     "step": "2 ms",
     "pace": "realtime",
     "participants": {
-        "motion": {"kind": "motion", "mounting": "cart", "arms": ARMS, "publish_period": "4 ms"},
+        "motion": {"kind": "motion", "mounting": "cart", "arms": ARMS, "publish_period": "10 ms"},
         "robot": {"kind": "mujoco", "mounting": "cart", "arms": ARMS, "looks": False, "publish_period": "10 ms"},
         "ros": {"kind": "ros2-zenoh", "host": "ros", **GATEWAY},
     },
@@ -91,7 +93,7 @@ def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
     """Measure a gateway alone."""
     endpoint = free_endpoint(range(1))
     with open_session("router", listen=[endpoint]):
-        command = [sys.executable, str(HERE / "ros_bare.py"), kind, endpoint, json.dumps(GATEWAY | place.params), str(seconds + 4.0)]
+        command = [sys.executable, str(HERE / "ros_bare.py"), kind, endpoint, json.dumps(GATEWAY | FAST | place.params), str(seconds + 4.0)]
         gateway = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE.parent)})
         _expect(gateway, "ready")
         console = Console(kind, place, endpoint, "listen", {"topics": LISTENED, "seconds": seconds})
@@ -107,10 +109,15 @@ def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
     return {"gateway_cpu_percent": cost["cpu_percent"], "lost_of_all": lost, "topics": heard, **_machine()}
 
 
-def in_session(kind: str, place: Place, task: str, arguments: dict[str, Any], connections: list[str], parts: dict[str, Any]) -> dict[str, Any]:
-    """Run a session, and in it a console with its task."""
+def in_session(
+    kind: str, place: Place, task: str, arguments: dict[str, Any], connections: list[str], parts: dict[str, Any], *, fast: bool = False
+) -> dict[str, Any]:
+    """Run a session, and in it a console with its task; states are published at 100 Hz, or 220 Hz if it is to be `fast`."""
     scenario = json.loads(json.dumps(SCENARIO))
     scenario["participants"]["ros"] |= {"kind": kind, **place.params}
+    if fast:
+        scenario["participants"]["ros"] |= FAST
+        scenario["participants"]["motion"]["publish_period"] = "4 ms"
     scenario["participants"] |= parts
     scenario["order"] += [name for name in parts if "host" not in parts[name]]
     scenario["connections"] += connections
@@ -158,7 +165,7 @@ def session(kind: str, place: Place, seconds: float, *, everything: bool = False
     parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
     connections = [*states, *(f"camera.{eye}/image_raw -> ros.endoscope/{eye}/image_raw" for eye in ("left", "right"))]
-    result = in_session(kind, place, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts)
+    result = in_session(kind, place, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts, fast=True)
     del result["received"]
     return result
 

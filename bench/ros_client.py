@@ -182,7 +182,7 @@ def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:
 
 def cycles(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     """Enable and home from nothing, as a client does in the morning, and let go of all again."""
-    arm, took_ns, hung = Arm(client, arm_name), [], 0
+    arm, took_ns, missed, hung = Arm(client, arm_name), [], 0, 0
     begin()
     arm.await_joints()
     home(arm)
@@ -194,10 +194,12 @@ def cycles(client: Any, arm_name: str, count: int) -> dict[str, Any]:
             ("home", lambda state: state.is_homed and not state.is_busy),
         ):
             since_ns = arm.command(words)
+            if words in ("enable", "home"):
+                missed += arm.await_state(since_ns, lambda state: state.is_busy, EDGE_S) is None
             if arm.await_state(since_ns, wanted, END_S) is None:
                 hung += 1
         took_ns.append(time_ns() - since_ns)
-    return {"cycles": count, "hung": hung, "homing_took": percentiles(took_ns)}
+    return {"cycles": count, "missed_busy_edges": missed, "hung": hung, "homing_took": percentiles(took_ns)}
 
 
 TASKS = {"listen": listen, "servo": servo, "moves": moves, "cycles": cycles}
