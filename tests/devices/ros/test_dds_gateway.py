@@ -1,6 +1,5 @@
 """The gateway to ROS 2 over DDS, as real rclpy sees it."""
 
-import os
 import time
 from contextlib import contextmanager
 
@@ -9,7 +8,7 @@ import pytest
 from devices.ros.dds_gateway import DdsGateway
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, check_published, check_served, check_subscribed, exercise
 from tests.devices.ros.rclpy_environment import rclpy_python
-from tests.devices.ros.rclpy_peer import RclpyPeer
+from tests.devices.ros.rclpy_peer import RclpyPeer, free_domain
 
 __all__ = ["rclpy_python"]
 
@@ -17,9 +16,8 @@ ARM = {"arms": {"PSM1": {}}, "cameras": []}
 
 
 @pytest.fixture
-def domain(request):
-    """A domain of this process."""
-    return 1 + os.getpid() % 100
+def domain():
+    return free_domain()
 
 
 @contextmanager
@@ -29,16 +27,32 @@ def showing(directory, **params):
         yield gateway
 
 
+def until(condition, seconds=5.0):
+    """Wait until `condition` holds; say whether it did."""
+    end = time.monotonic() + seconds
+    while not (held := condition()) and time.monotonic() < end:
+        time.sleep(0.005)
+    return held
+
+
+class Console(RclpyPeer):
+    """A program that waits until the gateway has found it, too: nobody gets what was published before that."""
+
+    def __init__(self, python, gateway, name="console", **settings):
+        super().__init__(python, gateway.params.domain, name, **settings)
+        self.gateway = gateway
+
+    def join(self, rows):
+        super().join(rows)
+        topics = {f"rt{row.topic}" for row in rows if row.way == "publish"}
+        writers = [writer for writer in self.gateway._transport._writers if writer.topic.name in topics]
+        assert until(lambda: all(writer.get_publication_matched_status().current_count for writer in writers))
+
+
 def test_every_row_of_the_table(rclpy_python, domain, tmp_path):
     with showing(tmp_path, **WHOLE, domain=domain) as gateway:
-        with RclpyPeer(rclpy_python, domain) as console:
-            t0 = time.time()
-            console.join([r for r in gateway.rows if r.way != "serve"])
-            print("join", time.time() - t0); t0 = time.time()
-            check_published(gateway, console, gateway.rows)
-            print("pub", time.time() - t0); t0 = time.time()
-            check_subscribed(gateway, console, gateway.rows)
-            print("sub", time.time() - t0); t0 = time.time()
-        with RclpyPeer(rclpy_python, domain, "late") as late:
+        with Console(rclpy_python, gateway) as console:
+            console.join(gateway.rows)
+            exercise(gateway, console)
+        with Console(rclpy_python, gateway, "late") as late:
             check_late_joiner(gateway, late)
-            print("late", time.time() - t0)
