@@ -26,6 +26,7 @@ _SOONEST_S, _LATEST_S = 0.5, 30.0
 """How long it takes until a connection that failed is tried again, at first and at last; rospy has the same."""
 _KEPT_S = 0.05
 """What a publisher has kept for those who come later follows its header at once, within a few milliseconds; what comes later than this is meant now."""
+_HINT = "If it runs, its ROS_IP or ROS_HOSTNAME must be an address that this machine knows"
 _NO_MESSAGE = b"\xff\xff"
 """Stands before bytes that could not be made CDR, which it cannot begin with."""
 
@@ -147,10 +148,17 @@ class Subscriptions:
     def _connect_all(self, uri: str) -> None:
         """Keep the links to one program connected, as long as there are any."""
         program, links = Program(uri, self._node), self._links[uri]
+        level = logging.WARNING
         try:
             while (due := self._due(uri, links)) is not None:
                 for link in due:
-                    self._connect(program, link)
+                    try:
+                        self._connect(program, link)
+                    except (OSError, DeviceError, ValueError, TypeError) as error:
+                        log.log(level, "ROS 1: the program at %s, which publishes %s, is not reached: %s. %s", uri, link.subscription.topic, error, _HINT)
+                        level = logging.DEBUG
+                        with self._changing:
+                            link.retry()
         finally:
             program.close()
 
@@ -172,30 +180,24 @@ class Subscriptions:
             return None
 
     def _connect(self, program: Program, link: _Link) -> None:
+        """Connect to a topic of a program. Raises OSError, DeviceError, or of a wrong answer ValueError or TypeError, if that cannot be."""
+        answer = program.call("requestTopic", link.subscription.topic, [["TCPROS"]])
+        if answer.code != 1:
+            raise DeviceError(answer.word)
+        _, host, port = answer.value
+        sock = socket.create_connection((host, port), _CONNECT_S)
         try:
-            answer = program.call("requestTopic", link.subscription.topic, [["TCPROS"]])
-            if answer.code != 1:
-                raise DeviceError(f"{program.uri}: {answer.word}")
-            _, host, port = answer.value
-            sock = socket.create_connection((host, port), _CONNECT_S)
-        except (OSError, DeviceError, ValueError, TypeError) as error:
-            log.debug("ROS 1: no connection for %s: %s", link.subscription.topic, error)
             with self._changing:
-                link.retry()
-            return
-        with self._changing:
-            self._begin(link, sock)
+                self._begin(link, sock)
+        except OSError:  # gone already
+            sock.close()
+            raise
 
     def _begin(self, link: _Link, sock: socket.socket) -> None:
         if self._closed:
             sock.close()
             return
-        try:
-            link.connection = connection = Connection(self._loop, sock, link.greeted, partial(self._lost, link))
-        except OSError:  # gone already
-            sock.close()
-            link.retry()
-            return
+        link.connection = connection = Connection(self._loop, sock, link.greeted, partial(self._lost, link))
         connection.send(header_frame(link.subscription.header))
         connection.start()
 

@@ -62,7 +62,7 @@ class Ros1Transport(Transport):
         self._registration.add(Thing("Service", row.topic, (f"rosrpc://{self._host}:{self._listener.port}",)))
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
-        connections = (*tuple(self._connections), *(connection for _, connection in self._subscriptions.connections))
+        connections = (*self._connections.copy(), *(connection for _, connection in self._subscriptions.connections))
         return tuple(Client(name, address) for name, address in {each.program: each.address for each in connections}.items())
 
     def close(self) -> None:  # noqa: D102
@@ -115,7 +115,7 @@ class Ros1Transport(Transport):
 
     def _bus(self) -> list[list[Any]]:
         """Return our connections as `rosnode info` shows them."""
-        readers = [(reader.program, "o", publication.topic) for reader, publication in tuple(self._connections.items()) if publication is not None]
+        readers = [(reader.program, "o", publication.topic) for reader, publication in self._connections.copy().items() if publication is not None]
         writers = [(writer.program, "i", topic) for topic, writer in self._subscriptions.connections]
         return [[index, program, way, "TCPROS", topic, True] for index, (program, way, topic) in enumerate(readers + writers)]
 

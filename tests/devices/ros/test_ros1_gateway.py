@@ -265,6 +265,19 @@ def test_the_place_of_one_that_was_killed_is_taken(ros, tmp_path, console, caplo
         assert known.lookupNode("/test", "/trocar_ros")[0] != 1, "at its end it is not known any more"
 
 
+def test_a_console_that_cannot_be_reached_is_told_of_once(ros, psm, console, caplog):
+    with xmlrpc.client.ServerProxy(ros.uri) as known:
+        for topic in (COMMAND, STATE_COMMAND):
+            known.registerPublisher("/unknown", topic, "*", "http://nowhere.invalid:1/")
+        assert until(lambda: "its ROS_IP or ROS_HOSTNAME must be an address" in caplog.text)
+        console.advertise(COMMAND, JOINTS)
+        assert console.wait_for_peers(COMMAND)
+        for topic in (COMMAND, STATE_COMMAND):
+            known.unregisterPublisher("/unknown", topic, "http://nowhere.invalid:1/")
+        assert until(lambda: not any("nowhere" in uri for uri in psm._transport._subscriptions._links))
+    assert caplog.text.count("is not reached") == 1
+
+
 def test_a_master_that_comes_later_and_one_that_starts_again(tmp_path, caplog):
     with master(tmp_path) as ros:
         ros.stop()
