@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -49,9 +49,10 @@ SAID = [
 """Time (s) of recording, topic, message."""
 
 
-def write(path, said, storage=StoragePlugin.MCAP):
-    with Writer2(path, version=9, storage_plugin=storage) as writer:
-        connections = {}
+def write(path, said, storage=StoragePlugin.MCAP, compression=CompressionMode.NONE):
+    writer, connections = Writer2(path, version=9, storage_plugin=storage), {}
+    writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
         for t, topic, message in said:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, message.ros_type, typestore=typestore())
@@ -94,10 +95,11 @@ def bag(tmp_path_factory):
     return write(tmp_path_factory.mktemp("said") / "bag", SAID)
 
 
-@pytest.mark.parametrize("form", ["directory", "mcap", "db3 directory", "db3", "ros1"])
+@pytest.mark.parametrize("form", ["directory", "compressed", "mcap", "db3 directory", "db3", "ros1"])
 def test_bags_of_every_kind_say_the_same(form, tmp_path):
     storage = StoragePlugin.SQLITE3 if "db3" in form else StoragePlugin.MCAP
-    path = write1(tmp_path / "said.bag", SAID) if form == "ros1" else write(tmp_path / "bag", SAID, storage)
+    compression = CompressionMode.FILE if form == "compressed" else CompressionMode.NONE
+    path = write1(tmp_path / "said.bag", SAID) if form == "ros1" else write(tmp_path / "bag", SAID, storage, compression)
     if form in ("mcap", "db3"):
         (path,) = path.glob(f"*.{form}")
     samples = played(path)

@@ -14,6 +14,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from typer.testing import CliRunner
 
+from devices.ros import bag_export
 from devices.ros.bag_export import export
 from devices.ros.command_line import app
 from devices.ros.zenoh_gateway import ZenohGateway
@@ -23,7 +24,7 @@ from hub.recording import Recording
 from hub.scenario_file import load
 from hub.verify import verify
 from schemas.codec import message_type, validated
-from schemas.errors import RecordingError
+from schemas.errors import MessageError, RecordingError
 from schemas.vectors import VectorCodec
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rospy_peer import environment, needs_rospy, rospy_python
@@ -251,3 +252,16 @@ def test_what_cannot_be_written_is_said(driven, bag, tmp_path):
     with pytest.raises(RecordingError, match="no gateway to ROS"):
         export(replayed, tmp_path / "bag")
     assert not (tmp_path / "bag").exists()
+
+
+def test_a_bag_that_cannot_be_finished_is_not_left_behind(driven, tmp_path, monkeypatch):
+    def none_of_that_type(model, payload):
+        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message")
+
+    monkeypatch.setattr(bag_export, "decode", none_of_that_type)
+    with pytest.raises(RecordingError, match=r"topic '/engine/motion/out/PSM1/operating_state' at 2000000 ns: crtk_msgs/msg/OperatingState: \d+ bytes"):
+        export(driven, tmp_path / "bag")
+    assert not (tmp_path / "bag").exists()
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match="cannot write the bag"):
+        export(driven, tmp_path / "file" / "bag")
