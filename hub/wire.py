@@ -33,6 +33,10 @@ log = logging.getLogger(__name__)
 LEASE_MS = 10_000
 """A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
 
+_EVENT_BATCHES = 16
+"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures of a stereo pair. With the two that it has otherwise, the second picture of a pair was
+dropped now and then while the first one was on its way."""
+
 _TAG = struct.Struct("<QIqqHHq")
 _STAMP = struct.Struct("<QQq")
 
@@ -53,6 +57,7 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
         "connect/timeout_ms": 5000,
         "connect/exit_on_failure": True,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/queue/size/interactive_high": _EVENT_BATCHES,
         "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
         **(security or {}),
     }
