@@ -34,8 +34,8 @@ LEASE_MS = 10_000
 """A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
 
 _EVENT_BATCHES = 16
-"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures of a stereo pair. With the two that it has otherwise, the second picture of a pair was
-dropped now and then while the first one was on its way."""
+"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures. With its default, two, the second picture of a stereo pair was dropped now and
+then while the first one was on its way."""
 
 _TAG = struct.Struct("<QIqqHHq")
 _STAMP = struct.Struct("<QQq")
