@@ -24,9 +24,10 @@ log = logging.getLogger(__name__)
 _CONNECT_S = 2.0
 _SOONEST_S, _LATEST_S = 0.5, 30.0
 """How long it takes until a connection that failed is tried again, at first and at last; rospy has the same."""
-_KEPT_S = 0.05
-"""What a publisher has kept for those who come later follows its header at once, within a few milliseconds; what comes later than this is meant now."""
-_HINT = "If it runs, its ROS_IP or ROS_HOSTNAME must be an address that this machine knows"
+_KEPT_S = 0.5
+"""What a publisher has kept for those who come later follows its header at once: within a few milliseconds, or some tens on a busy machine. What comes later
+than this is meant now."""
+_UNREACHED = "ROS 1: the program at %s, which publishes %s, is not reached: %s. Its ROS_IP or ROS_HOSTNAME must be an address that this machine knows"
 _NO_MESSAGE = b"\xff\xff"
 """Stands before bytes that could not be made CDR, which it cannot begin with."""
 
@@ -147,16 +148,16 @@ class Subscriptions:
 
     def _connect_all(self, uri: str) -> None:
         """Keep the links to one program connected, as long as there are any."""
-        program, links = Program(uri, self._node), self._links[uri]
-        level = logging.WARNING
+        program, links, told = Program(uri, self._node), self._links[uri], False
         try:
             while (due := self._due(uri, links)) is not None:
                 for link in due:
                     try:
                         self._connect(program, link)
                     except (OSError, DeviceError, ValueError, TypeError) as error:
-                        log.log(level, "ROS 1: the program at %s, which publishes %s, is not reached: %s. %s", uri, link.subscription.topic, error, _HINT)
-                        level = logging.DEBUG
+                        is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)  # it has ended without a word to the master
+                        log.log(logging.DEBUG if is_gone or told else logging.WARNING, _UNREACHED, uri, link.subscription.topic, error)
+                        told = told or not is_gone
                         with self._changing:
                             link.retry()
         finally:

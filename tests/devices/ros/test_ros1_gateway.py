@@ -1,5 +1,6 @@
 """The gateway to ROS 1, with a real master, as real programs on rospy see it."""
 
+import shutil
 import signal
 import subprocess
 import time
@@ -22,6 +23,7 @@ pytestmark = needs_rospy
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 STATE, COMMAND, EVENT, STATE_COMMAND = "/PSM1/measured_js", "/PSM1/servo_jp", "/PSM1/operating_state", "/PSM1/state_command"
+RELAY = shutil.which("relay", path="/usr/lib/topic_tools:/opt/ros/noetic/lib/topic_tools")
 JOINTS, STATE_TYPE, WORD, ORDER = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState", "std_msgs/msg/String", "crtk_msgs/msg/StringStamped"
 
 
@@ -100,6 +102,28 @@ def test_the_tools_of_ros_show_it(ros, psm):
     node = "xmlrpc.client.ServerProxy(rosgraph.Master('/t').lookupNode('/trocar_ros'))"
     ask = f"import rosgraph, xmlrpc.client; node = {node}; print(node.getPid('/t')[0], node.getBusInfo('/t')[0])"
     assert subprocess.run([ros.python, "-c", ask], env=ros.environment, capture_output=True, text=True, timeout=20, check=True).stdout.split() == ["1", "1"]
+
+
+@contextmanager
+def relay(ros, heard, told):
+    """A program on roscpp that says on one topic what it hears on another."""
+    with subprocess.Popen([RELAY, heard, told, f"__name:=relay{told.replace('/', '_')}"], env=ros.environment, stdout=subprocess.DEVNULL) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+@pytest.mark.skipif(RELAY is None, reason="needs programs in C++: apt install topic-tools")
+def test_programs_in_cpp_hear_and_command(ros, psm, console):
+    console.listen("/copied", JOINTS)
+    console.advertise("/orders", JOINTS)
+    with relay(ros, STATE, "/copied"), relay(ros, "/orders", COMMAND):
+        assert until(lambda: psm.write(STATE[1:], np.zeros(18)) or console.heard("/copied", 0.02), 10.0)
+        assert console.wait_for_peers("/orders")
+        assert until(lambda: console.send("/orders", joints()) or came_in(psm, COMMAND, 0.1), 10.0)
+        assert clients(psm) == ["/relay_copied", f"/relay{COMMAND.replace('/', '_')}"]
+    assert until(lambda: not clients(psm))
 
 
 def test_headers_are_numbered_as_publishers_of_ros_1_do_it(psm, console):
@@ -269,7 +293,7 @@ def test_a_console_that_cannot_be_reached_is_told_of_once(ros, psm, console, cap
     with xmlrpc.client.ServerProxy(ros.uri) as known:
         for topic in (COMMAND, STATE_COMMAND):
             known.registerPublisher("/unknown", topic, "*", "http://nowhere.invalid:1/")
-        assert until(lambda: "its ROS_IP or ROS_HOSTNAME must be an address" in caplog.text)
+        assert until(lambda: "Its ROS_IP or ROS_HOSTNAME must be an address" in caplog.text)
         console.advertise(COMMAND, JOINTS)
         assert console.wait_for_peers(COMMAND)
         for topic in (COMMAND, STATE_COMMAND):
