@@ -46,7 +46,7 @@ class Graph:
         self._nodes: dict[bytes, str] = {}
         """First node by participant, as told."""
         self._names: dict[bytes, str] = {}
-        """What a participant is called from the first time on that it was asked for."""
+        """What a participant is called since it sent something."""
 
     def came(self, endpoint: bytes, participant: bytes, topic: str) -> None:
         """Take note of a reader or a writer."""
@@ -74,21 +74,20 @@ class Graph:
             with self._changing:
                 self._nodes[participant] = f"{first.node_namespace.rstrip('/')}/{first.node_name}"
 
-    def name(self, participant: bytes) -> str:
-        """Return what the program of a participant is called: like its first node, with its id behind it if another one has that name."""
+    def sender(self, participant: bytes) -> str:
+        """Return what the program of a participant is called, from now on: who commands an arm does not become another one when its name is known."""
         with self._changing:
-            return self._name(participant)
+            return self._names.setdefault(participant, self._name(participant))
 
     def _name(self, participant: bytes) -> str:
-        name = self._names.get(participant)
-        if name is None:
-            identity, node = participant[:12].hex(), self._nodes.get(participant, "")
-            name = f"participant {identity}" if not node else f"{node} ({identity})" if node in self._names.values() else node
-            self._names[participant] = name
-        return name
+        """Like its first node, with its id behind it if another one is called so."""
+        identity, node = participant[:12].hex(), self._nodes.get(participant)
+        if node is None:
+            return f"participant {identity}"
+        return f"{node} ({identity})" if any(name == node for other, name in self._names.items() if other != participant) else node
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs that have to do with any of `topics`, given as DDS calls them."""
         with self._changing:
             there = dict.fromkeys(participant for participant, topic in self._endpoints.values() if topic in topics)
-            return tuple(Client(self._name(participant), participant[:12].hex()) for participant in there)
+            return tuple(Client(self._names.get(participant) or self._name(participant), participant[:12].hex()) for participant in there)

@@ -58,7 +58,7 @@ class Programs:
     def sender(self, publication: int) -> str:
         """Return the name of the program whose writer has this handle."""
         participant = self.participant(publication)
-        return self._graph.name(participant) if participant else f"writer {publication:x}"
+        return self._graph.sender(participant) if participant else f"writer {publication:x}"
 
     def participant(self, publication: int) -> bytes:
         """Return the id of the participant whose writer has this handle; empty if it is gone."""

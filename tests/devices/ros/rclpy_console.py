@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 
 class Console:
-    """A node with subscriptions, publishers and clients by topic. Messages are taken when they are asked for: an executor in Python is too slow for hundreds."""
+    """A node with subscriptions, publishers and clients by topic. Messages are taken when asked for: an executor in Python is too slow for hundreds."""
 
     def __init__(self, name):
         rclpy.init()
@@ -48,6 +48,17 @@ class Console:
         ready = filled(publisher.msg_type(), message)
         for _ in range(times):
             publisher.publish(ready)
+
+    def send_raw(self, topic, payload):
+        """Publish bytes, given in hexadecimal, as they are."""
+        self.publishers[topic].publish(bytes.fromhex(payload))
+
+    def count(self, topic, seconds):
+        """Return how many messages of a topic come in a time."""
+        end, found = time.monotonic() + seconds, 0
+        while (left := end - time.monotonic()) > 0:
+            found += self.heard(topic, left) is not None
+        return found
 
     def heard(self, topic, timeout):
         """Return the next message that was not returned before; None if none comes in time."""
@@ -103,6 +114,7 @@ def main(name):
         answer = getattr(console, order.pop("do"))(**order)
         sys.stdout.write(json.dumps(answer) + "\n")
         sys.stdout.flush()
+    rclpy.shutdown()
 
 
 if __name__ == "__main__":

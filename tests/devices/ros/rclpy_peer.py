@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
 from pathlib import Path
@@ -38,8 +39,11 @@ class RclpyPeer:
         return self
 
     def __exit__(self, *_):
-        self.process.kill()
-        self.process.communicate()
+        self.process.send_signal(signal.SIGCONT)
+        try:
+            self.process.communicate(timeout=5.0)  # the end of its input is the end of it
+        finally:
+            self.process.kill()
 
     def do(self, what, **order):
         self.process.stdin.write(json.dumps({"do": what, **order}) + "\n")
