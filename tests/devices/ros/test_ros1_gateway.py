@@ -104,6 +104,14 @@ def test_the_tools_of_ros_show_it(ros, psm):
     assert subprocess.run([ros.python, "-c", ask], env=ros.environment, capture_output=True, text=True, timeout=20, check=True).stdout.split() == ["1", "1"]
 
 
+def test_every_row_of_the_authors_topics(ros, tmp_path):
+    arms = {name: WHOLE["arms"][name] for name in ("PSM1", "PSM2", "ECM")}
+    with showing(ros, tmp_path, profile="paper", arms=arms) as gateway, Program(ros) as console:
+        table = TablePeer(console)
+        table.join(gateway.rows)
+        exercise(gateway, table)
+
+
 @contextmanager
 def relay(ros, heard, told):
     """A program on roscpp that says on one topic what it hears on another."""
