@@ -11,26 +11,20 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
-
-from devices.ros.bag import BagTopic, RosBag
-from devices.ros.face import face
-from devices.ros.paper import paper_face
-from devices.ros.params import GatewayParams, HeardParams
+from devices.ros.bag import RosBag
+from devices.ros.bag_params import BagParams, listed
 from devices.ros.row import Row
 from devices.ros.rules import as_signal, check
 from devices.ros.stamps import stamp_of, stamped
 from hub.participant import Device, Sample
 from hub.wire import Drops
 from schemas.codec import message_type, validated
-from schemas.errors import MessageError, RecordingError, did_you_mean
+from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.quantity import Duration
 
-__all__ = ["BagParams", "BagPlayer"]
+__all__ = ["BagPlayer"]
 
 log = logging.getLogger(__name__)
 
@@ -38,52 +32,6 @@ _LATCHED_NS = 1_000_000_000
 """A state command that is older when it is recorded came by a late recorder's connection; a CRTK client takes a connection for lost after as long."""
 _REMEMBERED = 8
 """State commands, as a gateway remembers them."""
-_NAMED = 6
-"""Topics that are named in one message."""
-
-
-class BagParams(HeardParams):
-    """Which bag is played, how, and what of it."""
-
-    bag: Path = Field(description="rosbag2 directory, .mcap, .db3, or .bag of ROS 1, relative to the scenario")
-    start: Duration = Field(default=0, ge=0, description="time of the bag at which playing begins")
-    rate: float = Field(default=1.0, gt=0.0, allow_inf_nan=False, description="speed of playing; 2 is twice as fast as recorded")
-    rename: Mapping[str, str] = Field(default={}, description="topics of the bag to topics of the dVRK: {/dvrk/PSM1/set_position_goal_joint: /PSM1/move_jp}")
-
-    @field_validator("bag")
-    @classmethod
-    def _find(cls, bag: Path, info: ValidationInfo) -> Path:
-        context: dict[str, Any] = info.context or {}
-        return (Path(context.get("directory", Path.cwd())) / bag).resolve()
-
-    @model_validator(mode="after")
-    def _has_something_to_play(self) -> Self:
-        try:
-            with RosBag(self.bag) as bag:
-                topics = bag.topics
-        except RecordingError as error:
-            raise ValueError(str(error)) from error
-        unknown = next((topic for topic in self.rename if topic not in topics), None)
-        if unknown is not None:
-            raise ValueError(f"rename: '{self.bag}' has no topic '{unknown}'.{did_you_mean(unknown, topics)}")
-        if not self.played(topics):
-            hearable = ", ".join(row.topic for row in self.heard.values()) or "none: `arms` and `listen` are empty"
-            raise ValueError(f"'{self.bag}' has nothing that could be played here. Its topics: {_listed(topics) or 'none'}. Topics that are heard: {hearable}")
-        return self
-
-    @property
-    def heard(self) -> Mapping[str, Row]:
-        """What a gateway would subscribe to, by topic."""
-        shared = {name: getattr(self, name) for name in HeardParams.model_fields}
-        params = GatewayParams(**shared)
-        rows = face(params) if self.profile == "dvrk" else paper_face(params)
-        return {row.topic: row for row in rows if row.way == "subscribe" and row.port is not None}
-
-    def played(self, topics: Mapping[str, BagTopic]) -> Mapping[str, Row]:
-        """Return which topics of a bag are played, and as what."""
-        heard = self.heard
-        rows = {topic: heard.get(self.rename.get(topic, topic)) for topic, told in topics.items() if told.messages}
-        return {topic: row for topic, row in rows.items() if row is not None and row.type == topics[topic].type}
 
 
 class BagPlayer(Device):
@@ -119,7 +67,7 @@ class BagPlayer(Device):
         played = self.params.played(bag.topics)
         passed_over = {topic: told for topic, told in bag.topics.items() if topic not in played}
         if passed_over:
-            log.info("device '%s': passed over of '%s', as nothing here hears them: %s", self.name, bag.path, _listed(passed_over))
+            log.info("device '%s': passed over of '%s', as nothing here hears them: %s", self.name, bag.path, listed(passed_over))
         self._drops = Drops()
         self._samples = self._play(bag, played)
         self._next = next(self._samples, None)
@@ -185,9 +133,3 @@ class _Rule:
         if stamp_ns in self._heeded:
             raise MessageError(f"heeded before, with the same stamp, {stamp_ns / 1e9:.9f} s")
         self._heeded.append(stamp_ns)
-
-
-def _listed(topics: Mapping[str, BagTopic]) -> str:
-    """Return topics with their types and numbers of messages; of many, the first."""
-    named = [f"{topic} ({told.type}, {told.messages})" for topic, told in sorted(topics.items())]
-    return ", ".join(named[:_NAMED]) + (f" and {len(named) - _NAMED} more" if len(named) > _NAMED else "")

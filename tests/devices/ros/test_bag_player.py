@@ -11,7 +11,8 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from devices.ros.bag_player import BagParams, BagPlayer
+from devices.ros.bag_params import BagParams
+from devices.ros.bag_player import BagPlayer
 from hub.participant import Device
 from hub.testing import check_device
 from schemas.codec import encode, typestore
