@@ -112,7 +112,7 @@ class Subscriptions:
     @property
     def topics(self) -> list[list[str]]:
         """Names and types."""
-        return [[topic, subscription.header["type"]] for topic, subscription in self._subscriptions.items()]
+        return [[topic, subscription.header["type"]] for topic, subscription in self._subscriptions.copy().items()]
 
     @property
     def connections(self) -> list[tuple[str, Connection]]:
