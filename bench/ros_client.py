@@ -20,8 +20,8 @@ from ros_middleware import JOINT_STATE, MIDDLEWARE, OPERATING_STATE, STRING_STAM
 
 MOVED_RAD = 1e-7
 """An arm that holds still does not move by 1e-13 rad; the drives move the yaw by some 1e-7 rad in the first step of 2 ms."""
-EDGE_S, END_S = 1.0, 10.0
-"""How long the busy edge and the end of a move or of homing may take; more is a hang."""
+PATIENCE_S = 10.0
+"""How long the busy edge of a move or of homing may take, and the end of it; more is a miss, and a hang."""
 
 
 def percentiles(times_ns: list[int]) -> dict[str, float]:
@@ -172,9 +172,9 @@ def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     for index in range(count):
         goal[0] += 2e-3 if index % 2 else -2e-3
         since_ns = arm.send("move_jp", goal)
-        busy_ns = arm.await_state(since_ns, lambda state: state.is_busy, EDGE_S)
+        busy_ns = arm.await_state(since_ns, lambda state: state.is_busy, PATIENCE_S)
         missed += busy_ns is None
-        if arm.await_state(busy_ns or since_ns, lambda state: not state.is_busy, END_S) is None:
+        if arm.await_state(busy_ns or since_ns, lambda state: not state.is_busy, PATIENCE_S) is None:
             hung += 1
         took_ns.append(time_ns() - since_ns)
     return {"moves": count, "missed_busy_edges": missed, "hung": hung, "took": percentiles(took_ns)}
@@ -195,8 +195,8 @@ def cycles(client: Any, arm_name: str, count: int) -> dict[str, Any]:
         ):
             since_ns = arm.command(words)
             if words in ("enable", "home"):
-                missed += arm.await_state(since_ns, lambda state: state.is_busy, EDGE_S) is None
-            if arm.await_state(since_ns, wanted, END_S) is None:
+                missed += arm.await_state(since_ns, lambda state: state.is_busy, PATIENCE_S) is None
+            if arm.await_state(since_ns, wanted, PATIENCE_S) is None:
                 hung += 1
         took_ns.append(time_ns() - since_ns)
     return {"cycles": count, "missed_busy_edges": missed, "hung": hung, "homing_took": percentiles(took_ns)}

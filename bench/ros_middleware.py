@@ -85,6 +85,7 @@ class Rclpy:
 
         self._node.create_subscription(self._found(type_), topic, heard, QoSProfile(depth=10, durability=durability))
         self._spin()
+        _wait(lambda: self._node.count_publishers(topic))
 
     def advertise(self, topic: str, type_: str) -> None:
         publisher = self._publishers[topic] = self._node.create_publisher(self._found(type_), topic, 10)
@@ -118,7 +119,7 @@ class Rclpy:
             self._thread = Thread(target=self._executor.spin, daemon=True)
             self._thread.start()
 
-    stamp_ns = Zenoh.stamp_ns
+    stamp_ns = staticmethod(Zenoh.stamp_ns)
 
     def close(self) -> None:
         self._executor.shutdown()
