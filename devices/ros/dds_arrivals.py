@@ -6,8 +6,9 @@ import ctypes
 import logging
 import threading
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any
 
+from cyclonedds.builtin import BuiltinDataReader
 from cyclonedds.core import DDSException, DDSStatus, GuardCondition, WaitSet
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.sub import DataReader
@@ -16,8 +17,6 @@ from cyclonedds.util import duration
 __all__ = ["Arrivals"]
 
 log = logging.getLogger(__name__)
-
-Sample = TypeVar("Sample")
 
 _AT_ONCE = 64
 _LONGEST_WAIT_NS = duration(hours=1)
@@ -39,7 +38,7 @@ class Arrivals(WaitSet):
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def add(self, reader: DataReader[Sample], take: Callable[[Sample], None]) -> None:
+    def add(self, reader: DataReader[Any] | BuiltinDataReader, take: Callable[[Any], None]) -> None:
         """Call `take` with every sample of a reader, from now on; it must not raise."""
         reader.set_status_mask(DDSStatus.DataAvailable)
 

@@ -23,8 +23,8 @@ _LOOPBACK_ONLY = '<Interfaces><NetworkInterface name="lo"/></Interfaces><MaxMess
 """Packets as large as UDP takes, as nothing on the way is smaller."""
 
 _ANNOUNCED = "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><SPDPInterval>1s</SPDPInterval>"
-"""Participants on one machine that are looked for where there is no multicast, as many as rmw_fastrtps and rmw_cyclonedds look for, and how often: a program with
-the default range does not look for others in this way, and waits for that."""
+"""Participants on one machine that are looked for where there is no multicast, as many as rmw_fastrtps and rmw_cyclonedds look for, and how often: a
+program with the default range does not look for others in this way, and waits for that."""
 
 _NEVER_WAIT = (
     "<Watermarks><WhcHigh>1GB</WhcHigh><WhcHighInit>1GB</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks>"

@@ -8,6 +8,7 @@ from collections.abc import Collection
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription, DcpsEndpoint
 from cyclonedds.core import InstanceState, Policy, Qos
 from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import InvalidSample
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
@@ -48,7 +49,7 @@ class Programs:
             self._senders.pop(handle, None)
             self._graph.went(key)
 
-    def _told(self, sample: Payload) -> None:
+    def _told(self, sample: Payload | InvalidSample) -> None:
         if isinstance(sample, Payload):
             try:
                 self._graph.told(sample.cdr)

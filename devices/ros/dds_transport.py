@@ -10,6 +10,7 @@ import logging
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -77,7 +78,7 @@ class DdsTransport(Transport):
         return publish
 
     def subscribe(self, row: Row, take: Taker) -> None:  # noqa: D102
-        def heard(sample: Payload) -> None:
+        def heard(sample: Payload | InvalidSample) -> None:
             if isinstance(sample, Payload):
                 take(sample.cdr, self._programs.sender(sample.sample_info.publication_handle))
 
@@ -88,7 +89,7 @@ class DdsTransport(Transport):
         writer = self._writer(f"rr{row.topic}Reply", response_type, VOLATILE)
         self._writers.append(writer)
 
-        def asked(sample: Payload) -> None:
+        def asked(sample: Payload | InvalidSample) -> None:
             if not isinstance(sample, Payload) or self._programs.participant(sample.sample_info.publication_handle).startswith(FAST_DDS):
                 return
             try:
