@@ -112,6 +112,7 @@ class DdsTransport(Transport):
             self._requests.close()
             self._calls.close()
             self._participant.__del__()  # now, with all that is on it, and not when somebody lets go of the last part
+            del self._domain
 
     def _writer(self, topic: str, type_: type[Payload], quality: Qos, ros_type: str = "") -> DataWriter[Payload]:
         self._topics.add(topic)

@@ -23,7 +23,7 @@ _BASES: dict[str, Any] = {
     "char": types.uint8,
     **{name: getattr(types, name) for name in ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64")},
 }
-_REQUEST_HEADER = {"client_guid": types.uint64, "client_sequence": types.int64}
+_REQUEST_HEADER = {"guid": types.uint64, "seq": types.int64}
 """What rmw_cyclonedds puts before requests and replies: ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t)."""
 
 
