@@ -4,7 +4,7 @@ It is made once, in XDG's cache folder, by `python -m tests.devices.ros.rclpy_en
 the fixture `rclpy_python`. A program by hand:
 
     export ROS_DOMAIN_ID=42 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
-    $(python -m tests.devices.ros.rclpy_environment) tests/devices/ros/rclpy_crtk.py PSM1
+    $(python -m tests.devices.ros.rclpy_environment) program.py
 """
 
 import fcntl
@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import venv
 from hashlib import sha256
 from pathlib import Path
@@ -51,6 +52,8 @@ def python():
 def make(directory, executable, texts):
     if shutil.which("gcc") is None or shutil.which("g++") is None:
         raise NoEnvironmentError("gcc and g++ are needed, to compile the messages of crtk_msgs")
+    if not Path(sysconfig.get_path("include"), "Python.h").exists():
+        raise NoEnvironmentError("Python.h is needed, to compile the messages of crtk_msgs: install python3-dev")
     venv.create(directory, clear=True)
     install = [sys.executable, "-m", "pip", "--python", executable, "install", "--quiet", *WHEELS]
     installed = subprocess.run(install, capture_output=True, text=True, check=False)
