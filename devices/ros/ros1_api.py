@@ -5,19 +5,21 @@ Source: wiki.ros.org/ROS/Master_API and wiki.ros.org/ROS/Slave_API.
 
 from __future__ import annotations
 
+import logging
 import threading
 import xmlrpc.client
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from http.client import HTTPConnection, HTTPException
+from http.client import HTTPConnection
 from socketserver import ThreadingMixIn
 from typing import Any, NamedTuple
-from xml.parsers.expat import ExpatError
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 from schemas.errors import DeviceError
 
 __all__ = ["Answer", "Program", "ProgramServer", "said"]
+
+log = logging.getLogger(__name__)
 
 _TIMEOUT_S = 2.0
 """For a program that is there and does not answer, such as a stopped one."""
@@ -50,7 +52,7 @@ class Program:
     def __init__(self, uri: str, caller: str) -> None:
         """Take its address, `http://host:port`, and the name of the node that calls."""
         self.uri, self._caller = uri, caller
-        self._proxy = xmlrpc.client.ServerProxy(uri, transport=_Timed())
+        self._proxy: xmlrpc.client.ServerProxy | None = None
 
     def call(self, method: str, *arguments: Any) -> Answer:
         """Call a method. Raises DeviceError if there is no answer."""
@@ -59,35 +61,49 @@ class Program:
     def call_all(self, calls: Sequence[tuple[str, Sequence[Any]]]) -> list[Answer]:
         """Call methods of a master, all in one request. Raises DeviceError if there is no answer."""
         boxed = [{"methodName": method, "params": [self._caller, *arguments]} for method, arguments in calls]
-        answers: list[Any] = self._ask("system.multicall", boxed)
-        return [self._answer(answer) for (answer, *_) in answers]  # of a fault, a dictionary, it takes a name, which is no answer
+        match self._ask("system.multicall", boxed):
+            case [*answers] if len(answers) == len(calls):
+                return [self._answer(answer) for answer in answers]
+            case other:
+                raise self._wrong(other)
 
     def _ask(self, method: str, *arguments: Any) -> Any:
         try:
+            if self._proxy is None:
+                self._proxy = xmlrpc.client.ServerProxy(self.uri, transport=_Timed())
             return getattr(self._proxy, method)(*arguments)
-        except (OSError, xmlrpc.client.Error, HTTPException, ExpatError) as error:
+        except Exception as error:  # beside errors of its own, xmlrpc lets ValueError, LookupError, zlib.error and more through for what is no answer
             raise DeviceError(f"{self.uri} does not answer '{method}' ({error})") from error
 
     def _answer(self, answer: Any) -> Answer:
         match answer:
-            case [int(code), str(word), value]:
+            case [int(code), str(word), value] | [[int(code), str(word), value]]:  # in a box of its own where several are asked for
                 return Answer(code, word, value)
             case _:
-                pass
-        raise DeviceError(f"{self.uri} gives an answer that is none of ROS 1: {answer!r:.200}")
+                raise self._wrong(answer)
+
+    def _wrong(self, answer: Any) -> DeviceError:
+        return DeviceError(f"{self.uri} gives an answer that is none of ROS 1: {answer!r:.200}")
 
     def close(self) -> None:
         """Close the connection."""
-        self._proxy("close")()
+        if self._proxy is not None:
+            self._proxy("close")()
 
 
 class _Handler(SimpleXMLRPCRequestHandler):
     timeout = 10.0  # for one that connects and says nothing
 
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002
+        log.debug(format, *args)
+
 
 class _Server(ThreadingMixIn, SimpleXMLRPCServer):
     daemon_threads = True
     block_on_close = False
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002
+        log.debug("ROS 1: a call from %s is left unanswered", client_address, exc_info=True)
 
 
 def _listed(method: Callable[..., Answer], *arguments: Any) -> list[Any]:

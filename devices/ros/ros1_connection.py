@@ -28,9 +28,13 @@ Incoming = Callable[[bytes], None]
 """Takes a message, without its length."""
 
 _LENGTH = struct.Struct("<I")
-_READ_BYTES = 1 << 18
+_READ_BYTES = 1 << 14
+"""At once, of one connection: a flood on it has the others wait for so much."""
 _MOST_HEADER_BYTES = 1 << 20
 _BACKLOG = 1000
+_KEEPALIVE = {"TCP_KEEPIDLE": 60, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 9}
+"""Seconds of silence until it is asked whether the other machine is still there, between two questions, and how many of them; where the system lets them be
+set. As rospy has it (ros/ros_comm, clients/rospy/src/rospy/impl/tcpros_base.py): one that lost its power closes no connection."""
 
 
 def header_frame(fields: Fields) -> bytes:
@@ -70,6 +74,10 @@ class Connection:
         self._loop, self._socket, self._greeted, self._lost, self.keep = loop, sock, greeted, lost, keep
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in _KEEPALIVE.items():
+            if hasattr(socket, name):
+                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
         self.address = str(sock.getpeername()[0])
         self.program = self.address
         """Name of the program at the other side, once its header has come."""
@@ -153,6 +161,9 @@ class Connection:
         except MessageError as error:
             log.warning("ROS 1: the connection with %s is closed: %s", self.program, error)
             self.close()
+        except Exception:  # what was read is not taken again and again
+            self.close()
+            raise
 
     def _take_frames(self) -> None:
         at = 0

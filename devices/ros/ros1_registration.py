@@ -68,7 +68,7 @@ class Registration:
             try:
                 self._look()
                 self._obstacle = ""
-            except DeviceError as error:
+            except (DeviceError, TypeError) as error:  # TypeError: a master that tells of no list of publishers
                 self._known = 0
                 if str(error) != self._obstacle:
                     self._obstacle = str(error)

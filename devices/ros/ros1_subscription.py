@@ -77,7 +77,7 @@ class _Link:
 
     def retry(self) -> None:
         """Have the connection made again, later each time that it fails."""
-        self.connection = None
+        self.connection, self.there_before = None, True  # what the program has kept by then was heard, or could not be told while it was meant
         self.delay = min(max(2 * self.delay, _SOONEST_S), _LATEST_S)
         self.due = monotonic() + self.delay
 
@@ -86,7 +86,6 @@ class _Link:
         self.subscription.check(fields)
         self.delay = 0.0
         keeps = self.there_before and fields.get("latching") == "1"
-        self.there_before = True  # when it is made again, what was kept has been heard
         kept_until, linked_ns = monotonic() + _KEPT_S, time_ns()
 
         def heard(message: bytes) -> None:
@@ -104,6 +103,8 @@ class Subscriptions:
         """Take what watches the connections, and the name of our node."""
         self._loop, self._node = loop, node
         self._subscriptions: dict[str, Subscription] = {}
+        self._listed: set[str] = set()
+        """Topics of which a master has told who published them before us."""
         self._links: dict[str, dict[str, _Link]] = {}
         """By address of the program and topic."""
         self._changing = threading.Condition()
@@ -126,21 +127,25 @@ class Subscriptions:
         self._subscriptions[subscription.topic] = subscription
 
     def update(self, topic: str, uris: Iterable[str], *, there_before: bool) -> None:
-        """Take the addresses of all programs that publish a topic; `there_before`: they did so before we listened.
+        """Take the addresses of all programs that publish a topic; `there_before`: it is a master's answer to our registration, so they did before we listened.
 
-        One that is not among them and still connected is heard until it goes: a master that has started again knows nobody.
+        Of whom it tells before that, it is not known. One that is not among them and still connected is heard until it goes: a master that has started again
+        knows nobody.
         """
         subscription, publishing = self._subscriptions.get(topic), set(uris)
         if subscription is None:
             return
         with self._changing:
+            if there_before:
+                self._listed.add(topic)
+            kept_before = there_before or topic not in self._listed
             for uri in sorted(publishing):
                 links = self._links.get(uri)
                 if links is None and not self._closed:
                     links = self._links[uri] = {}
                     threading.Thread(target=self._connect_all, args=(uri,), name=f"ROS 1 {uri}", daemon=True).start()
                 if links is not None:
-                    links.setdefault(topic, _Link(subscription, there_before=there_before))
+                    links.setdefault(topic, _Link(subscription, there_before=kept_before))
             for uri, links in self._links.items():
                 if topic in links:
                     links[topic].wanted = uri in publishing
@@ -150,43 +155,42 @@ class Subscriptions:
         """Keep the links to one program connected, as long as there are any."""
         program, links, told = Program(uri, self._node), self._links[uri], False
         try:
-            while (due := self._due(uri, links)) is not None:
-                for link in due:
-                    try:
-                        self._connect(program, link)
-                    except (OSError, DeviceError, ValueError, TypeError) as error:
-                        is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)  # it has ended without a word to the master
-                        log.log(logging.DEBUG if is_gone or told else logging.WARNING, _UNREACHED, uri, link.subscription.topic, error)
-                        told = told or not is_gone
-                        with self._changing:
-                            link.retry()
+            while (link := self._due(uri, links)) is not None:
+                try:
+                    self._connect(program, link)
+                except (OSError, DeviceError, ValueError) as error:
+                    is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)  # it has ended without a word to the master
+                    log.log(logging.DEBUG if is_gone or told else logging.WARNING, _UNREACHED, uri, link.subscription.topic, error)
+                    told = told or not is_gone
+                    with self._changing:
+                        link.retry()
         finally:
             program.close()
 
-    def _due(self, uri: str, links: dict[str, _Link]) -> list[_Link] | None:
-        """Wait for links that are to be connected now; None when there are no links any more."""
+    def _due(self, uri: str, links: dict[str, _Link]) -> _Link | None:
+        """Wait for a link that is to be connected now; None when there are no links any more."""
         with self._changing:
             while not self._closed:
                 for topic in [topic for topic, link in links.items() if link.connection is None and not link.wanted]:
                     del links[topic]
                 if not links:
                     break
-                now = monotonic()
                 missing = [link for link in links.values() if link.connection is None]
-                due = [link for link in missing if link.due <= now]
-                if due:
-                    return due
-                self._changing.wait(min(link.due for link in missing) - now if missing else None)
+                first = min(missing, key=lambda link: link.due, default=None)
+                if first is not None and first.due <= monotonic():
+                    return first
+                self._changing.wait(None if first is None else first.due - monotonic())
             del self._links[uri]
             return None
 
     def _connect(self, program: Program, link: _Link) -> None:
-        """Connect to a topic of a program. Raises OSError, DeviceError, or of a wrong answer ValueError or TypeError, if that cannot be."""
+        """Connect to a topic of a program. Raises OSError, DeviceError, or of a host's name that is none ValueError, if that cannot be."""
         answer = program.call("requestTopic", link.subscription.topic, [["TCPROS"]])
-        if answer.code != 1:
-            raise DeviceError(answer.word)
-        _, host, port = answer.value
-        sock = socket.create_connection((host, port), _CONNECT_S)
+        match answer:
+            case (1, _, [_, str(host), int(port)]) if 0 < port < 1 << 16:
+                sock = socket.create_connection((host, port), _CONNECT_S)
+            case _:
+                raise DeviceError(f"it names no place to connect to: {answer}")
         try:
             with self._changing:
                 self._begin(link, sock)

@@ -322,9 +322,8 @@ def test_a_master_that_comes_later_and_one_that_starts_again(tmp_path, caplog):
                 ros.start()
                 with Program(ros, "second") as second:
                     second.join([(STATE, JOINTS, "publish"), (COMMAND, JOINTS, "subscribe")])
-                    psm.write(STATE[1:], np.zeros(18))
                     for each in (first, second):
-                        assert each.heard(STATE, 5.0), "whoever was connected stays so"
+                        assert until(lambda each=each: psm.write(STATE[1:], np.zeros(18)) or each.heard(STATE, 0.1)), "whoever was connected stays so"
                 first.send(COMMAND, joints())
                 assert came_in(psm, COMMAND)
             ros.stop()
