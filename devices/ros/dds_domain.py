@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -82,8 +83,10 @@ def _confine(number: int) -> None:
     ports = range(_FIRST_PORT + number * _PORTS, _FIRST_PORT + (number + 1) * _PORTS)
     for entry in _OPEN_FILES.iterdir() if _OPEN_FILES.is_dir() else ():
         try:
+            if not stat.S_ISSOCK(entry.stat().st_mode):
+                continue
             ours = socket.socket(fileno=os.dup(int(entry.name)))
-        except OSError:  # no socket, or closed meanwhile
+        except OSError:  # closed meanwhile
             continue
         with ours:
             if ours.family == socket.AF_INET and ours.type == socket.SOCK_DGRAM and ours.getsockname()[1] in ports:

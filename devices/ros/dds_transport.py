@@ -37,6 +37,10 @@ _ALWAYS = (Policy.Reliability.Reliable(0), Policy.DataRepresentation(use_cdrv0_r
 
 VOLATILE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(10))
 """As ROS programs have it: the last ten messages."""
+_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_LARGE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(60))
+"""Of pictures, a second at 60 Hz. What is larger than a packet comes in parts, and a reader of Fast DDS 2.14 that has some of them never returns from its next
+take when it is told that the rest is gone (docs/decisions/0030): so the rest is there while a busy machine loses packets."""
 _LAST = Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1)
 LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), _LAST)
 _HEARD = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
@@ -68,7 +72,8 @@ class DdsTransport(Transport):
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         type_ = payload_type(row.type)
-        writer = self._writer(f"rt{row.topic}", type_, LATCHED if row.latched else VOLATILE, row.type)
+        quality = LATCHED if row.latched else _LARGE if row.type in _PICTURES else VOLATILE
+        writer = self._writer(f"rt{row.topic}", type_, quality, row.type)
         self._writers.append(writer)
         self._announce()
 

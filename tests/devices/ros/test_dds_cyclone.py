@@ -148,6 +148,15 @@ def test_nothing_but_the_loopback_interface_reaches_it(gateway):
     assert all(bound.values())
 
 
+def test_opening_and_closing_leaves_no_file_open(tmp_path):
+    number = free_domain()
+    counts = []
+    for _ in range(3):
+        opened(number, tmp_path).close()
+        counts.append(len(list(Path("/proc/self/fd").iterdir())))
+    assert counts[0] == counts[-1]
+
+
 def test_two_gateways_of_one_process_share_a_domain_if_they_say_the_same(gateway, tmp_path):
     number = gateway.params.domain
     with opened(number, tmp_path, "second", namespace="sim") as second:
