@@ -88,6 +88,11 @@ class _Program:
     """By writer."""
     sending: dict[tuple[bytes, bytes], Sending] = field(default_factory=dict[tuple[bytes, bytes], Sending])
     """By writer and reader."""
+    early: list[tuple[_Service, Data]] = field(default_factory=list["tuple[_Service, Data]"])
+    """Requests of clients that are not known to listen yet."""
+
+
+_MOST_EARLY = 64
 
 
 class Calls:
@@ -176,6 +181,8 @@ class Calls:
         post = self._poster(prefix, builtin)
         program.receiving[_PUBLICATIONS] = Receiving(post, _PUBLICATIONS_HEARD, _PUBLICATIONS, partial(self._publication, prefix))
         program.receiving[_SUBSCRIPTIONS] = Receiving(post, _SUBSCRIPTIONS_HEARD, _SUBSCRIPTIONS, partial(self._subscription, prefix))
+        for line in program.receiving.values():
+            line.begin()
         for writer, reader in ((_PUBLICATIONS, _PUBLICATIONS_HEARD), (_SUBSCRIPTIONS, _SUBSCRIPTIONS_HEARD)):
             program.sending[writer, reader] = Sending(post, writer, reader)
         self._announce([builtin])
@@ -194,6 +201,7 @@ class Calls:
                 writer = listed[_ENDPOINT_ID][12:16]
                 post = self._poster(prefix, program.address)
                 program.receiving[writer] = Receiving(post, service.reader, writer, partial(self._asked, service, prefix))
+                program.receiving[writer].begin()
 
     def _subscription(self, prefix: bytes, told: Data) -> None:
         """Open a line for responses to a client, or close it."""
@@ -207,12 +215,16 @@ class Calls:
             if listed[_TOPIC].startswith(text(service.response)):
                 reader = listed[_ENDPOINT_ID][12:16]
                 program.sending[service.writer, reader] = Sending(self._poster(prefix, program.address), service.writer, reader)
+        early, program.early = program.early, []
+        for service, request in early:
+            self._asked(service, prefix, request)
 
     def _asked(self, service: _Service, prefix: bytes, request: Data) -> None:
         reader = (request.qos.get(_RELATED) or request.qos.get(_RELATED_FAST) or b"")[:16]
-        line = self._programs[prefix].sending.get((service.writer, reader[12:]))
+        program = self._programs[prefix]
+        line = program.sending.get((service.writer, reader[12:]))
         if line is None:
-            log.warning("%s: a request is not answered: its client is not known to listen", service.request)
+            program.early = [*program.early, (service, request)][-_MOST_EARLY:]
             return
         try:
             response = service.handle(request.payload)

@@ -60,6 +60,10 @@ class Receiving:
         self._waiting: dict[int, Data | None] = {}
         """What came before its turn; None: it will never come."""
 
+    def begin(self) -> None:
+        """Ask what there is: something may have come before this line was there, and writers tell of themselves only every few seconds."""
+        self._post([acknack(self._writer, self._reader, 0, (), 0)])
+
     def came(self, sample: Data) -> None:
         """Take a sample in its turn."""
         if self._expected <= sample.number < self._expected + _KEPT:
