@@ -33,8 +33,9 @@ def percentiles(times_ns: list[int]) -> dict[str, float]:
     return {"count": len(ordered)} | {name: round(value / 1e6, 3) for name, value in picked.items()}
 
 
-def begin() -> None:
+def begin(client: Any) -> None:
     """Say that all is declared, and wait until the other side is ready, too."""
+    client.start()
     print("ready", flush=True)
     sys.stdin.readline()
 
@@ -67,7 +68,7 @@ def listen(client: Any, topics: list[tuple[str, str]], seconds: float) -> dict[s
     heard = {topic: Heard(client) for topic, _ in topics}
     for topic, type_ in topics:
         client.listen(topic, type_, heard[topic].take)
-    begin()
+    begin(client)
     sleep(1.0)
     begun_ns = time_ns()
     sleep(seconds)
@@ -142,7 +143,7 @@ def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     """Tell an arm now and then to go 2 mrad to or fro, and note when its setpoint and its joint are seen to follow."""
     arm, times, pause = Arm(client, arm_name), {"setpoint_js": [], "measured_js": []}, random.Random(0)
     stamped: dict[str, list[int]] = {"setpoint_js": [], "measured_js": []}
-    begin()
+    begin(client)
     arm.await_joints()
     home(arm)
     goal, never = list(arm.joints["setpoint_js"][0]), 0
@@ -165,7 +166,7 @@ def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
 def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     """`move_jp(...).wait()`, 2 mrad to and fro."""
     arm, took_ns, missed, hung = Arm(client, arm_name), [], 0, 0
-    begin()
+    begin(client)
     arm.await_joints()
     home(arm)
     goal = list(arm.joints["setpoint_js"][0])
@@ -183,7 +184,7 @@ def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:
 def cycles(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     """Enable and home from nothing, as a client does in the morning, and let go of all again."""
     arm, took_ns, missed, hung = Arm(client, arm_name), [], 0, 0
-    begin()
+    begin(client)
     arm.await_joints()
     home(arm)
     for _ in range(count):

@@ -9,14 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from importlib import import_module
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 __all__ = ["JOINT_STATE", "MIDDLEWARE", "OPERATING_STATE", "STRING_STAMPED"]
 
 Take = Callable[[Any, "int | None"], None]
 JOINT_STATE, OPERATING_STATE, STRING_STAMPED = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState", "crtk_msgs/msg/StringStamped"
-PATIENCE_S = 20.0
+PATIENCE_S, POLL_S = 20.0, 5e-4
 
 
 class Zenoh:
@@ -31,6 +31,9 @@ class Zenoh:
 
     def listen(self, topic: str, type_: str, take: Take, *, latched: bool = False) -> None:
         self._peer.listen(topic, type_, lambda message, attached: take(message, attached[0]), latched=latched)
+
+    def start(self) -> None:
+        """Messages are taken as they come."""
 
     def advertise(self, topic: str, type_: str) -> None:
         self._publish[topic] = self._peer.publisher(topic, type_)
@@ -63,29 +66,33 @@ class Zenoh:
 
 
 class Rclpy:
-    """A node on rclpy and its executor; its domain is in the environment."""
+    """A node on rclpy, whose domain is in the environment. Its messages are taken one after the other: the executor in Python is too slow for so many."""
 
     def __init__(self, where: str) -> None:
         import rclpy
-        from rclpy.executors import SingleThreadedExecutor
 
         rclpy.init()
-        self._rclpy, self._node, self._publishers = rclpy, rclpy.create_node("figures"), {}
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._thread: Thread | None = None
+        self._rclpy, self._node, self._publishers, self._takers = rclpy, rclpy.create_node("figures"), {}, []
+        self._ending = Event()
+        self._thread = Thread(target=self._run, daemon=True)
 
     def listen(self, topic: str, type_: str, take: Take, *, latched: bool = False) -> None:
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-
-        def heard(message: Any, info: Any) -> None:
-            take(message, info["publication_sequence_number"])
-
-        self._node.create_subscription(self._found(type_), topic, heard, QoSProfile(depth=10, durability=durability))
-        self._spin()
+        subscription = self._node.create_subscription(self._found(type_), topic, lambda _: None, QoSProfile(depth=10, durability=durability))
+        self._takers.append((subscription, take))
         _wait(lambda: self._node.count_publishers(topic))
+
+    def start(self) -> None:
+        """Begin to take messages."""
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ending.wait(POLL_S):
+            for subscription, take in self._takers:
+                while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
+                    take(taken[0], taken[1]["publication_sequence_number"])
 
     def advertise(self, topic: str, type_: str) -> None:
         publisher = self._publishers[topic] = self._node.create_publisher(self._found(type_), topic, 10)
@@ -114,18 +121,12 @@ class Rclpy:
         package, kind, name = type_.split("/")
         return getattr(import_module(f"{package}.{kind}"), name)
 
-    def _spin(self) -> None:
-        if self._thread is None:
-            self._thread = Thread(target=self._executor.spin, daemon=True)
-            self._thread.start()
-
     stamp_ns = staticmethod(Zenoh.stamp_ns)
 
     def close(self) -> None:
-        self._executor.shutdown()
+        self._ending.set()
+        self._thread.join(PATIENCE_S)
         self._rclpy.shutdown()
-        if self._thread is not None:
-            self._thread.join(PATIENCE_S)
 
 
 class Rospy:
@@ -145,6 +146,8 @@ class Rospy:
             topic, self._class(type_), lambda message: take(message, message.header.seq), queue_size=10, buff_size=picture, tcp_nodelay=True
         )
         _wait(heard.get_num_connections)
+
+    start = Zenoh.start
 
     def advertise(self, topic: str, type_: str) -> None:
         publisher = self._publishers[topic] = self._rospy.Publisher(topic, self._class(type_), queue_size=10, tcp_nodelay=True)
