@@ -45,7 +45,7 @@ class Console(RclpyPeer):
 
     def __init__(self, python, gateway, name="console", **settings):
         super().__init__(python, gateway.params.domain, name, **settings)
-        self.gateway = gateway
+        self.gateway, self.name = gateway, name
 
     def join(self, rows):
         super().join(rows)
@@ -53,6 +53,7 @@ class Console(RclpyPeer):
         found = [it.get_publication_matched_status for it in transport._writers if it.topic.name in topics]
         found += [it.get_subscription_matched_status for it in transport._readers if it.topic.name in topics]
         assert until(lambda: all(status().current_count for status in found))
+        assert until(lambda: any(client.name == f"/{self.name}" for client in transport.clients())), "nobody has told the gateway its name"
 
 
 def test_every_row_of_the_table(rclpy_python, domain, tmp_path):
@@ -116,7 +117,8 @@ def test_a_console_that_comes_back_is_there_again(rclpy_python, psm):
         with console(rclpy_python, psm, STATE, COMMAND) as program:
             psm.write(STATE[1:], np.zeros(18))
             assert program.heard(row(psm, STATE), 5.0)
-            assert until(lambda: program.send(row(psm, COMMAND), joints()) or came(psm))  # for a second it is another one's arm
+            program.send(row(psm, COMMAND), joints())
+            assert until(lambda: came(psm))
         assert until(lambda: psm._transport.clients() == ())
 
 
