@@ -64,6 +64,8 @@ class Arrivals(WaitSet):
                     self._taken[number]()
                 except DDSException as error:
                     log.warning("a reader of DDS fails: %s", error)
+                except Exception:  # one sample that goes wrong in a way nobody thought of is not to end all hearing
+                    log.exception("a sample on DDS cannot be taken")
 
     def close(self) -> None:
         """Take nothing more."""

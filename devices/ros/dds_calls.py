@@ -1,7 +1,8 @@
-"""Answers services to programs with rmw_fastrtps, which tell a request from another by parameters beside the message, where Cyclone DDS lets nobody look.
+"""Answers services. Programs with rmw_fastrtps tell a request from another by parameters beside the message, where Cyclone DDS lets nobody look.
 
-So it is a participant of its own, of which such programs see servers and nothing else. Source of what is said beside a request and its response:
-ros2/rmw_fastrtps, rmw_fastrtps_shared_cpp/src/rmw_request.cpp and rmw_response.cpp.
+So it is a participant of its own, of which programs see servers and nothing else. It answers those with rmw_cyclonedds, too: of two servers a program would
+take the first that it finds for the one that hears it. Sources of what a request and its response say beside what is asked: ros2/rmw_fastrtps,
+rmw_fastrtps_shared_cpp/src/rmw_request.cpp and rmw_response.cpp; ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import os
 import socket
 import struct
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from time import monotonic
@@ -35,13 +36,14 @@ from devices.ros.dds_rtps import (
 from devices.ros.transport import Handler
 from schemas.errors import MessageError
 
-__all__ = ["FAST_DDS", "Calls"]
+__all__ = ["Calls"]
 
 log = logging.getLogger(__name__)
 
-FAST_DDS = b"\x01\x0f"
-"""Vendor of a participant, the first two bytes of its id."""
-_NO_VENDOR = b"\x00\x00"
+_FAST_DDS, _CYCLONE_DDS, _NO_VENDOR = b"\x01\x0f", b"\x01\x10", b"\x00\x00"
+"""Vendors of a participant, the first two bytes of its id."""
+_HEADER = slice(4, 20)
+"""Of requests and responses of rmw_cyclonedds, behind the encapsulation header: which client, and the number of its request."""
 
 _PARTICIPANT = b"\x00\x00\x01\xc1"
 _FINDER, _FOUND = b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7"
@@ -58,7 +60,9 @@ _RELIABLE, _VOLATILE = struct.pack("<iiI", 2, 0, 100_000_000), struct.pack("<i",
 _GONE = b"\x00\x00\x00\x03"
 _ALL_BUILTIN = struct.pack("<I", 0b111111)
 
-_LEASE_S, _PERIOD_S = 20.0, 1.0
+_LEASE_S, _PERIOD_S, _REMEMBERED_S = 20.0, 1.0, 3600.0
+"""How long a participant that says nothing is taken to be there, how often we say that we are, and how long the numbers of lines are kept: one that was
+stopped for longer than its lease, as in a debugger, goes on with those that it knows."""
 _FIRST_PORT, _PORTS, _FIRST_OWN, _PER_PARTICIPANT, _MOST_PROGRAMS = 7400, 250, 10, 2, 32
 _GROUP = "239.255.0.1"
 """Where programs listen for others: DDSI-RTPS 9.6.2.3."""
@@ -100,6 +104,7 @@ class Calls:
 
     def __init__(self, domain: int, *, multicast: bool, hosts: Sequence[str]) -> None:
         """Begin to look for programs of a domain: on `hosts`, and on the network if `multicast`. Only 127.0.0.1 is heard if nothing else is looked for."""
+        self._other = b""
         confined = not multicast and all(host == "127.0.0.1" for host in hosts)
         base = _FIRST_PORT + _PORTS * domain
         own_ports = range(base + _FIRST_OWN, base + _FIRST_OWN + _PER_PARTICIPANT * (_MOST_PROGRAMS + 1), _PER_PARTICIPANT)
@@ -116,8 +121,17 @@ class Calls:
         self._thread = threading.Thread(target=self._run, name="DDS services", daemon=True)
         self._thread.start()
 
-    def serve(self, topic: str, ros_type: str, handle: Handler) -> None:
-        """Begin to answer the service `topic` (`/PSM1/forward_kinematics`) of type `ros_type` (`crtk_msgs/srv/QueryForwardKinematics`)."""
+    def ignore(self, participant: bytes) -> None:
+        """Take the participant with this id, which asks nothing, for nobody: the other one of the same gateway."""
+        with self._changing:
+            self._other = participant[:12]
+            self._programs.pop(self._other, None)  # found already
+
+    def serve(self, topic: str, ros_type: str, handle: Handler) -> tuple[bytes, bytes]:
+        """Begin to answer the service `topic` (`/PSM1/forward_kinematics`) of type `ros_type` (`crtk_msgs/srv/QueryForwardKinematics`).
+
+        Returns the ids (16 bytes) of the reader of requests and of the writer of responses.
+        """
         package, group, name = ros_type.split("/")
         key = struct.pack(">I", len(self._services) + 1)[1:]
         service = _Service(f"rq{topic}Request", f"rr{topic}Reply", f"{package}::{group}::dds_::{name}_", key + _READER_KIND, key + _WRITER_KIND, handle)
@@ -125,6 +139,7 @@ class Calls:
             self._services.append(service)
             for program in self._programs.values():
                 self._tell(program, service)
+        return self._prefix + service.reader, self._prefix + service.writer
 
     def _run(self) -> None:
         due = monotonic()
@@ -143,16 +158,19 @@ class Calls:
                 self._take(received(datagram, self._prefix), address[0])
             except (MessageError, struct.error) as error:
                 log.debug("a datagram from %s is not heeded: %s", address[0], error)
+            except Exception:  # one that goes wrong in a way nobody thought of is not to leave the others without answers
+                log.exception("a datagram from %s makes services fail", address[0])
 
     def _tidy(self, now: float) -> None:
         with self._changing:
-            self._programs = {prefix: it for prefix, it in self._programs.items() if now - it.heard_s < _LEASE_S}
+            self._programs = {prefix: it for prefix, it in self._programs.items() if now - it.heard_s < _REMEMBERED_S}
             for program in self._programs.values():
-                for line in program.sending.values():
-                    line.repeat()
+                if now - program.heard_s < _LEASE_S:
+                    for line in program.sending.values():
+                        line.repeat()
 
     def _take(self, got: Received, host: str) -> None:
-        if got.source[:2] != FAST_DDS:
+        if got.source[:2] not in (_FAST_DDS, _CYCLONE_DDS) or got.source == self._other:
             return
         with self._changing:
             for part in got.submessages:
@@ -169,7 +187,7 @@ class Calls:
 
     def _found(self, prefix: bytes, told: Data, host: str) -> None:
         """Take note of a participant that is there, or gone."""
-        if told.qos.get(_STATUS, bytes(4))[3] & _GONE[3]:
+        if _is_gone(told):
             self._programs.pop(prefix, None)
             return
         known = self._programs.get(prefix)
@@ -179,10 +197,8 @@ class Calls:
         builtin, user = ((host, struct.unpack_from("<I", _listed(told)[locator], 4)[0]) for locator in (_BUILTIN_UNICAST, _UNICAST))
         program = self._programs[prefix] = _Program(builtin, user, monotonic())
         post = self._poster(prefix, builtin)
-        program.receiving[_PUBLICATIONS] = Receiving(post, _PUBLICATIONS_HEARD, _PUBLICATIONS, partial(self._publication, prefix))
-        program.receiving[_SUBSCRIPTIONS] = Receiving(post, _SUBSCRIPTIONS_HEARD, _SUBSCRIPTIONS, partial(self._subscription, prefix))
-        for line in program.receiving.values():
-            line.begin()
+        program.receiving[_PUBLICATIONS] = _line(post, prefix, _PUBLICATIONS_HEARD, _PUBLICATIONS, partial(self._publication, prefix))
+        program.receiving[_SUBSCRIPTIONS] = _line(post, prefix, _SUBSCRIPTIONS_HEARD, _SUBSCRIPTIONS, partial(self._subscription, prefix))
         for writer, reader in ((_PUBLICATIONS, _PUBLICATIONS_HEARD), (_SUBSCRIPTIONS, _SUBSCRIPTIONS_HEARD)):
             program.sending[writer, reader] = Sending(post, writer, reader)
         self._announce([builtin])
@@ -192,22 +208,21 @@ class Calls:
     def _publication(self, prefix: bytes, told: Data) -> None:
         """Listen to a client's requests, or no more."""
         program = self._programs[prefix]
-        if told.qos.get(_STATUS, bytes(4))[3] & _GONE[3]:
-            program.receiving.pop(told.qos.get(_KEY_HASH, bytes(16))[12:], None)
+        if _is_gone(told):
+            program.receiving.pop(_identity(told), None)
             return
         listed = _listed(told)
         for service in self._services:
             if listed[_TOPIC].startswith(text(service.request)):
                 writer = listed[_ENDPOINT_ID][12:16]
                 post = self._poster(prefix, program.address)
-                program.receiving[writer] = Receiving(post, service.reader, writer, partial(self._asked, service, prefix))
-                program.receiving[writer].begin()
+                program.receiving[writer] = _line(post, prefix, service.reader, writer, partial(self._asked, service, prefix))
 
     def _subscription(self, prefix: bytes, told: Data) -> None:
         """Open a line for responses to a client, or close it."""
         program = self._programs[prefix]
-        if told.qos.get(_STATUS, bytes(4))[3] & _GONE[3]:
-            gone = told.qos.get(_KEY_HASH, bytes(16))[12:]
+        if _is_gone(told):
+            gone = _identity(told)
             program.sending = {ids: line for ids, line in program.sending.items() if ids[1] != gone}
             return
         listed = _listed(told)
@@ -220,19 +235,26 @@ class Calls:
             self._asked(service, prefix, request)
 
     def _asked(self, service: _Service, prefix: bytes, request: Data) -> None:
-        reader = (request.qos.get(_RELATED) or request.qos.get(_RELATED_FAST) or b"")[:16]
-        program = self._programs[prefix]
-        line = program.sending.get((service.writer, reader[12:]))
-        if line is None:
+        """Answer: to the client that is named beside the request, or to all of the program, of which each looks for its header."""
+        program, payload = self._programs[prefix], request.payload
+        if prefix.startswith(_FAST_DDS):
+            reader = (request.qos.get(_RELATED) or request.qos.get(_RELATED_FAST) or b"")[:16]
+            identity = reader + sequence_number(request.number)
+            header, beside = b"", {_RELATED: identity, _RELATED_FAST: identity}
+            listening = [line for ids, line in program.sending.items() if ids == (service.writer, reader[12:])]
+        else:
+            header, payload, beside = payload[_HEADER], payload[: _HEADER.start] + payload[_HEADER.stop :], {}
+            listening = [line for ids, line in program.sending.items() if ids[0] == service.writer]
+        if not listening:
             program.early = [*program.early, (service, request)][-_MOST_EARLY:]
             return
         try:
-            response = service.handle(request.payload)
+            response = service.handle(payload)
         except MessageError as error:
             log.warning("%s: a request is not answered: %s", service.request, error)
             return
-        identity = reader + sequence_number(request.number)
-        line.send(response, {_RELATED: identity, _RELATED_FAST: identity})
+        for line in listening:
+            line.send(response[: _HEADER.start] + header + response[_HEADER.start :], beside)
 
     def _announce(self, targets: Sequence[tuple[str, int]]) -> None:
         locator = struct.pack("<iI12x4s", 1, self._socket.getsockname()[1], socket.inet_aton(self._host))
@@ -286,6 +308,14 @@ class Calls:
             self._socket.close()
 
 
+def _line(post: Post, prefix: bytes, reader: bytes, writer: bytes, take: Callable[[Data], None]) -> Receiving:
+    """Return a line from a program's writer that has begun; Cyclone DDS tells by itself what it has, and takes the question for malformed."""
+    line = Receiving(post, reader, writer, take)
+    if prefix.startswith(_FAST_DDS):
+        line.begin()
+    return line
+
+
 def _hand(line: Receiving, part: Data | Heartbeat | Gap) -> None:
     if isinstance(part, Data):
         line.came(part)
@@ -293,6 +323,15 @@ def _hand(line: Receiving, part: Data | Heartbeat | Gap) -> None:
         line.beat(part)
     else:
         line.skip(part)
+
+
+def _is_gone(told: Data) -> bool:
+    return bool(int.from_bytes(told.qos.get(_STATUS, b"")) & _GONE[3])
+
+
+def _identity(gone: Data) -> bytes:
+    """Return the id (4 bytes) of a reader or writer that is gone: Fast DDS tells it beside what it sends, Cyclone DDS in it."""
+    return (gone.qos.get(_KEY_HASH) or read_parameters(gone.payload[4:])[0].get(_ENDPOINT_ID, b""))[12:16]
 
 
 def _listed(told: Data) -> dict[int, bytes]:

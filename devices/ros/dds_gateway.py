@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,7 +11,7 @@ from pydantic import Field
 from devices.ros.gateway import Gateway
 from devices.ros.params import GatewayParams
 from devices.ros.transport import Transport
-from schemas.errors import MissingExtraError
+from schemas.errors import DeviceError, MissingExtraError
 
 __all__ = ["DdsGateway", "DdsParams"]
 
@@ -49,6 +50,15 @@ class DdsGateway(Gateway):
         except ModuleNotFoundError as error:
             raise MissingExtraError(f"device '{self.name}'", "ros2-dds", "cyclonedds") from error
         where = self._where
-        joined = domain(where.domain, configuration(where.discovery, where.peers))
-        hosts = ("127.0.0.1", *where.peers) if where.discovery == "localhost" else where.peers
+        peers = [_address(peer) for peer in where.peers]  # of a name that it does not know Cyclone DDS ends the process
+        joined = domain(where.domain, configuration(where.discovery, peers))
+        hosts = ["127.0.0.1", *peers] if where.discovery == "localhost" else peers
         return DdsTransport(joined, where.domain, Calls(where.domain, multicast=where.discovery == "subnet", hosts=hosts))
+
+
+def _address(peer: str) -> str:
+    """Return the address of another machine. Raises DeviceError if it is not known here."""
+    try:
+        return socket.gethostbyname(peer)
+    except (OSError, UnicodeError) as error:
+        raise DeviceError(f"the peer '{peer}' is not known to this machine ({error}); expected a name that it knows, or an address (IPv4)") from error

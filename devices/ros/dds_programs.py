@@ -58,12 +58,8 @@ class Programs:
 
     def sender(self, publication: int) -> str:
         """Return the name of the program whose writer has this handle."""
-        participant = self.participant(publication)
-        return self._graph.sender(participant) if participant else f"writer {publication:x}"
-
-    def participant(self, publication: int) -> bytes:
-        """Return the id of the participant whose writer has this handle; empty if it is gone."""
-        return self._senders.get(publication, b"")
+        participant = self._senders.get(publication)
+        return f"writer {publication:x}" if participant is None else self._graph.sender(participant)
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs that read or write any of `topics`, given as DDS calls them."""

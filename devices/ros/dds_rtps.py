@@ -32,7 +32,7 @@ __all__ = [
 
 PL_CDR_LE = b"\x00\x03\x00\x00"
 _SENTINEL = struct.pack("<HH", 1, 0)
-_LITTLE, _INLINE_QOS, _FINAL, _PAYLOAD = 1, 2, 2, 4
+_LITTLE, _INLINE_QOS, _FINAL, _PAYLOAD, _KEY = 1, 2, 2, 4, 8
 _ACKNACK, _HEARTBEAT, _GAP, _INFO_DESTINATION, _DATA = 0x06, 0x07, 0x08, 0x0E, 0x15
 _WINDOW = 256
 """Numbers in a set."""
@@ -48,7 +48,7 @@ class Data:
     qos: Mapping[int, bytes]
     """Parameters beside it."""
     payload: bytes
-    """With its encapsulation header; empty if it only says that something is gone."""
+    """With its encapsulation header; if it only says that something is gone, the key of that or nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +197,7 @@ def _read_data(content: bytes, flags: int) -> Data:
     if flags & _INLINE_QOS:
         qos, length = read_parameters(content[at:])
         at += length
-    return Data(content[8:12], content[4:8], _read_number(content, 12), qos, content[at:] if flags & _PAYLOAD else b"")
+    return Data(content[8:12], content[4:8], _read_number(content, 12), qos, content[at:] if flags & (_PAYLOAD | _KEY) else b"")
 
 
 def _read_number(content: bytes, at: int) -> int:

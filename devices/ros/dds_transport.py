@@ -6,8 +6,6 @@ type) and ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (enclave of a
 
 from __future__ import annotations
 
-import logging
-
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.internal import InvalidSample
@@ -16,18 +14,15 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from devices.ros.dds_arrivals import Arrivals
-from devices.ros.dds_calls import FAST_DDS, Calls
+from devices.ros.dds_calls import Calls
 from devices.ros.dds_graph import INFO_TOPIC, INFO_TYPE, entities_info
 from devices.ros.dds_programs import Programs
-from devices.ros.dds_types import Payload, payload_type, request_type
+from devices.ros.dds_types import Payload, payload_type
 from devices.ros.row import Row
 from devices.ros.transport import Client, Handler, Publisher, Taker, Transport
 from schemas.codec import rihs01
-from schemas.errors import MessageError
 
 __all__ = ["NODE", "DdsTransport"]
-
-log = logging.getLogger(__name__)
 
 NODE = "/dvrk"
 """Name of the node that all belongs to, as on the real system: jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7)."""
@@ -46,26 +41,26 @@ LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLas
 _HEARD = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
 """As many as a gateway takes at once."""
 
-_HEADER = slice(4, 20)
-"""Of requests and replies of rmw_cyclonedds, behind the encapsulation header: which client, and the number of its request."""
-
 
 class DdsTransport(Transport):
     """Publishes, listens and answers as one node on one participant.
 
-    Nothing that is published waits for a reader: each topic keeps its last messages for whoever is slow. Messages and requests are taken in a thread each.
+    Nothing that is published waits for a reader: each topic keeps its last messages for whoever is slow. Messages are taken in a thread of their own.
     """
 
     def __init__(self, domain: Domain, number: int, calls: Calls) -> None:
-        """Join `domain`, whose number is `number`, with what answers programs with rmw_fastrtps there."""
+        """Join `domain`, whose number is `number`, with what answers services there."""
         self._domain, self._calls = domain, calls
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
         self._id = self._participant.guid.bytes
-        self._messages, self._requests = (Arrivals(self._participant, f"DDS {what}") for what in ("messages", "requests"))
+        calls.ignore(self._id)
+        self._messages = Arrivals(self._participant, "DDS messages")
         self._programs = Programs(self._participant, self._messages)  # first: no message comes before its sender
         self._topics: set[str] = set()
         self._readers: list[DataReader[Payload]] = []
         self._writers: list[DataWriter[Payload]] = []
+        self._served: list[tuple[bytes, bytes]] = []
+        """Ids of what hears and answers each service."""
         self._info = self._writer(INFO_TOPIC, payload_type(INFO_TYPE), LATCHED)
         self._closed = False
         self._announce()
@@ -90,22 +85,9 @@ class DdsTransport(Transport):
         self._messages.add(self._reader(f"rt{row.topic}", payload_type(row.type), row.type), heard)
 
     def serve(self, row: Row, handle: Handler) -> None:  # noqa: D102
-        response_type = request_type(f"{row.type}_Response")
-        writer = self._writer(f"rr{row.topic}Reply", response_type, VOLATILE)
-        self._writers.append(writer)
-
-        def asked(sample: Payload | InvalidSample) -> None:
-            if not isinstance(sample, Payload) or self._programs.participant(sample.sample_info.publication_handle).startswith(FAST_DDS):
-                return
-            try:
-                response = handle(sample.cdr[: _HEADER.start] + sample.cdr[_HEADER.stop :])
-            except MessageError as error:
-                log.warning("%s: a request is not answered: %s", row.topic, error)
-                return
-            writer.write(response_type(response[: _HEADER.start] + sample.cdr[_HEADER] + response[_HEADER.start :]))
-
-        self._requests.add(self._reader(f"rq{row.topic}Request", request_type(f"{row.type}_Request")), asked)
-        self._calls.serve(row.topic, row.type, handle)
+        self._topics |= {f"rq{row.topic}Request", f"rr{row.topic}Reply"}
+        self._served.append(self._calls.serve(row.topic, row.type, handle))
+        self._announce()
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
         return self._programs.clients(self._topics)
@@ -114,7 +96,6 @@ class DdsTransport(Transport):
         if not self._closed:
             self._closed = True
             self._messages.close()
-            self._requests.close()
             self._calls.close()
             self._participant.__del__()  # now, with all that is on it, and not when somebody lets go of the last part
             del self._domain
@@ -132,7 +113,8 @@ class DdsTransport(Transport):
 
     def _announce(self) -> None:
         """Tell of which node our readers and writers are."""
-        readers, writers = ([entity.guid.bytes for entity in entities] for entities in (self._readers, self._writers))
+        readers = [*(reader.guid.bytes for reader in self._readers), *(reader for reader, _ in self._served)]
+        writers = [*(writer.guid.bytes for writer in self._writers), *(writer for _, writer in self._served)]
         self._info.write(self._info.data_type(entities_info(self._id, NODE, readers, writers)))
 
 

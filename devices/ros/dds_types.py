@@ -14,7 +14,7 @@ from rosbags.interfaces import Nodetype
 
 from schemas.codec import typestore
 
-__all__ = ["Payload", "payload_type", "request_type"]
+__all__ = ["Payload", "payload_type"]
 
 _BASES: dict[str, Any] = {
     "bool": bool,
@@ -23,8 +23,6 @@ _BASES: dict[str, Any] = {
     "char": types.uint8,
     **{name: getattr(types, name) for name in ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64")},
 }
-_REQUEST_HEADER = {"guid": types.uint64, "seq": types.int64}
-"""What rmw_cyclonedds puts before requests and replies: ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t)."""
 
 
 class Payload(IdlStruct):
@@ -53,12 +51,6 @@ class Payload(IdlStruct):
 def payload_type(ros_type: str) -> type[Payload]:
     """Return the type of messages of `sensor_msgs/msg/JointState`."""
     return make_idl_struct(_class_name(ros_type), _dds_name(ros_type), _fields(ros_type), dataclassify=False, bases=(Payload,))
-
-
-@cache
-def request_type(ros_type: str) -> type[Payload]:
-    """Return the type of one part of a service, such as `crtk_msgs/srv/QueryForwardKinematics_Request`, as rmw_cyclonedds sends it."""
-    return make_idl_struct(_class_name(ros_type), _dds_name(ros_type), _REQUEST_HEADER | _fields(ros_type), dataclassify=False, bases=(Payload,))
 
 
 @cache

@@ -18,6 +18,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
+from devices.ros import dds_rtps
 from devices.ros.dds_domain import configuration, domain
 from devices.ros.dds_gateway import DdsGateway
 from devices.ros.dds_graph import Graph, entities_info
@@ -99,6 +100,23 @@ def test_requests_of_rmw_cyclonedds_are_answered_once_with_what_came_before_them
     time.sleep(0.2)
     assert not hear.take(10)
     program.__del__()
+
+
+def test_a_datagram_that_goes_wrong_ends_no_service(gateway, caplog):
+    calls = gateway._transport._calls
+    torn = dds_rtps.data(b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7", 1, b"", {0x71: b""})
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        for payload in (b"", b"RTPS", dds_rtps.message(b"\x01\x0f" + bytes(10), bytes(12), [torn]), bytes(range(256))):
+            other.sendto(payload, ("127.0.0.1", calls._socket.getsockname()[1]))
+    calls._take = lambda *_: 1 / 0
+    assert until(lambda: "ZeroDivisionError" in caplog.text), "it hears what is told every second"
+    del calls._take
+    assert calls._thread.is_alive()
+
+
+def test_a_peer_that_is_not_known_is_told(tmp_path):
+    with pytest.raises(DeviceError, match=r"the peer 'nowhere\.invalid' is not known to this machine"):
+        opened(free_domain(), tmp_path, peers=["nowhere.invalid"])
 
 
 def test_all_is_told_to_be_of_one_node(gateway):
