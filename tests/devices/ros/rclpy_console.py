@@ -114,6 +114,8 @@ def main(name):
         answer = getattr(console, order.pop("do"))(**order)
         sys.stdout.write(json.dumps(answer) + "\n")
         sys.stdout.flush()
+    for node in (console.node, console.asking):  # at the end of the process alone, nobody is told
+        node.destroy_node()
     rclpy.shutdown()
 
 

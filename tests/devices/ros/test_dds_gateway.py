@@ -98,7 +98,7 @@ def test_all_belongs_to_one_node_called_as_on_the_real_system(rclpy_python, psm)
             offers = [offer[1:] for offer in program.do("offered", topic=topic) if offer[0] == "dvrk"]
             type_ = row(psm, topic).type
             assert offers == [[type_, rihs01(type_), durability, "RELIABLE"]]
-        assert until(lambda: [client.name for client in psm._transport.clients()] == ["/console"])
+        assert until(lambda: [client.name for client in psm._transport.clients()] == ["/console"]), psm._transport.clients()
 
 
 def test_a_program_with_the_default_range_finds_it(rclpy_python, psm):
@@ -119,7 +119,7 @@ def test_a_console_that_comes_back_is_there_again(rclpy_python, psm):
             assert program.heard(row(psm, STATE), 5.0)
             program.send(row(psm, COMMAND), joints())
             assert until(lambda: came(psm))
-        assert until(lambda: psm._transport.clients() == ())
+        assert until(lambda: psm._transport.clients() == ()), psm._transport.clients()
 
 
 def test_a_second_console_does_not_command_the_same_arm(rclpy_python, psm):
