@@ -59,6 +59,9 @@ def domain(number: int, settings: str) -> Domain:
                 _confine(number)
         except DDSException as error:
             raise DeviceError(f"DDS cannot take part in domain {number}: {error.msg}") from error
+        except PermissionError as error:  # before Linux 5.7 that is root's
+            why = f"this system does not let its sockets be bound to the loopback interface ({error})"
+            raise DeviceError(f"DDS cannot take part in domain {number}: {why}; `discovery: subnet` opens it to the network") from error
     return found
 
 

@@ -18,7 +18,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from devices.ros import dds_rtps
+from devices.ros import dds_domain, dds_rtps
 from devices.ros.dds_domain import configuration, domain
 from devices.ros.dds_gateway import DdsGateway
 from devices.ros.dds_graph import Graph, entities_info
@@ -203,6 +203,15 @@ def test_only_what_was_asked_for_opens_it_to_the_network():
 def test_settings_that_make_no_domain_are_told():
     with pytest.raises(DeviceError, match="cannot take part in domain"):
         domain(101, "<CycloneDDS><Domain><General><Nonsense/></General></Domain></CycloneDDS>")
+
+
+def test_a_system_that_does_not_let_it_keep_to_the_loopback_interface_is_told(monkeypatch):
+    def refuse(number):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(dds_domain, "_confine", refuse)
+    with pytest.raises(DeviceError, match="bound to the loopback interface"):
+        domain(free_domain(), configuration("localhost", ()))
 
 
 class TestGraph:
