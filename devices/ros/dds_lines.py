@@ -62,7 +62,8 @@ class Receiving:
 
     def begin(self) -> None:
         """Ask what there is: something may have come before this line was there, and writers tell of themselves only every few seconds."""
-        self._post([acknack(self._writer, self._reader, 0, (), 0)])
+        self._answers += 1
+        self._post([acknack(self._writer, self._reader, 0, (), self._answers)])
 
     def came(self, sample: Data) -> None:
         """Take a sample in its turn."""
