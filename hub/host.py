@@ -6,7 +6,7 @@ The host does not know whether a value comes from a neighbour in this process or
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -72,6 +72,10 @@ class _Slot:
     work_j: list[float] = field(default_factory=list[float])
 
 
+_MANY = 32
+"""Values of one port that may wait for their reader: a socket of Linux holds some 160, and then the sender stands."""
+
+
 class Host:
     """The stepped participants of one process."""
 
@@ -94,8 +98,10 @@ class Host:
             self._lay_sinks(slot)
         for slot in self._slots:
             slot.readers = self._readers(slot.member)
-        self.feeds = {m.name: Feed(self._readers(m), plan.step_ns) for m in plan.members.values() if m.follows_clock and m.host == name}
+        fed = {m.name: self._readers(m) for m in plan.members.values() if m.follows_clock and m.host == name}
+        self.feeds = {device: Feed(readers, plan.step_ns) for device, readers in fed.items()}
         """What the devices here that follow the clock are to be written."""
+        self._seldom_read = self._lay_seldom_read({reader.cell for readers in fed.values() for reader in readers})
         self._lay_inlets()
 
     # --- laying out ------------------------------------------------------------------------------------------------
@@ -155,6 +161,18 @@ class Host:
             cell = self._cell(link.source, link.source_port)
             readers.append(Reader(target.name, cell, link.fresh, link.linear, as_messages(source, target), stride_s))
         return readers
+
+    def _lay_seldom_read(self, fed: Collection[Cell]) -> list[tuple[RemoteCell, list[tuple[int, bool]]]]:
+        """Return the cells of other hosts' values of which many arrive between two readings, with period (steps) and freshness of all that read them.
+
+        Those from which devices are `fed` are left to them.
+        """
+        read: dict[RemoteCell, list[tuple[int, bool]]] = {}
+        for slot in self._slots:
+            for reader in slot.readers:
+                if isinstance(reader.cell, RemoteCell):
+                    read.setdefault(reader.cell, []).append((slot.member.period, reader.fresh))
+        return [(cell, by) for cell, by in read.items() if cell not in fed and min(period for period, _ in by) > _MANY * cell.stride]
 
     def _cell(self, source: str, port: str) -> Cell:
         if source in self._by_name:
@@ -264,6 +282,8 @@ class Host:
                     if step + period >= end:
                         done(slot.member, Report(grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j))
         self._stepping = None
+        for cell, readers in self._seldom_read:
+            cell.take_until(min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers))
 
     def _step(self, slot: _Slot, step: int, t: int) -> None:
         self._stepping = slot.member.name
