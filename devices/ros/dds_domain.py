@@ -20,7 +20,7 @@ __all__ = ["Discovery", "configuration", "domain"]
 
 Discovery = Literal["localhost", "subnet"]
 
-_LOOPBACK_ONLY = '<Interfaces><NetworkInterface name="lo"/></Interfaces><MaxMessageSize>65000B</MaxMessageSize><FragmentSize>64000B</FragmentSize>'
+_LOOPBACK_ONLY = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><MaxMessageSize>65000B</MaxMessageSize><FragmentSize>64000B</FragmentSize>'
 """Packets as large as UDP takes, as nothing on the way is smaller."""
 
 _ANNOUNCED = "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><SPDPInterval>1s</SPDPInterval>"

@@ -192,10 +192,10 @@ def test_a_gateway_opens_again_where_it_was_closed(tmp_path):
 
 
 def test_only_what_was_asked_for_opens_it_to_the_network():
-    assert '"lo"' in configuration("localhost", ())
+    assert '"127.0.0.1"' in configuration("localhost", ())
     assert "<AllowMulticast>false" in configuration("localhost", ())
     for wider in (configuration("subnet", ()), configuration("localhost", ("console.lab",))):
-        assert '"lo"' not in wider
+        assert '"127.0.0.1"' not in wider
     assert '<Peer address="console.lab"/>' in configuration("localhost", ("console.lab",))
     assert "<AllowMulticast>true" in configuration("subnet", ())
 
