@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
+from devices.playback import Playback
 from devices.ros.bag import RosBag
 from devices.ros.bag_params import BagParams, listed
 from devices.ros.row import Row
@@ -45,8 +46,7 @@ class BagPlayer(Device):
         super().__init__(name, params)
         self._bag: RosBag | None = None
         self._drops = Drops()
-        self._samples: Iterator[tuple[int, Sample]] = iter(())
-        self._next: tuple[int, Sample] | None = None
+        self._playback = Playback()
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -69,20 +69,15 @@ class BagPlayer(Device):
         if passed_over:
             log.info("device '%s': passed over of '%s', as nothing here hears them: %s", self.name, bag.path, listed(passed_over))
         self._drops = Drops()
-        self._samples = self._play(bag, played)
-        self._next = next(self._samples, None)
+        self._playback = Playback(self._play(bag, played))
 
     def read(self, t: int) -> list[Sample]:
         """Return the samples up to time `t` that were not returned before, oldest first."""
-        due: list[Sample] = []
-        while self._next is not None and self._next[0] <= t:
-            due.append(self._next[1])
-            self._next = next(self._samples, None)
-        return due
+        return self._playback.due(t)
 
     def close(self) -> None:
         """Close the bag."""
-        self._samples, self._next = iter(()), None
+        self._playback = Playback()
         if self._bag is not None:
             self._bag.close()
         self._bag = None
