@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hub.credentials import CONSOLE, OBSERVER
-from hub.plan import Member, Plan
+from hub.plan import Member, Outlet, Plan
 from schemas.keys import Keys
 
 __all__ = ["access_settings"]
@@ -76,8 +76,8 @@ def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
     """Return the rights of one remote participant."""
     name, role, hub = member.name, member.key_role, keys.alive("hub", "hub")
     links = [keys.output("engine", link.source, link.source_port) for link in plan.links if link.target == name]
-    outlets = [keys.feed(outlet.source, outlet.source_port) for outlet in plan.outlets if outlet.device == name]
-    heard = list(dict.fromkeys(links + outlets))
+    feeds = [_feed(plan, keys, outlet) for outlet in plan.outlets if outlet.device == name]
+    heard = list(dict.fromkeys(links + feeds))
     listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]  # as the hub does, to all participants at once
     return [
         _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
@@ -88,6 +88,13 @@ def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
         _allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
         _allow("egress", ["liveliness_token"], hub),
     ]
+
+
+def _feed(plan: Plan, keys: Keys, outlet: Outlet) -> str:
+    """Return the key on which a device gets what a connection brings."""
+    if plan.members[outlet.source].port(outlet.source_port).variability == "event":
+        return keys.feed(outlet.source, outlet.source_port)
+    return keys.signals(outlet.source, outlet.device)
 
 
 def _asks(*keys: str) -> list[Rule]:

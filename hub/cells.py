@@ -36,7 +36,7 @@ class Cell:
     def __init__(self, period: int, stride: int, depth: int) -> None:
         """Take the source's period and the distance of two values, both in steps, and how many values readers may look back."""
         self._period = period
-        self._stride = stride
+        self.stride = stride
         self._depth = depth
         self._values: dict[int, Any] = {}
 
@@ -55,8 +55,8 @@ class Cell:
 
     def tag(self, step: int, *, fresh: bool) -> int:
         """Return the tag that a reader in `step` sees: of the newest step begun (fresh), or of the newest completed by then."""
-        count = (step + self._period if fresh else step) // self._stride
-        return count * self._stride - self._period if count else INITIAL
+        count = (step + self._period if fresh else step) // self.stride
+        return count * self.stride - self._period if count else INITIAL
 
     def valid_from(self, tag: int) -> int:
         """Return the communication point at which the value of `tag` holds: the end of the step that made it."""
@@ -64,11 +64,11 @@ class Cell:
 
     def before(self, tag: int) -> int:
         """Return the tag of the value before `tag`."""
-        return max(tag - self._stride, INITIAL)
+        return max(tag - self.stride, INITIAL)
 
     def after(self, tag: int) -> int:
         """Return the tag of the value after `tag`."""
-        return (tag if tag > INITIAL else -self._period) + self._stride
+        return (tag if tag > INITIAL else -self._period) + self.stride
 
 
 class RemoteCell(Cell):
@@ -95,6 +95,11 @@ class RemoteCell(Cell):
             self.put(tag, value)
             if self._heard is not None:
                 self._heard(tag, value)
+
+    def take_until(self, tag: int) -> None:
+        """Take what has arrived up to the value of step `tag`, the next one that is asked for: whoever sends waits where too much is not taken."""
+        while self._newest < tag and (arrived := self._receiver.poll()) is not None:
+            self._keep(*arrived)
 
     def drain(self) -> None:
         """Take what has arrived and nobody has asked for."""

@@ -12,6 +12,9 @@ _WINDOW_NS = 10_000_000
 """Simulated time that a grant covers where nothing enters and the scenario does not say: what is asked of the hub then takes effect at
 100 Hz of simulated time, and turning round costs a step of 1 ms a tenth."""
 
+_CAUGHT_UP_NS = 50_000_000
+"""By how much a step may come late before simulated time slips (docs/decisions/0034): two pictures of the endoscope drawn without a GPU take 22 ms."""
+
 
 class Clock:
     """Hands out horizons in steps. Pace `fast` never waits; `realtime` follows the wall clock and counts what comes late."""
@@ -61,7 +64,7 @@ class Clock:
         self._wall_zero_ns = monotonic_ns() - self.time_ns
 
     def advance(self, count: int) -> None:
-        """Go on by `count` steps; in real time wait for the wall clock, or slip by as much as the steps came late."""
+        """Go on by `count` steps; in real time wait for the wall clock. What comes late is caught up by the next steps; what is too late for that slips."""
         self.step += count
         if not self.realtime:
             return
@@ -70,4 +73,4 @@ class Clock:
             sleep(ahead_ns / 1e9)
         else:
             self.late_steps += count
-            self._wall_zero_ns -= ahead_ns
+            self._wall_zero_ns += max(-ahead_ns - _CAUGHT_UP_NS, 0)

@@ -44,16 +44,15 @@ class ClockOffset:
     """The offset of two clocks, from the exchange of the last ones that is least wrong by now."""
 
     def __init__(self) -> None:
-        self._exchanges: tuple[Exchange, ...] = ()  # never changed, only replaced: other threads may be looking through it
+        """Begin without an exchange."""
+        self._exchanges: tuple[Exchange, ...] = ()
+        self.best: Exchange | None = None
+        """The exchange whose offset is least wrong, None before the first; it stays so until the next one, as all of them go wrong at the same pace."""
 
     def add(self, exchange: Exchange) -> None:
         """Take an exchange. One that cannot be true together with those before (a clock stood still or jumped) makes them forgotten."""
-        now_ns, best = exchange.answered_ns, self.best(exchange.answered_ns)
+        now_ns, best = exchange.answered_ns, self.best
         if best is not None and abs(best.offset_ns - exchange.offset_ns) > best.error_ns(now_ns) + exchange.error_ns(now_ns) + 2:
             self._exchanges = ()
         self._exchanges = (*self._exchanges, exchange)[-_WINDOW:]
-
-    def best(self, now_ns: int) -> Exchange | None:
-        """Return the exchange whose offset is least wrong; None before the first."""
-        exchanges = tuple(self._exchanges)  # another thread may add one
-        return min(exchanges, key=lambda exchange: exchange.error_ns(now_ns), default=None)
+        self.best = min(self._exchanges, key=lambda exchange: exchange.error_ns(now_ns))

@@ -1,4 +1,4 @@
-"""A device that lives in wall time: a thread reads it at its own rate, whether or not a hub is there to be told."""
+"""A device that lives in wall time: a thread reads it at its own rate, and when it has something new, whether or not a hub is there to be told."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from time import monotonic_ns, sleep
+from time import monotonic_ns
 from typing import Protocol
 
 from hub.devices import open_device
@@ -19,14 +19,16 @@ __all__ = ["DeviceLoop", "Uplink"]
 log = logging.getLogger(__name__)
 
 _LONGEST_SLEEP_S = 0.05
+_LINK_NS = 1_000_000
+"""How often a link is asked what has come through it."""
 _STATES = (Joy, DiagnosticStatus)
 
 
 class Uplink(Protocol):
     """Where the samples go."""
 
-    def exchange(self, t: int, samples: list[Sample]) -> None:
-        """Take the samples read at `t` (ns since the loop's start)."""
+    def exchange(self, t: int, samples: list[Sample]) -> bool:
+        """Take the samples read at `t` (ns since the loop's start); return whether a link holds things up, so that it wants to be asked again soon."""
         ...
 
 
@@ -80,13 +82,17 @@ class DeviceLoop:
             while not self._ending:
                 t = self.now_ns
                 samples = list(self._device.read(t))
+                delayed = False
                 with self._attaching:
                     self._standing.update((sample.port, sample) for sample in samples if isinstance(sample.message, Joy | DiagnosticStatus))
                     if self._uplink is not None:
-                        self._uplink.exchange(t, samples)
-                due_ns = max(due_ns + self._period_ns, self._start_ns + t)  # what is late is not caught up
+                        delayed = self._uplink.exchange(t, samples)
+                if self._start_ns + t >= due_ns:  # it was not read early
+                    period_ns = min(self._period_ns, _LINK_NS) if delayed else self._period_ns
+                    due_ns = max(due_ns + period_ns, self._start_ns + t)  # what is late is not caught up
                 while not self._ending and (left_ns := due_ns - monotonic_ns()) > 0:
-                    sleep(min(left_ns / 1e9, _LONGEST_SLEEP_S))
+                    if self._device.wait(min(left_ns / 1e9, _LONGEST_SLEEP_S)):
+                        break
         except Exception as error:  # noqa: BLE001  # it is logged and told
             self._fail(error)
 

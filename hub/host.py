@@ -6,7 +6,7 @@ The host does not know whether a value comes from a neighbour in this process or
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from hub.bundle import Bundle, bundled
 from hub.cells import INITIAL, Cell, RemoteCell
 from hub.inputs import Inputs
 from hub.participant import Outputs, Setup, Stepped
 from hub.plan import Member, Plan
 from hub.reader import Feed, Reader, as_messages
-from hub.wire import PortCodec, PortPublisher, Wire
+from hub.wire import PortCodec, PortPublisher, Tag, Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.lockstep import Permission, Report
 from schemas.ports import BondSide, Port
@@ -63,10 +64,16 @@ class _Slot:
     readers: list[Reader] = field(default_factory=list[Reader])
     sinks: dict[int, list[_Sink]] = field(default_factory=dict[int, list[_Sink]])
     """By stride, so that a step looks only at those that are due."""
+    bundles: dict[str, Bundle] = field(default_factory=dict[str, Bundle])
+    """By the device that they are for."""
     work_ports: tuple[str, ...] = ()
     hashes: list[int] = field(default_factory=list[int])
     compute_ns: list[int] = field(default_factory=list[int])
     work_j: list[float] = field(default_factory=list[float])
+
+
+_MANY = 32
+"""Values of one port that may wait for their reader: a socket of Linux holds some 160, and then the sender stands."""
 
 
 class Host:
@@ -91,8 +98,10 @@ class Host:
             self._lay_sinks(slot)
         for slot in self._slots:
             slot.readers = self._readers(slot.member)
-        self.feeds = {m.name: Feed(self._readers(m), plan.step_ns) for m in plan.members.values() if m.follows_clock and m.host == name}
+        fed = {m.name: self._readers(m) for m in plan.members.values() if m.follows_clock and m.host == name}
+        self.feeds = {device: Feed(readers, plan.step_ns) for device, readers in fed.items()}
         """What the devices here that follow the clock are to be written."""
+        self._seldom_read = self._lay_seldom_read({reader.cell for readers in fed.values() for reader in readers})
         self._lay_inlets()
 
     # --- laying out ------------------------------------------------------------------------------------------------
@@ -117,20 +126,30 @@ class Host:
         return depth
 
     def _lay_sinks(self, slot: _Slot) -> None:
-        member = slot.member
+        member, wire = slot.member, self._wire
+        places = self._places(slot, wire) if wire is not None else {}
         for port in member.ports:
             if port.causality == "input":
                 continue
             stride = self.plan.stride(member.name, port.name)
             depth = self._depth(member.name, port.name, here=True)
             readers = sorted({self.plan.members[k.target].host for k in self.plan.links if (k.source, k.source_port) == (member.name, port.name)} - {self.name})
-            feeds = (member.name, port.name) in {(outlet.source, outlet.source_port) for outlet in self.plan.outlets}
-            publisher = self._wire.publisher(member, port, readers, feeds=feeds) if self._wire else None
+            feeds = port.variability == "event" and (member.name, port.name) in {(outlet.source, outlet.source_port) for outlet in self.plan.outlets}
+            publisher = wire.publisher(member, port, readers, feeds=feeds, bundles=places.get(port.name, ())) if wire is not None else None
             cell = Cell(member.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
             sink = _Sink(port, vector, () if vector is None else vector.neutral.shape, cell, publisher)
             sinks = slot.sinks.setdefault(stride, [])
             sinks.insert(0 if readers else len(sinks), sink)  # first what another host waits for
+
+    def _places(self, slot: _Slot, wire: Wire) -> dict[str, list[tuple[Bundle, int]]]:
+        """Lay out the bundles for devices; return by output port in which of them its value goes along, and as which."""
+        places: dict[str, list[tuple[Bundle, int]]] = {}
+        for device in dict.fromkeys(outlet.device for outlet in self.plan.outlets if outlet.source == slot.member.name):
+            bundle = slot.bundles[device] = wire.bundle(slot.member.name, device)
+            for index, outlet in enumerate(bundled(self.plan, slot.member.name, device)):
+                places.setdefault(outlet.source_port, []).append((bundle, index))
+        return places
 
     def _readers(self, reading: Member) -> list[Reader]:
         readers: list[Reader] = []
@@ -142,6 +161,18 @@ class Host:
             cell = self._cell(link.source, link.source_port)
             readers.append(Reader(target.name, cell, link.fresh, link.linear, as_messages(source, target), stride_s))
         return readers
+
+    def _lay_seldom_read(self, fed: Collection[Cell]) -> list[tuple[RemoteCell, list[tuple[int, bool]]]]:
+        """Return the cells of other hosts' values of which many arrive between two readings, with period (steps) and freshness of all that read them.
+
+        Those from which devices are `fed` are left to them.
+        """
+        read: dict[RemoteCell, list[tuple[int, bool]]] = {}
+        for slot in self._slots:
+            for reader in slot.readers:
+                if isinstance(reader.cell, RemoteCell):
+                    read.setdefault(reader.cell, []).append((slot.member.period, reader.fresh))
+        return [(cell, by) for cell, by in read.items() if cell not in fed and min(period for period, _ in by) > _MANY * cell.stride]
 
     def _cell(self, source: str, port: str) -> Cell:
         if source in self._by_name:
@@ -209,6 +240,8 @@ class Host:
         """Publish the outputs at time 0 once more, for hosts that were not yet listening."""
         for publisher, value in self._initial:
             publisher.put(INITIAL, 0, value)
+        for slot in self._slots:
+            self._send_bundles(slot, INITIAL, 0)
 
     def drain(self) -> None:
         """Show the tap what has arrived from other hosts and nobody has asked for: at the end of a run."""
@@ -249,6 +282,8 @@ class Host:
                     if step + period >= end:
                         done(slot.member, Report(grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j))
         self._stepping = None
+        for cell, readers in self._seldom_read:
+            cell.take_until(min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers))
 
     def _step(self, slot: _Slot, step: int, t: int) -> None:
         self._stepping = slot.member.name
@@ -307,6 +342,13 @@ class Host:
                         self._initial.append((sink.publisher, value if sink.vector is None else value.copy()))
                 if self._tap is not None:
                     self._tap(slot.member, sink.port, step, time_ns, value)
+        if slot.bundles:
+            self._send_bundles(slot, step, time_ns)
+
+    def _send_bundles(self, slot: _Slot, step: int, time_ns: int) -> None:
+        if self._wire is not None:
+            for bundle in slot.bundles.values():
+                bundle.send(Tag.pack(self._wire.run, 0, step, time_ns))
 
     def _enter(self, slot: _Slot, port: str, codec: PortCodec, payload: bytes, *, stale: bool) -> None:
         if stale:

@@ -51,6 +51,11 @@ class Inputs:
         """Return the messages that arrived on an event port since the last step, oldest first."""
         return self._events.get(port, ())
 
+    @property
+    def quiet(self) -> bool:
+        """Whether no event port has a message in this step."""
+        return not self._events
+
     def stale(self, port: str) -> bool:
         """Say whether the device behind this port has been silent for longer than the port allows, or never spoke."""
         return port in self._stale

@@ -7,6 +7,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import distributions
 from pathlib import Path
+from time import time_ns
 from typing import Any
 
 from hub import registry
@@ -73,11 +74,12 @@ def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[s
     versions = {"python": platform.python_version(), "platform": platform.platform()}
     versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}
     read_here = [params for name, params in loaded.params.items() if scenario.participants[name].host != "remote"]
+    origin = {"directory": str(source.directory), "overrides": sorted(set(source.overrides.values())), "started_ns": time_ns()}
     return {
         "scenario.yaml": source.file.read_bytes(),
         "scenario.json": scenario.model_dump_json(indent=2).encode(),
         "plan.json": plan.model_dump_json(indent=2).encode(),
-        "origin.json": json.dumps({"directory": str(source.directory), "overrides": sorted(set(source.overrides.values()))}, indent=2).encode(),
+        "origin.json": json.dumps(origin, indent=2).encode(),
         "files.json": json.dumps(file_hashes(read_here, source.directory), indent=2).encode(),
         "versions.json": json.dumps(versions, indent=2).encode(),
     }

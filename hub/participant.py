@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import sleep
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
@@ -138,6 +139,9 @@ class Sample:
 class Device(_Participant):
     """A participant that lives in wall time, or, if it can play by a script, in simulated time."""
 
+    read_period_ns: ClassVar[int] = 1_000_000
+    """How often it is read in wall time where the scenario does not say; a haptic stylus moves and is felt at 1 kHz."""
+
     @property
     def foreign_keys(self) -> tuple[str, ...]:
         """Zenoh keys, none of Trocar's own, that programs and this device share at the hub's router: who has the certificate `console` may use them."""
@@ -153,6 +157,11 @@ class Device(_Participant):
     @abstractmethod
     def read(self, t: int) -> Iterable[Sample]:
         """Return what is new up to time `t` (ns since the session's start, wall or simulated), oldest first."""
+
+    def wait(self, seconds: float) -> bool:
+        """Wait in the thread that reads, until the next period; a device that knows when it has something new returns at once, True, and is read."""
+        sleep(seconds)
+        return False
 
     def write(self, port: str, value: Value) -> None:
         """Take the newest value of a signal, or the next message of an event port. A device without inputs is never written to."""

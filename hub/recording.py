@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from hub.plan import Plan
 from schemas.bag import Bag, output_port
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError
@@ -57,6 +59,26 @@ class Recording(Bag):
             return {str(key): str(value) for key, value in content.items()}
         except (AttributeError, ValueError) as error:
             raise RecordingError(f"'{self.file}': attachment {name} is no table: {error}") from error
+
+    def plan(self) -> Plan:
+        """Return the wiring. Raises RecordingError if the recording is not one of a session."""
+        try:
+            return Plan.model_validate_json(self.attachments["plan.json"])
+        except KeyError:
+            raise RecordingError(f"'{self.file}' holds no plan.json: it was not recorded by `trocar run`") from None
+        except ValidationError as error:
+            raise RecordingError(f"'{self.file}': the plan in it is none that this version reads: {error.errors(include_url=False)[0]['msg']}") from error
+
+    def directory(self) -> Path:
+        """Return where relative paths of the scenario started. Raises RecordingError if the recording is not one of a session."""
+        origin = self._table("origin.json")
+        if "directory" not in origin:
+            raise RecordingError(f"'{self.file}' holds no origin.json: it was not recorded by `trocar run`")
+        return Path(origin["directory"])
+
+    def started_ns(self) -> int:
+        """Return the wall time (ns since 1970) at which the session was started; 0 if it is not stated."""
+        return int(self._table("origin.json").get("started_ns", 0))
 
     def session(self) -> str:
         """Return the name of the session."""

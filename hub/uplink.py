@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
@@ -12,6 +14,7 @@ import zenoh
 from pydantic import ValidationError
 from zenoh.handlers import Callback
 
+from hub.bundle import bundled, unpacked
 from hub.cells import INITIAL
 from hub.clock_offset import ClockOffset
 from hub.device_loop import DeviceLoop
@@ -30,6 +33,8 @@ from schemas.trocar_msgs import DeviceStatus
 __all__ = ["DeviceUplink", "Run"]
 
 _STATUS_NS = 1_000_000_000
+_MOST_WAITING = 8
+"""Bundles of signals; a host that is busy beyond that misses the oldest ones, as what it has should be new."""
 
 
 @dataclass(frozen=True)
@@ -57,25 +62,46 @@ class DeviceUplink:
         self._publishers = {port.name: _publisher(session, run.keys.output("device", member.name, port.name), port) for port in outputs}
         self._lines = {port.name: self._link.line(port) for port in outputs}
         self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR)
-        outlets = [outlet for outlet in run.plan.outlets if outlet.device == member.name]
-        self._inflows = [_Inflow(outlet, run, self._link, loop, drops, self._latencies, offset) for outlet in outlets]
-        self._arrived: SimpleQueue[tuple[_Inflow, zenoh.Sample] | None] = SimpleQueue()
+        self._inflows: list[_Inflow] = []
+        self._arrived: SimpleQueue[_Feed | None] = SimpleQueue()
         self._taker = Thread(target=self._take, name=f"inflow {member.name}", daemon=True)
         self._taker.start()
-        self._subscribers = [session.declare_subscriber(inflow.key, Callback(partial(self._put, inflow), indirect=False)) for inflow in self._inflows]
+        self._subscribers = [session.declare_subscriber(feed.key, Callback(partial(self._put, feed), indirect=False)) for feed in self._feeds()]
         self._subscribers.append(session.declare_subscriber(run.keys.link(member.name), Callback(self._relink, indirect=True)))
 
-    def _put(self, inflow: _Inflow, sample: zenoh.Sample) -> None:
-        self._arrived.put((inflow, sample))
+    def _feeds(self) -> Iterator[_Feed]:
+        """Yield what is to be listened to: the bundle of each participant's signals, and each event port."""
+        plan, keys, name = self._run.plan, self._run.keys, self._member.name
+        outlets = [outlet for outlet in plan.outlets if outlet.device == name]
+        for source in dict.fromkeys(outlet.source for outlet in outlets):
+            signals = bundled(plan, source, name)
+            if signals:
+                yield _Feed(keys.signals(source, name), [self._inflow(outlet) for outlet in signals], whole=False)
+            for outlet in outlets:
+                if outlet.source == source and outlet not in signals:
+                    yield _Feed(keys.feed(source, outlet.source_port), [self._inflow(outlet)], whole=True)
+
+    def _inflow(self, outlet: Outlet) -> _Inflow:
+        inflow = _Inflow(outlet, self._run, self._link, self._loop, self._drops, self._latencies, self._offset)
+        self._inflows.append(inflow)
+        return inflow
+
+    def _put(self, feed: _Feed, sample: zenoh.Sample) -> None:
+        feed.waiting.append(sample)
+        self._arrived.put(feed)
 
     def _take(self) -> None:
         """Take what arrives, all in one thread: with one for each of a hundred ports the simulation would wait for every one of them in turn."""
-        while (arrived := self._arrived.get()) is not None:
-            inflow, sample = arrived
-            inflow.take(sample)
+        while (feed := self._arrived.get()) is not None:
+            if feed.waiting:  # otherwise newer signals have taken its place
+                sample = feed.waiting.popleft()
+                try:
+                    feed.take(sample, self._run.number)
+                except MessageError as error:
+                    self._drops.count(sample, error)
 
-    def exchange(self, t: int, samples: list[Sample]) -> None:
-        """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link."""
+    def exchange(self, t: int, samples: list[Sample]) -> bool:
+        """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link; return whether there is a link."""
         self._link.settle(t)
         now_ns, idle = monotonic_ns(), self._link.idle
         for sample in samples:
@@ -93,13 +119,14 @@ class DeviceUplink:
                 inflow.arrive(t)
         if now_ns - self._told_ns >= _STATUS_NS:
             self._told_ns = now_ns
-            self._status.put(encode(self._report(now_ns)))
+            self._status.put(encode(self._report()))
+        return not idle
 
     def _publish(self, port: str, payload: bytes, stamp: bytes) -> None:
         self._publishers[port].put(payload, attachment=stamp)
 
-    def _report(self, now_ns: int) -> DeviceStatus:
-        best = None if self._offset is None else self._offset.best(now_ns)
+    def _report(self) -> DeviceStatus:
+        best = None if self._offset is None else self._offset.best
         offset_ns, round_trip_ns = (0, -1) if best is None else (best.offset_ns, best.round_trip_ns)
         latencies = self._latencies.messages()
         return DeviceStatus(device=self._member.name, offset_ns=offset_ns, round_trip_ns=round_trip_ns, link=in_words(self._link.spec), latencies=latencies)
@@ -113,7 +140,7 @@ class DeviceUplink:
     def close(self) -> None:
         """Tell the hub a last time how it was, and send and take no more."""
         self._loop.attach(None)
-        self._status.put(encode(self._report(monotonic_ns())))
+        self._status.put(encode(self._report()))
         for entity in (*self._subscribers, *self._publishers.values(), self._status):
             entity.undeclare()
         self._arrived.put(None)
@@ -129,31 +156,44 @@ def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
     return session.declare_publisher(key, encoding=zenoh.Encoding.APPLICATION_CDR, priority=urgency, congestion_control=choked, express=True)
 
 
+class _Feed:
+    """What comes under one key."""
+
+    def __init__(self, key: str, inflows: Sequence[_Inflow], *, whole: bool) -> None:
+        """`whole`: a message is the value of the only inflow; otherwise it is a bundle."""
+        self.key, self._inflows, self._whole = key, inflows, whole
+        self.waiting: deque[zenoh.Sample] = deque(maxlen=None if whole else _MOST_WAITING)
+        """What has come and is not yet taken."""
+
+    def take(self, sample: zenoh.Sample, run: int) -> None:
+        """Hand on what a message holds. Raises MessageError if it is none of this run, or no value."""
+        tag = Tag.of(sample)
+        if tag.run != run:
+            raise MessageError(f"belongs to run {tag.run:x}, this is run {run:x}")
+        if not tag.count:  # no events in this step
+            return
+        payload = sample.payload.to_bytes()
+        for index, value in [(0, payload)] if self._whole else unpacked(payload):
+            if index >= len(self._inflows):
+                raise MessageError(f"a bundle has value {index} of {len(self._inflows)}")
+            self._inflows[index].take(tag, value)
+
+
 class _Inflow:
     """What one connection brings to the device."""
 
     def __init__(self, outlet: Outlet, run: Run, link: Link, loop: DeviceLoop, drops: Drops, latencies: Latencies, offset: ClockOffset | None) -> None:
         source, target = run.plan.members[outlet.source], run.plan.members[outlet.device].port(outlet.device_port)
-        self.key = run.keys.feed(outlet.source, outlet.source_port)
         self._codec = PortCodec(source.port(outlet.source_port).model_copy(update={"variability": target.variability}))
         self._port, self._stream = target.name, f"{outlet.source}.{outlet.source_port} -> {outlet.device}.{target.name}"
-        self._run, self._link, self._loop, self._drops, self._latencies, self._offset = run, link, loop, drops, latencies, offset
+        self._link, self._loop, self._drops, self._latencies, self._offset = link, loop, drops, latencies, offset
         self._line: Line = link.line(target)
         self._timed = not source.host.startswith("remote/")  # the clock of a third machine is nobody's here
         self._newest = (INITIAL - 1, 0)
 
-    def take(self, sample: zenoh.Sample) -> None:
-        """Take a value as it comes from the wire."""
-        try:
-            tag = Tag.of(sample)
-            if tag.run != self._run.number:
-                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run.number:x}")
-            if not tag.count:  # no events in this step
-                return
-            value = self._codec.decode(sample.payload.to_bytes())
-        except MessageError as error:
-            self._drops.count(sample, error)
-            return
+    def take(self, tag: Tag, payload: bytes) -> None:
+        """Take a value as it comes from the wire. Raises MessageError if it is none."""
+        value = self._codec.decode(payload)
         if self._link.idle:
             self._write(tag, value)
         else:
@@ -167,15 +207,15 @@ class _Inflow:
     def _write(self, tag: Tag, value: Value) -> None:
         if (tag.step, tag.index) <= self._newest:
             if tag.step > INITIAL:  # the value at time 0 is repeated until every host has it
-                self._drops.refuse(self.key, f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here before it")
+                self._drops.refuse(self._stream, f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here before it")
             return
         self._newest = tag.step, tag.index
         try:
             self._loop.write(self._port, value)
         except MessageError as error:
-            self._drops.refuse(self.key, error)
+            self._drops.refuse(self._stream, error)
             return
         now_ns = monotonic_ns()
-        best = None if self._offset is None else self._offset.best(now_ns)
+        best = None if self._offset is None else self._offset.best
         if self._timed and (self._offset is None or best is not None):
             self._latencies.add("state to force", self._stream, now_ns + (0 if best is None else best.offset_ns) - tag.sent_ns)

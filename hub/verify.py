@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from hub import registry
 from hub.files import changed_files
@@ -14,7 +12,6 @@ from hub.plan import Member, Plan
 from hub.recording import Recording
 from hub.session import Session
 from hub.summary import Progress
-from schemas.errors import RecordingError
 from schemas.lockstep import Report
 from schemas.trocar_msgs import Ack
 
@@ -42,7 +39,7 @@ def verify(recording: Recording, *, endpoint: str | None = None, progress: Calla
 
     Raises RecordingError if the recording is not one of a session, and what `Session.run` raises.
     """
-    scenario, plan, directory = recording.scenario().model_copy(update={"pace": "fast"}), _plan(recording), _directory(recording)
+    scenario, plan, directory = recording.scenario().model_copy(update={"pace": "fast"}), _plan(recording), recording.directory()
     here = [member for member in plan.members.values() if member.host == "hub" and member.role != "device"]
     made = {member.name: registry.make(member.kind, member.name, scenario.participants[member.name].params, directory) for member in here}
     for path in changed_files(recording.files()):
@@ -97,18 +94,7 @@ class _Comparison:
 
 def _plan(recording: Recording) -> Plan:
     """Return the recorded wiring; a participant that joined from elsewhere gets a process here, and devices are left alone."""
-    plan = Plan.model_validate_json(_attachment(recording, "plan.json"))
+    plan = recording.plan()
     members = {name: member.model_copy(update={"host": member.host.replace("/", "_")}) for name, member in plan.members.items()}
     links = tuple(link for link in plan.links if plan.members[link.target].role != "device")
     return plan.model_copy(update={"members": members, "links": links, "outlets": ()})
-
-
-def _directory(recording: Recording) -> Path:
-    return Path(json.loads(_attachment(recording, "origin.json"))["directory"])
-
-
-def _attachment(recording: Recording, name: str) -> bytes:
-    try:
-        return recording.attachments[name]
-    except KeyError:
-        raise RecordingError(f"'{recording.file}' holds no {name}: it was not recorded by `trocar run`") from None

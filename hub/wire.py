@@ -11,10 +11,12 @@ from time import monotonic_ns
 from typing import Any, NamedTuple
 
 import zenoh
-from zenoh.handlers import Callback, FifoChannel
+from zenoh.handlers import FifoChannel
 
+from hub.bundle import Bundle
 from hub.cells import INITIAL, RemoteCell
 from hub.lane import LaneReceiver, LaneSender, has_lane, lane_address
+from hub.outgoing import Outgoing
 from hub.participant import Value
 from hub.plan import Member
 from schemas.codec import decode, encode, message_type
@@ -30,6 +32,10 @@ log = logging.getLogger(__name__)
 
 LEASE_MS = 10_000
 """A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
+
+_EVENT_BATCHES = 16
+"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures. With its default, two, the second picture of a stereo pair was dropped now and
+then while the first one was on its way."""
 
 _TAG = struct.Struct("<QIqqHHq")
 _STAMP = struct.Struct("<QQq")
@@ -51,6 +57,7 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
         "connect/timeout_ms": 5000,
         "connect/exit_on_failure": True,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/queue/size/interactive_high": _EVENT_BATCHES,
         "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
         **(security or {}),
     }
@@ -237,50 +244,37 @@ class PortReceiver:
         self._subscriber.undeclare()
 
 
-class _Outgoing:
-    """A publisher that knows whether anybody listens, and tells when that changes."""
-
-    def __init__(self, session: zenoh.Session, key: str, choked: zenoh.CongestionControl, changed: Callable[[], None], *, always: bool) -> None:
-        self._publisher = session.declare_publisher(
-            key, encoding=zenoh.Encoding.APPLICATION_CDR, congestion_control=choked, priority=zenoh.Priority.REAL_TIME, express=True
-        )
-        self.wanted = always
-        self._changed = changed
-        if not always:
-            self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
-            self._match(self._publisher.matching_status)
-
-    def _match(self, status: Any) -> None:
-        self.wanted = bool(status.matching)
-        self._changed()
-
-    def put(self, payload: bytes, tag: bytes) -> None:
-        self._publisher.put(payload, attachment=tag)
-
-    def close(self) -> None:
-        self._publisher.undeclare()
-
-
 class PortPublisher:
     """Publishes the values of one output port; without a reader it costs a flag test.
 
-    Devices of the wall clock hear it under a key of their own, where a signal is dropped if the way to one of them is choked. A step without events is told
-    only to those who need every value (`always`): dozens of quiet ports cost nothing.
+    Devices of the wall clock hear events under a key of their own, and signals in bundles. A step without events is told only to those who need every
+    value (`always`): dozens of quiet ports cost nothing.
     """
 
     def __init__(
-        self, session: zenoh.Session, keys: Keys, member: Member, port: Port, run: int, *, always: bool, feeds: bool, lanes: Sequence[LaneSender] = ()
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        member: Member,
+        port: Port,
+        run: int,
+        *,
+        always: bool,
+        feeds: bool,
+        bundles: Sequence[tuple[Bundle, int]] = (),
+        lanes: Sequence[LaneSender] = (),
     ) -> None:
-        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock is connected."""
+        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock takes its events; `bundles`: for its signals."""
         self.codec = PortCodec(port)
         self._lanes = lanes
         self._run = run
         self._always = always
-        block, drop = zenoh.CongestionControl.BLOCK, zenoh.CongestionControl.DROP
-        self._ways: list[_Outgoing] = []
-        self._ways.append(_Outgoing(session, keys.output(member.key_role, member.name, port.name), block, self._look, always=always))
+        self._bundles = bundles
+        block = zenoh.CongestionControl.BLOCK
+        self._ways: list[Outgoing] = []
+        self._ways.append(Outgoing(session, keys.output(member.key_role, member.name, port.name), block, self._look, always=always))
         if feeds:
-            self._ways.append(_Outgoing(session, keys.feed(member.name, port.name), block if self.codec.is_event else drop, self._look, always=False))
+            self._ways.append(Outgoing(session, keys.feed(member.name, port.name), block, self._look, always=False))
         self._look()
 
     def _look(self) -> None:
@@ -290,10 +284,15 @@ class PortPublisher:
         """Publish the value computed in `step`, valid at `time_ns`."""
         for lane in self._lanes:
             lane.send(step, value)
-        if not self._wanted:
+        bundles = [bundle for bundle in self._bundles if bundle[0].wanted] if self._bundles else ()
+        if not self._wanted and not bundles:
             return
         if not self.codec.is_event:
-            self._send(self.codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns))
+            payload = self.codec.encode(value, time_ns)
+            for bundle, index in bundles:
+                bundle.add(index, payload)
+            if self._wanted:
+                self._send(payload, Tag.pack(self._run, 0, step, time_ns))
             return
         if not value and self._always:
             self._ways[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
@@ -328,15 +327,25 @@ class Wire:
         self.run = run
         self.drops = drops
         self._publishers: list[PortPublisher] = []
+        self._bundles: list[Bundle] = []
         self._receivers: list[PortReceiver | LaneReceiver] = []
         self._cells: list[RemoteCell] = []
 
-    def publisher(self, member: Member, port: Port, readers: Sequence[str], *, feeds: bool) -> PortPublisher:
-        """Return a publisher of an output of a participant here; the hosts `readers` need every value, `feeds`: devices of the wall clock the newest."""
+    def bundle(self, source: str, device: str) -> Bundle:
+        """Return what carries the signals of a participant here to a device of the wall clock."""
+        bundle = Bundle(self.session, self.keys.signals(source, device))
+        self._bundles.append(bundle)
+        return bundle
+
+    def publisher(self, member: Member, port: Port, readers: Sequence[str], *, feeds: bool, bundles: Sequence[tuple[Bundle, int]]) -> PortPublisher:
+        """Return a publisher of an output of a participant here; the hosts `readers` need every value.
+
+        Devices of the wall clock get events if it `feeds` them, and signals in `bundles`, each with the number that it has there.
+        """
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
         always = len(fast) < len(readers) or (member.name, port.name) in self._watched
-        publisher = PortPublisher(self.session, self.keys, member, port, self.run, always=always, feeds=feeds, lanes=lanes)
+        publisher = PortPublisher(self.session, self.keys, member, port, self.run, always=always, feeds=feeds, bundles=bundles, lanes=lanes)
         self._publishers.append(publisher)
         return publisher
 
@@ -363,6 +372,6 @@ class Wire:
 
     def close(self) -> None:
         """Stop publishing and receiving; the session stays open."""
-        for entity in (*self._publishers, *self._receivers):
+        for entity in (*self._publishers, *self._bundles, *self._receivers):
             entity.close()
-        self._publishers, self._receivers = [], []
+        self._publishers, self._bundles, self._receivers = [], [], []

@@ -18,8 +18,6 @@ __all__ = ["make_plan", "measured_port"]
 
 Path = tuple[str | int, ...]
 
-_READ_NS = 1_000_000
-"""A haptic stylus moves and is felt at 1 kHz."""
 _LEAST_READ_NS = 100_000
 """A loop in Python that is asked for more keeps a core busy for nothing."""
 
@@ -58,7 +56,7 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
     ports = participant.ports + tuple(port for _, side in sides for port in bond_ports(side))
     in_wall_time = role == "device" and not plays_in_simulated_time(ports)
     period_ns = spec.period if spec.period is not None and not in_wall_time else scenario.step
-    read_ns = (spec.period if spec.period is not None else _READ_NS) if in_wall_time else 0
+    read_ns = (spec.period if spec.period is not None else participant.read_period_ns) if in_wall_time and isinstance(participant, Device) else 0
     if period_ns <= 0 or period_ns % scenario.step:
         raise ScenarioError(f"period {period_ns / 1e6:g} ms is no multiple of the step {scenario.step / 1e6:g} ms", path=(*path, "period"))
     if in_wall_time and read_ns < _LEAST_READ_NS:

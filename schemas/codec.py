@@ -13,7 +13,7 @@ from schemas import crtk, ros, trocar_msgs
 from schemas.errors import MessageError, did_you_mean
 from schemas.message import Message, msg_text
 
-__all__ = ["decode", "encode", "message_type", "message_types", "rihs01", "ros2msg_definition", "typestore"]
+__all__ = ["decode", "encode", "message_type", "message_types", "rihs01", "ros2msg_definition", "typestore", "validated"]
 
 MAX_MESSAGE_BYTES = 16 * 2**20
 """Larger payloads are refused unread: the largest honest message, an uncompressed 1080p stereo image, has 12 MB."""
@@ -66,13 +66,19 @@ def decode(model: type[M], payload: bytes) -> M:
         raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message (they do not begin as CDR)")
     try:
         raw = typestore().deserialize_cdr(payload, model.ros_type)
+    except Exception as error:  # rosbags lets struct.error, IndexError, AssertionError, UnicodeDecodeError and more through
+        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})") from error
+    return validated(model, raw)
+
+
+def validated(model: type[M], raw: object) -> M:
+    """Return the message of type `model` that has the fields of `raw`, a message of `rosbags`. Raises MessageError if a value is out of its range."""
+    try:
         return model.model_validate(raw, from_attributes=True)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         path = ".".join(str(part) for part in first["loc"])
         raise MessageError(f"{model.ros_type}: {path}: {first['msg']}") from error
-    except Exception as error:  # rosbags lets struct.error, IndexError, AssertionError, UnicodeDecodeError and more through
-        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})") from error
 
 
 @cache

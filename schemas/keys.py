@@ -43,8 +43,12 @@ class Keys:
         return f"{self.prefix}/{role}/{participant}/out/{port}"
 
     def feed(self, participant: str, port: str) -> str:
-        """Key on which the values of an output are for devices of the wall clock: one that does not keep up misses some, and holds nobody up."""
+        """Key on which the messages of an event port are for devices of the wall clock."""
         return f"{self.prefix}/engine/{participant}/feed/{port}"
+
+    def signals(self, participant: str, device: str) -> str:
+        """Key on which the signals of a participant are for a device of the wall clock: one that does not keep up misses some, and holds nobody up."""
+        return f"{self.prefix}/engine/{participant}/signals/{device}"
 
     def refused(self, role: str, participant: str) -> str:
         """Key on which a host tells of messages that it had to drop, under the name of one of its participants."""

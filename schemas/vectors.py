@@ -85,16 +85,18 @@ class VectorCodec:
         """Find where the stamp and the blocks stand in the CDR bytes, by serialising numbers that occur nowhere else."""
         marks: Vector = np.random.default_rng(0).random(self.size)
         template = bytearray(encode(self.to_message(marks, 0)))
-        self._offsets = [(template.index(struct.pack("<d", marks[block.start])), block) for _, _, block in self._blocks]
+        starts = [(template.index(struct.pack("<d", marks[block.start])), 8 * block.start, 8 * block.stop) for _, _, block in self._blocks]
+        # where each block begins and ends in the message, and which of the vector's bytes it is
+        self._spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
         self._has_stamp = "header" in self.model.model_fields
         self._fixed: list[tuple[int, int, bytes]] = []
         at = 0
-        for offset, block in [*sorted(self._offsets, key=lambda row: row[0]), (len(template), slice(0, 0))]:
+        for start, stop in [*sorted((start, stop) for start, stop, _ in self._spans), (len(template), len(template))]:
             if at == 0 and self._has_stamp:
                 self._fixed.append((0, 4, bytes(template[0:4])))
                 at = 12
-            self._fixed.append((at, offset, bytes(template[at:offset])))
-            at = offset + 8 * (block.stop - block.start)
+            self._fixed.append((at, start, bytes(template[at:start])))
+            at = stop
         self._template = bytes(template)
         self._length = len(template)
 
@@ -104,8 +106,8 @@ class VectorCodec:
         if self._has_stamp:
             struct.pack_into("<iI", buffer, 4, *divmod(time_ns, 10**9))
         raw = value.tobytes()
-        for offset, block in self._offsets:
-            buffer[offset : offset + 8 * (block.stop - block.start)] = raw[8 * block.start : 8 * block.stop]
+        for start, stop, block in self._spans:
+            buffer[start:stop] = raw[block]
         return bytes(buffer)
 
     def decode(self, payload: bytes) -> Vector:
@@ -117,8 +119,8 @@ class VectorCodec:
             raise MessageError(f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}")
         if not self.fits(payload):
             raise MessageError(f"port '{self.port.name}': frame, names or layout differ from what the port declares")
-        parts = [np.frombuffer(payload, np.float64, block.stop - block.start, offset) for offset, block in self._offsets]
-        return self.checked(parts[0].copy() if len(parts) == 1 else np.concatenate(parts))
+        numbers = bytearray().join([payload[start:stop] for start, stop, _ in self._spans])  # a third of the cost of np.concatenate
+        return self.checked(np.frombuffer(numbers))
 
     def fits(self, payload: bytes) -> bool:
         """Say whether all bytes but the numbers and the stamp, which must be one, are as this codec writes them."""

@@ -12,11 +12,12 @@ import numpy as np
 
 from controllers.console.component import Component, State
 from controllers.console.params import ConsoleParams
-from controllers.console.ports import PEDALS, console_ports
+from controllers.console.ports import console_ports
 from controllers.console.readiness import Readiness
 from controllers.console.voice import Voice
 from hub.inputs import Inputs
 from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from robots.dvrk.console_topics import PEDALS
 from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 from schemas.ports import Port
@@ -121,7 +122,7 @@ class Console(Stepped):
             self._select(name.data, wish=False)
 
     def _heed_pedals(self, inputs: Inputs) -> None:
-        for pedal in PEDALS:
+        for pedal in PEDALS.told:
             for joy in inputs.events(f"pedals/{pedal}"):
                 self._voice.say(f"footpedals/{pedal}", joy)
         for button, pedal in _BUTTONS.items():

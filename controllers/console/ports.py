@@ -6,55 +6,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from math import pi
 
 from controllers.console.params import ConsoleParams
+from robots.dvrk.console_topics import BUTTON, CONSOLE, PEDALS, SYSTEM, TELEOPERATION
 from schemas.ports import Port
 
-__all__ = ["NO_GRIPPER", "PEDALS", "console_ports"]
+__all__ = ["NO_GRIPPER", "console_ports"]
 
 _JOINT_STATE, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
-_JOY, _STATE_COMMAND, _OPERATING_STATE = "sensor_msgs/msg/Joy", "crtk_msgs/msg/StringStamped", "crtk_msgs/msg/OperatingState"
+_STATE_COMMAND, _OPERATING_STATE = "crtk_msgs/msg/StringStamped", "crtk_msgs/msg/OperatingState"
 _EMPTY, _STRING, _BOOL, _FLOAT = (f"std_msgs/msg/{name}" for name in ("Empty", "String", "Bool", "Float64"))
 
-PEDALS = ("clutch", "camera", "cam_minus", "cam_plus", "bicoag", "coag", "operatorpresent")
-"""As jhu-dvrk/dvrk-readthedocs (53699e4d) names them, and the head sensor."""
 NO_GRIPPER = -pi
 """rad; angle of a gripper that is not connected: no master's opens that far the other way."""
 
-_HEARD = {
-    "console/teleop/enable": _BOOL,
-    "console/teleop/select": _STRING,
-    "console/teleop/unselect": _STRING,
-    "console/teleop/set_scale": _FLOAT,
-    "console/emulate_operator_present": _JOY,
-    "console/emulate_clutch": _JOY,
-    "console/emulate_camera": _JOY,
-    "system/power_on": _EMPTY,
-    "system/power_off": _EMPTY,
-    "system/home": _EMPTY,
-    "system/set_volume": _FLOAT,
-}
-_TOLD = {
-    "console/teleop/enabled": _BOOL,
-    "console/teleop/scale": _FLOAT,
-    "console/teleop/selected": _STRING,
-    "console/teleop/unselected": _STRING,
-    "console/operator_present": _JOY,
-    "console/clutch": _JOY,
-    "console/camera": _JOY,
-    "console/warning": _STRING,
-    "system/volume": _FLOAT,
-}
-_TELEOPERATION_HEARD = {"state_command": _STATE_COMMAND, "set_scale": _FLOAT, "lock_rotation": _BOOL, "lock_translation": _BOOL, "set_align_MTM": _BOOL}
-_TELEOPERATION_TOLD = {
-    "desired_state": _STRING,
-    "current_state": _STRING,
-    "following": _BOOL,
-    "scale": _FLOAT,
-    "align_mtm": _BOOL,
-    "alignment_offset": "geometry_msgs/msg/QuaternionStamped",
-    "rotation_locked": _BOOL,
-    "translation_locked": _BOOL,
-    "warning": _STRING,
-}
+_SYSTEM_HEARD = ("power_on", "power_off", "home", "set_volume")
+"""A hub has no loudspeaker: what else the system of a dVRK hears are sounds."""
 _MASTER_TOLD = {
     "state_command": _STATE_COMMAND,
     "hold": _EMPTY,
@@ -69,10 +34,12 @@ _MASTER_TOLD = {
 def console_ports(params: ConsoleParams) -> tuple[Port, ...]:
     """Return the ports of a console as `params` say."""
     masters, led = (sorted({name.split("_")[i] for name in params.teleoperations}) for i in (0, 1))
+    heard = _named("console", CONSOLE.heard) | {f"system/{name}": SYSTEM.heard[name] for name in _SYSTEM_HEARD} | _named("pedals", PEDALS.told)
+    told = _named("console", CONSOLE.told) | _named("system", SYSTEM.told) | _named("footpedals", PEDALS.told)
     return (
-        *_events("input", _HEARD | {f"pedals/{pedal}": _JOY for pedal in PEDALS} | {f"{arm}/operating_state": _OPERATING_STATE for arm in params.arms}),
-        *_events("output", _TOLD | {f"footpedals/{pedal}": _JOY for pedal in PEDALS} | {f"{arm}/state_command": _STATE_COMMAND for arm in params.arms}),
-        Port(name="teleop/ECM/buttons", causality="output", type=_JOY, variability="event", description="button 0: the camera pedal leads the endoscope"),
+        *_events("input", heard | {f"{arm}/operating_state": _OPERATING_STATE for arm in params.arms}),
+        *_events("output", told | {f"{arm}/state_command": _STATE_COMMAND for arm in params.arms}),
+        Port(name="teleop/ECM/buttons", causality="output", type=BUTTON, variability="event", description="button 0: the camera pedal leads the endoscope"),
         *(port for master in masters for port in _master(master)),
         *(_pose(f"{arm}/setpoint_cp", "of the tip, in the camera's frame: masters are turned like it") for arm in led),
         *(port for name in params.teleoperations for port in _teleoperation(name, params)),
@@ -106,9 +73,9 @@ def _master(master: str) -> Iterable[Port]:
 def _teleoperation(name: str, params: ConsoleParams) -> Iterable[Port]:
     leads, tells = f"teleop/{name}", "to the `teleoperation`"
     return (
-        *_events("input", _named(name, _TELEOPERATION_HEARD) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING}),
-        *_events("output", _named(name, _TELEOPERATION_TOLD)),
-        *_events("output", {f"{leads}/buttons": _JOY, f"{leads}/lock_rotation": _BOOL, f"{leads}/lock_translation": _BOOL}),
+        *_events("input", _named(name, TELEOPERATION.heard) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING}),
+        *_events("output", _named(name, TELEOPERATION.told)),
+        *_events("output", {f"{leads}/buttons": BUTTON, f"{leads}/lock_rotation": _BOOL, f"{leads}/lock_translation": _BOOL}),
         Port(name=f"{leads}/scale", causality="output", type=_FLOAT, start=(params.scale,), description=tells),
         Port(name=f"{leads}/gripper", causality="output", type=_FLOAT, description=f"{tells}: 0 closed .. 1 open, negative: none"),
     )

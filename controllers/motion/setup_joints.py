@@ -54,6 +54,8 @@ class SetupJoints:
         news = not self._told[0]
         for arm, said in self._said.items():
             said.begin(t + h)
+            if inputs.quiet:
+                continue
             for message in inputs.events(f"SUJ/{arm}/state_command"):
                 news |= self._command(said, cast("StringStamped", message))
             for name in SETUP_JOINT_COMMANDS:

@@ -1,16 +1,19 @@
-"""The command `trocar ros`: which gateways run, who is connected to them, and what goes through."""
+"""The commands `trocar ros`: which gateways run, who is connected to them, and what goes through; and `trocar ros bag`."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
-from hub.command_line.display import table
+from hub.command_line.display import show, table
+from hub.command_line.recordings import RecordingPath
 from hub.command_line.scenarios import Json
 from schemas.trocar_msgs import GatewayStatus
 
@@ -19,13 +22,16 @@ __all__ = ["app"]
 app = typer.Typer()
 
 
-@app.command()
+@app.callback(invoke_without_command=True)
 def ros(
+    context: typer.Context,
     *,
     connect: Annotated[list[str] | None, typer.Option(metavar="ENDPOINT", help="Where a hub of this machine listens; by default all are asked.")] = None,
     as_json: Json = False,
 ) -> None:
     """Show which gateways to ROS run in which session, which programs are connected to them, and the rates of all topics."""
+    if context.invoked_subcommand is not None:
+        return
     from devices.ros.watch import running_gateways
     from hub.endpoint import listening_endpoints
 
@@ -38,6 +44,22 @@ def ros(
         out.print("no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`: trocar run ros", soft_wrap=True)
     for (session, name), status in gateways.items():
         _print(out, session, name, status)
+
+
+@app.command()
+def bag(
+    recording: RecordingPath,
+    *,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The directory to write; by default <recording>-ros beside it.")] = None,
+    gateway: Annotated[str | None, typer.Option(help="Whose topics, where a session has several gateways.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write what a recorded session has told ROS programs, and heard from them, as a bag with ROS names, for `ros2 bag play`."""
+    from devices.ros.bag_export import export
+    from hub.recording import Recording
+
+    stem = recording.parent if recording.is_file() else recording
+    show(asdict(export(Recording(recording), output or stem.with_name(f"{stem.resolve().name}-ros"), gateway)), as_json=as_json)
 
 
 def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None:

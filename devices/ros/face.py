@@ -9,16 +9,18 @@ jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst). All eve
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import get_args
 
 from devices.ros.params import GatewayParams, Real
 from devices.ros.row import Row
 from robots.dvrk import arms as dvrk
+from robots.dvrk.console_topics import BUTTON, CONSOLE, PEDALS, SYSTEM, TELEOPERATION, Topics
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import JOINT_NAMES, CartArm
 from schemas.ports import Port
 
-__all__ = ["BUTTON", "NOT_SERVED", "face"]
+__all__ = ["NOT_SERVED", "face"]
 
 _JOINT_STATE, _POSE, _TWIST, _WRENCH = (
     "sensor_msgs/msg/JointState",
@@ -27,8 +29,6 @@ _JOINT_STATE, _POSE, _TWIST, _WRENCH = (
     "geometry_msgs/msg/WrenchStamped",
 )
 _EMPTY, _STRING, _BOOL, _FLOAT, _ARRAY = (f"std_msgs/msg/{name}" for name in ("Empty", "String", "Bool", "Float64", "Float64MultiArray"))
-BUTTON = "sensor_msgs/msg/Joy"
-"""buttons[0]: 0 released, 1 pressed, 2 a quick tap; no axes."""
 _STATE_COMMAND, _OPERATING_STATE = "crtk_msgs/msg/StringStamped", "crtk_msgs/msg/OperatingState"
 _FORWARD, _INVERSE = "crtk_msgs/srv/QueryForwardKinematics", "crtk_msgs/srv/QueryInverseKinematics"
 
@@ -91,51 +91,9 @@ _MTM_COMMANDS = {"lock_orientation": "geometry_msgs/msg/Quaternion", "unlock_ori
 _SUJ_EVENTS = {"operating_state": _OPERATING_STATE, "error": _STRING, "warning": _STRING, "status": _STRING}
 _SUJ_COMMANDS = {"state_command": _STATE_COMMAND, "servo_jp": _JOINT_STATE, "move_jp": _JOINT_STATE}
 
-_PARTS: Mapping[str, tuple[Mapping[str, str], Mapping[str, str]]] = {
-    "system": (
-        {"volume": _FLOAT},
-        {"power_off": _EMPTY, "power_on": _EMPTY, "home": _EMPTY, "set_volume": _FLOAT, "beep": _ARRAY, "string_to_speech": _STRING},
-    ),
-    "console": (
-        {
-            "teleop/enabled": _BOOL,
-            "teleop/scale": _FLOAT,
-            "teleop/selected": _STRING,
-            "teleop/unselected": _STRING,
-            "operator_present": BUTTON,
-            "clutch": BUTTON,
-            "camera": BUTTON,
-            "warning": _STRING,
-        },
-        {
-            "teleop/enable": _BOOL,
-            "teleop/select": _STRING,
-            "teleop/unselect": _STRING,
-            "teleop/set_scale": _FLOAT,
-            "emulate_operator_present": BUTTON,
-            "emulate_clutch": BUTTON,
-            "emulate_camera": BUTTON,
-        },
-    ),
-    "footpedals": (dict.fromkeys(("clutch", "camera", "cam_minus", "cam_plus", "bicoag", "coag", "operatorpresent"), BUTTON), {}),
-    "SUJ": ({}, {"set_reference_arm": _STRING}),
-}
-"""What there is once: events and commands."""
+_PARTS = {"system": SYSTEM, "console": CONSOLE, "footpedals": PEDALS, "SUJ": Topics({}, {"set_reference_arm": _STRING})}
+"""What there is once."""
 
-_TELEOPERATION = (
-    {
-        "desired_state": _STRING,
-        "current_state": _STRING,
-        "following": _BOOL,
-        "scale": _FLOAT,
-        "align_mtm": _BOOL,
-        "alignment_offset": "geometry_msgs/msg/QuaternionStamped",
-        "rotation_locked": _BOOL,
-        "translation_locked": _BOOL,
-        "warning": _STRING,
-    },
-    {"state_command": _STATE_COMMAND, "set_scale": _FLOAT, "lock_rotation": _BOOL, "lock_translation": _BOOL, "set_align_MTM": _BOOL},
-)
 _PICTURES = {"image_raw": "sensor_msgs/msg/Image", "image_raw/compressed": "sensor_msgs/msg/CompressedImage"}
 
 
@@ -146,11 +104,11 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         rows += _shown(name, arm, _reference(name, params))
     for carried in get_args(CartArm):
         rows += _setup_joints(carried, _reference(carried, params) if carried in params.arms.shown else "")
-    for part, (events, commands) in _PARTS.items():
+    for part, topics in _PARTS.items():
         if part not in params.listen:
-            rows += _talk(part, events, commands)
+            rows += _talk(part, topics.told, topics.heard)
     for component in params.teleoperations:
-        rows += _talk(component, *_TELEOPERATION)
+        rows += _talk(component, TELEOPERATION.told, TELEOPERATION.heard)
     for camera in params.cameras:
         rows += _camera(camera)
     rows += (
@@ -158,7 +116,7 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         Row("/joint_states", _JOINT_STATE, "publish", periodic=True),
         Row("/robot_description", _STRING, "publish", latched=True),
     )
-    return tuple(_named(row, params.namespace) for row in rows) + tuple(row for name in params.listen for row in _listened(name))
+    return tuple(_named(row, params.namespace) for row in rows) + tuple(replace(row, is_real=True) for name in params.listen for row in _listened(name))
 
 
 def _reference(arm: CartArm, params: GatewayParams) -> str:
@@ -263,7 +221,7 @@ _REAL_MAX_AGE_NS = 100_000_000
 def _listened(arm: Real) -> Iterator[Row]:
     """Yield the rows of a real arm: its states and events come in, commands to it go out; or those of real pedals."""
     if arm == "footpedals":
-        yield from _talk(arm, {}, _PARTS[arm][0])
+        yield from _talk(arm, {}, PEDALS.told)
         return
     names = tuple(joint.name for joint in dvrk.chain(arm).joints)
     is_master, is_psm = arm.startswith("MTM"), arm.startswith("PSM")

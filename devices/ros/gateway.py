@@ -6,6 +6,7 @@ a `connect` that returns another transport.
 
 from __future__ import annotations
 
+import threading
 from abc import abstractmethod
 from collections import defaultdict, deque
 from collections.abc import Mapping
@@ -45,6 +46,7 @@ class Gateway(Device):
 
     params_model = GatewayParams
     params: GatewayParams
+    read_period_ns = 50_000_000  # for what goes wrong, and the status: what programs say is read as it comes
     kind: ClassVar[str]
     """As the scenario calls it: `ros2-zenoh`."""
 
@@ -70,6 +72,7 @@ class Gateway(Device):
         self._commanders: defaultdict[str, Commander] = defaultdict(Commander)
         self._refusals = Refusals(self.name, self._say)
         self._said: deque[Sample] = deque()
+        self._news = threading.Event()
         self._status_due_ns = 0
         self._outgoing: Outgoing | None = None
 
@@ -123,6 +126,7 @@ class Gateway(Device):
     def _hand_on(self, row: Row, message: Message) -> None:
         if row.port is not None:
             self._said.append(Sample(row.port.name, message))
+            self._news.set()
 
     def _handler(self, row: Row) -> Handler:
         """Return what answers a service of an arm."""
@@ -139,11 +143,16 @@ class Gateway(Device):
         """Return what ROS programs have said since the last time, and the status once a second."""
         if self._outgoing is not None:
             self._outgoing.check()
+        self._news.clear()
         said = [self._said.popleft() for _ in range(len(self._said))]
         if self._transport is not None and t >= self._status_due_ns:
             self._status_due_ns = t + _STATUS_NS
             said.append(Sample(self._status.name, self._traffic.status(self._transport.clients())))
         return said
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for what ROS programs say, at most so long; return whether they have."""
+        return self._news.wait(seconds)
 
     def write(self, port: str, value: Value) -> None:
         """Take the newest value of a state, or publish a message. Never blocks."""

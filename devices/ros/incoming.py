@@ -43,7 +43,7 @@ class Incoming:
         """Stamps of the newest state commands."""
         self._allowance, self._counted_ns = float(_BURST), monotonic_ns()
 
-    def take(self, payload: bytes, client: str) -> None:
+    def take(self, payload: bytes, client: str, /, *, linked_ns: int = 0) -> None:
         """Hand on a message, or refuse it."""
         self._count.messages += 1
         if not self._has_allowance():
@@ -55,15 +55,17 @@ class Incoming:
         except MessageError as error:
             self._refuse("error", f"{error} (from {client})")
             return
-        reason = self._not_now(message, client)
+        reason = self._not_now(message, client, linked_ns)
         if reason is None:
             self._hand_on(self._row, message if self._state is None else as_signal(message, self._state))
         else:
             self._refuse("warning", reason)
 
-    def _not_now(self, message: Message, client: str) -> str | None:
+    def _not_now(self, message: Message, client: str, linked_ns: int) -> str | None:
         """Return why a valid message is not heeded now."""
         stamp_ns = stamp_of(message)
+        if (stamp_ns or 0) < linked_ns and not self._row.is_real:
+            return f"kept by {client} from before it was connected: if it is meant, give it again"
         if self._state is not None and stamp_ns == 0:
             return f"marked invalid by {client} (stamp 0)"
         if self._row.name == "state_command" and stamp_ns:

@@ -13,7 +13,7 @@ from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.quantity import Duration
 
-__all__ = ["Arms", "GatewayParams", "Real"]
+__all__ = ["Arms", "GatewayParams", "HeardParams", "Real"]
 
 Real = Literal["PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR", "footpedals"]
 
@@ -33,25 +33,37 @@ class Arms(Params):
         return {name: arm for name, arm in named.items() if arm is not None}
 
 
-class GatewayParams(Params):
-    """Which part of the dVRK is shown, and which real one is listened to."""
+class HeardParams(Params):
+    """Whose commands are heard, and which real arms."""
 
     profile: Literal["dvrk", "paper"] = Field(
         default="dvrk", description="topics of the real system, or of the authors' simulator, behind which a participant of kind `paper` stands"
     )
     arms: Arms = Field(default=Arms(), description="the simulated arms, as the motion controller is told them")
-    mounting: Literal["free", "cart"] = Field(default="free", description="as the motion controller is told it")
-    reference: Literal["camera", "base", "world"] = Field(default="camera", description="as the motion controller is told it")
     listen: tuple[Real, ...] = Field(
         default=(), description="real arms: their states come in, and commands to them go out; `footpedals`: what is pressed comes in, instead of going out"
     )
     teleoperations: tuple[Annotated[str, Field(pattern=r"^MTM[LR]_(PSM[123]|ECM)$")], ...] = Field(
         default=(), description="teleoperation components of the console, such as MTMR_PSM1"
     )
-    cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(default=("endoscope",), description="names of stereo cameras")
     namespace: Annotated[str, Field(pattern=r"^([A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*)?$")] = Field(
         default="", description="put before every topic that is not of a real arm, so that simulation and real system share one graph"
     )
+
+    @model_validator(mode="after")
+    def _shown_or_listened_to(self) -> Self:
+        both = sorted(set(self.arms.shown) & set(self.listen))
+        if both:
+            raise ValueError(f"{', '.join(both)}: an arm is either simulated (`arms`) or real (`listen`); for both take two gateways, one with a `namespace`")
+        return self
+
+
+class GatewayParams(HeardParams):
+    """Which part of the dVRK is shown, and which real one is listened to."""
+
+    mounting: Literal["free", "cart"] = Field(default="free", description="as the motion controller is told it")
+    reference: Literal["camera", "base", "world"] = Field(default="camera", description="as the motion controller is told it")
+    cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(default=("endoscope",), description="names of stereo cameras")
     publish_period: Duration = Field(default=10_000_000, ge=500_000, description="of all states in wall time, whatever the step; 10 ms as on the dVRK")
     robot_description: Path | None = Field(default=None, description="URDF file that is published as robot_description, as `trocar model export` writes it")
 
@@ -65,10 +77,3 @@ class GatewayParams(Params):
         if not path.is_file():
             raise ValueError(f"no file '{path}'; `trocar model export` writes one")
         return path.resolve()
-
-    @model_validator(mode="after")
-    def _shown_or_listened_to(self) -> Self:
-        both = sorted(set(self.arms.shown) & set(self.listen))
-        if both:
-            raise ValueError(f"{', '.join(both)}: an arm is either simulated (`arms`) or real (`listen`); for both take two gateways, one with a `namespace`")
-        return self

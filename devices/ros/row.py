@@ -31,6 +31,9 @@ class Row:
     owner: str = ""
     """The arm, console part or camera that it belongs to, on whose `warning` and `error` its bad input is told: `PSM1`, `SUJ/PSM1`."""
 
+    is_real: bool = False
+    """Whether it is of a real arm or pedal, that is listened to."""
+
     @property
     def name(self) -> str:
         """What is left of the topic without its owner: `measured_js`, `jaw/servo_jp`."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from devices.ros.row import Row
 
@@ -16,8 +17,17 @@ __all__ = ["Client", "Handler", "Publisher", "Taker", "Transport"]
 Publisher = Callable[[bytes], None]
 """Sends one message (CDR). Never blocks: where a reader does not keep up, older messages are dropped for it. One thread at a time per publisher."""
 
-Taker = Callable[[bytes, str], None]
-"""Takes one message (CDR) and the name of the client that sent it. Never raises, never blocks; may be called from any thread."""
+
+class Taker(Protocol):
+    """Takes messages of one topic. Never raises, never blocks; may be called from any thread."""
+
+    def __call__(self, payload: bytes, client: str, /, *, linked_ns: int = 0) -> None:
+        """Take one message (CDR) and the name of the client that sent it.
+
+        `linked_ns`: wall time at which the client was connected, where this may be a message from before that the client has kept; else 0.
+        """
+        ...
+
 
 Handler = Callable[[bytes], bytes]
 """Takes a request and returns the response (both CDR). Raises MessageError if the bytes are no such request: then there is no response."""

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from devices.playback import Playback
 from hub.participant import Device, Params, Sample
 from schemas.bag import Bag, BagMessage, output_port
 from schemas.codec import decode, message_type
@@ -55,8 +56,7 @@ class ScriptedDevice(Device):
     def __init__(self, name: str, params: ScriptedParams) -> None:
         """Take the participant's name and what is to be played."""
         super().__init__(name, params)
-        self._samples: Iterator[tuple[int, Sample]] = iter(())
-        self._next: tuple[int, Sample] | None = None
+        self._playback = Playback()
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -75,20 +75,15 @@ class ScriptedDevice(Device):
             messages = [decode(message_type(m.type), m.payload) for m in played]
         except MessageError as error:
             raise RecordingError(f"'{bag.file}': {error}") from error
-        self._samples = self._play(played, messages)
-        self._next = next(self._samples, None)
+        self._playback = Playback(self._play(played, messages))
 
     def read(self, t: int) -> list[Sample]:
         """Return the samples up to time `t` that were not returned before, oldest first."""
-        due: list[Sample] = []
-        while self._next is not None and self._next[0] <= t:
-            due.append(self._next[1])
-            self._next = next(self._samples, None)
-        return due
+        return self._playback.due(t)
 
     def close(self) -> None:
         """Forget the samples."""
-        self._samples, self._next = iter(()), None
+        self._playback = Playback()
 
     def _play(self, played: list[BagMessage], messages: list[Message]) -> Iterator[tuple[int, Sample]]:
         """Yield (time in ns, sample) in order, for ever if `loop` is set."""

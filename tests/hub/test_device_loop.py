@@ -114,3 +114,30 @@ def test_a_device_that_cannot_be_opened_says_so():
 
     with pytest.raises(ParticipantError, match=r"participant 'pen' failed.*cannot be opened: no such device"):
         DeviceLoop("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())
+
+
+class Doorbell(Pen):
+    """Says at once when there is something new."""
+
+    def __init__(self):
+        super().__init__()
+        self.rung = threading.Event()
+
+    def wait(self, seconds):
+        return self.rung.wait(seconds)
+
+    def read(self, t):
+        self.rung.clear()
+        yield from super().read(t)
+
+
+def test_what_is_new_is_read_before_the_period_is_over(start):
+    bell, uplink = Doorbell(), Uplink()
+    loop, failures = start(bell, 3600 * 1000 * MS)
+    loop.attach(uplink)
+    for _ in range(25):
+        bell.rung.set()
+        while bell.rung.is_set():
+            sleep(1e-4)
+    assert uplink.enough.wait(5.0)
+    assert not failures

@@ -139,6 +139,26 @@ def test_a_device_is_told_every_event_and_each_value_of_a_signal_once(prepare, t
     assert len(numbers) == len(set(numbers)) <= 1 + summary.steps // 2
 
 
+SLOW = """\
+name: slow
+step: 2 ms
+pace: realtime
+duration: 3 s
+participants:
+  mixer: {kind: "toys:Mixer", step_ns: 2000000}
+  console: {kind: "toys:Slow"}
+connections:
+  - mixer.out -> console.numbers
+"""
+
+
+def test_a_device_that_is_slow_is_told_what_is_new_and_misses_the_rest(prepare):
+    summary = prepare(SLOW).run()
+    told = summary.latency["state to force"]["mixer.out -> console.numbers"]
+    assert told["count"] < summary.steps / 5
+    assert told["largest_s"] < 0.25 * summary.wall_time_s  # in a queue the last would have waited for nearly all of it
+
+
 @pytest.mark.parametrize("host", ["hub", "other"])
 def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connected(prepare, tmp_path, host):
     scenario = SCENARIO.replace("  - player.buttons -> deaf.buttons\n", "") + "  x: {kind: peak-norm, of: player.hand.position}\n"

@@ -54,7 +54,7 @@ PLAN = Plan(
     bonds=(),
 )
 CONTACT, SECRET = (KEYS.output("engine", "robot", port) for port in ("contact", "secret"))
-FEED = KEYS.feed("robot", "contact")
+FEED, OTHERS_FEED = (KEYS.signals("robot", device) for device in ("touch", "head"))
 
 
 class Hub:
@@ -80,7 +80,7 @@ class Hub:
             query.reply(str(query.key_expr).replace("/*/", "/s/", 1), b"a secret")
 
     def say(self):
-        for key in (CONTACT, FEED, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
+        for key in (CONTACT, FEED, OTHERS_FEED, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
             self.router.put(key, b"said")
 
     @contextmanager
@@ -195,7 +195,7 @@ ASKED = [
     "trocar/**",
     "@/*/router/**",
 ]
-READ = [CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
+READ = [OTHERS_FEED, CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
 
 
 @pytest.mark.parametrize("deed", FORBIDDEN)

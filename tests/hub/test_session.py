@@ -112,3 +112,25 @@ def test_what_was_recorded_comes_out_again(prepare, tmp_path):
     verified = verify(Recording(tmp_path / "recording"))
     assert (verified.same, verified.steps) == (True, 60)
     assert verified.hashes == 5 * 60 + 3 * 30 + 3 * 12
+
+
+SELDOM = """\
+name: seldom
+step: 1 ms
+duration: 1250 ms
+participants:
+  fast: {kind: "toys:Mixer", seed: 1}
+  seldom: {kind: "toys:Mixer", seed: 2, period: 600 ms, step_ns: 600000000}
+  ledger: {kind: "toys:Ledger", period: 300 ms}
+order: [fast, seldom, ledger]
+connections:
+  - fast.out -> seldom.a
+  - {source: fast.out, target: seldom.b, extrapolation: linear}
+  - fast.out -> ledger.a
+  - seldom.out -> fast.a
+"""
+
+
+def test_hundreds_of_values_between_two_readings_hold_up_nobody(prepare):
+    hashes = [prepare(SELDOM, *_on(host, ("seldom", "ledger"))).run().state_hash for host in ("hub", "far")]
+    assert hashes[0] == hashes[1]

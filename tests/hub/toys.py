@@ -304,6 +304,24 @@ class Pad(Device):
         pass
 
 
+class Slow(Device):
+    """Takes 20 ms for what it is told."""
+
+    ports = (Port(name="numbers", causality="input", size=SIZE),)
+
+    def open(self, directory):
+        pass
+
+    def read(self, t):
+        return ()
+
+    def write(self, port, value):
+        time.sleep(0.02)
+
+    def close(self):
+        pass
+
+
 class FaultParams(Params):
     at: int = 5
     how: Literal["configure", "raise", "nan", "shape", "hang", "exit", "kill"] = "raise"

@@ -1,0 +1,80 @@
+"""ROS bags of any kind, read through `rosbags`: rosbag2 directories, bare .mcap and .db3 files, .bag files of ROS 1. Nothing in them is trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Connection
+
+from schemas.codec import typestore
+from schemas.errors import RecordingError
+
+__all__ = ["BagTopic", "RosBag"]
+
+
+class BagTopic(NamedTuple):
+    """One topic of a bag."""
+
+    type: str
+    """As ROS 2 writes it, whichever ROS has recorded it: `sensor_msgs/msg/JointState`."""
+    messages: int
+
+
+class RosBag:
+    """A bag that is open for reading; its messages are read with the definitions that it brings, or, if it brings none, with ours."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a bag. Raises RecordingError if it is none."""
+        self.path = path
+        with _reading(path):
+            self._reader = AnyReader([path], default_typestore=typestore())
+            self._reader.open()
+        self.topics: dict[str, BagTopic] = {}
+        for one in self._reader.connections:
+            known = self.topics.get(one.topic)
+            self.topics[one.topic] = BagTopic(one.msgtype, one.msgcount + (known.messages if known is not None else 0))
+        self.start_ns = self._reader.start_time if any(topic.messages for topic in self.topics.values()) else 0
+        """Wall time (ns) of the first message."""
+
+    def messages(self, topics: Collection[str], start_ns: int) -> Iterator[tuple[str, int, object]]:
+        """Yield topic, time (ns) and the message as `rosbags` has it, or the error that it makes, of all since `start_ns`, by time. Raises RecordingError."""
+        wanted: list[Connection] = [one for one in self._reader.connections if one.topic in topics]
+        if not wanted:
+            return
+        with _reading(self.path):
+            for connection, time_ns, payload in self._reader.messages(wanted, start=start_ns):
+                yield connection.topic, time_ns, self._decoded(payload, connection.msgtype)
+
+    def _decoded(self, payload: bytes, type_name: str) -> object:
+        try:
+            return self._reader.deserialize(payload, type_name)
+        except Exception as error:  # noqa: BLE001 - rosbags lets struct.error, IndexError, UnicodeDecodeError and more through
+            return error
+
+    def close(self) -> None:
+        """Close the file. May be called twice."""
+        if self._reader.stack is not None:
+            self._reader.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+@contextmanager
+def _reading(path: Path) -> Generator[None]:
+    """Turn whatever damaged bytes make the parsers raise into a RecordingError that names the bag."""
+    try:
+        yield
+    except (RecordingError, GeneratorExit):
+        raise
+    except Exception as error:  # rosbags raises errors of its own, KeyError, struct.error, sqlite3's and zstd's
+        raise RecordingError(
+            f"cannot read the bag '{path}' ({type(error).__name__}: {error}); a rosbag2 directory, an .mcap, .db3 or .bag file is expected"
+        ) from error

@@ -1,0 +1,95 @@
+"""Messages and services as ROS 1 has them: names, definitions, checksums, and what its wire has in place of CDR.
+
+ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, and knows the definitions of Noetic, in which some
+fields have other names than in ROS 2 (`CameraInfo`); what it does not know (CRTK, tf2) is the same in both and comes from our models.
+"""
+
+from __future__ import annotations
+
+import struct
+from functools import cache
+from hashlib import md5
+
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from schemas.codec import message_types, typestore
+from schemas.errors import MessageError
+from schemas.message import msg_text
+
+__all__ = ["Wire", "checksum", "definition", "ros1_name", "service_checksum"]
+
+_LENGTH = struct.Struct("<I")
+_LENGTH_AND_COUNT = struct.Struct("<II")
+_HEADER = "std_msgs/msg/Header"
+
+
+@cache
+def _noetic() -> Typestore:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for name, model in message_types().items():
+        if name not in store.types and not name.startswith("trocar_msgs/"):
+            (fields,) = get_types_from_msg(msg_text(model), name).values()
+            store.register({name: fields})
+    return store
+
+
+def ros1_name(type_: str) -> str:
+    """`sensor_msgs/msg/JointState` to `sensor_msgs/JointState`."""
+    package, _, name = type_.split("/")
+    return f"{package}/{name}"
+
+
+def definition(type_: str) -> str:
+    """Return the definition of a message and of all that it holds, as publishers tell it and bags keep it."""
+    return _noetic().generate_msgdef(type_, ros_version=1)[0]
+
+
+def checksum(type_: str) -> str:
+    """Return the MD5 sum of a message's definition; both sides of a connection must have the same."""
+    return _noetic().generate_msgdef(type_, ros_version=1)[1]
+
+
+def service_checksum(type_: str) -> str:
+    """Return the MD5 sum of a service: that of the texts of its request and response, one after the other (genmsg, gentools.py)."""
+    return md5((_summed(f"{type_}_Request") + _summed(f"{type_}_Response")).encode(), usedforsecurity=False).hexdigest()
+
+
+def _summed(type_: str) -> str:
+    """Return the text of which a checksum is made: the definition, with its checksum for every message in it."""
+    lines = definition(type_).partition("=" * 80)[0].strip().splitlines()
+    return "\n".join(_summed_line(*line.split(" ", 1)) for line in lines)
+
+
+def _summed_line(kind: str, name: str) -> str:
+    package, _, short = kind.removesuffix("[]").partition("/")
+    return f"{checksum(f'{package}/msg/{short}')} {name}" if short else f"{kind} {name}"
+
+
+class Wire:
+    """Converts messages of one type to the frames of ROS 1, four bytes of length and the message, and back."""
+
+    def __init__(self, type_: str) -> None:
+        """Take the type as our models have it: `sensor_msgs/msg/JointState`."""
+        self._type, self._store = type_, typestore()
+        fields = self._store.fielddefs[type_][1]
+        self._counted = bool(fields) and fields[0][1][1] == _HEADER
+
+    def frame(self, cdr: bytes, count: int) -> bytearray:
+        """Return the frame of a message of ours; `count` goes into its header, if it has one, as the publishers of ROS 1 do it."""
+        message = self._store.cdr_to_ros1(memoryview(cdr), self._type)
+        frame = bytearray(_LENGTH.size + len(message))
+        frame[_LENGTH.size :] = message
+        if self._counted:
+            _LENGTH_AND_COUNT.pack_into(frame, 0, len(message), count & 0xFFFFFFFF)
+        else:
+            _LENGTH.pack_into(frame, 0, len(message))
+        return frame
+
+    def cdr(self, message: bytes) -> bytes:
+        """Return a message of ROS 1, without its length, as CDR. Raises MessageError if the bytes are no such message."""
+        try:
+            return bytes(self._store.ros1_to_cdr(message, self._type))
+        except (SerdeError, AssertionError, IndexError, struct.error, ValueError) as error:
+            raise MessageError(f"{self._type}: {len(message)} bytes are no such message of ROS 1 ({error})") from error

@@ -1,0 +1,41 @@
+"""The program of docs/ros.md, on real rclpy, against a session with a gateway."""
+
+import os
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from hub.endpoint import free_endpoint
+from hub.launch import launch
+from hub.scenario_file import load
+from tests.devices.ros.rclpy_environment import rclpy_python
+from tests.devices.ros.test_bags import SCENARIO
+from tests.devices.ros.test_dds_gateway import domain
+
+__all__ = ["domain", "rclpy_python"]
+
+pytest.importorskip("cyclonedds")
+PROGRAM = Path(__file__).parents[3] / "examples" / "ros2_psm.py"
+
+
+def test_the_program_of_the_documentation_moves_an_arm(rclpy_python, domain, tmp_path):
+    gateway = f"{{kind: ros2-dds, domain: {domain}, mounting: cart, arms: *psm, cameras: []}}"
+    (tmp_path / "psm.yaml").write_text(SCENARIO.format(device=gateway, pace="realtime", duration="120 s") + "  - motion.* -> ros.*\n")
+    session = launch(load(str(tmp_path / "psm.yaml")), endpoint=free_endpoint(range(1)))
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+    def program():
+        try:
+            return subprocess.run([rclpy_python, PROGRAM], env=environment, capture_output=True, text=True, timeout=100, check=False)
+        finally:
+            session.state.shutdown()
+
+    with ThreadPoolExecutor(1) as pool:
+        ran = pool.submit(program)
+        session.run()
+    assert ran.result().returncode == 0, ran.result().stderr
+    there, back = ran.result().stdout.splitlines()
+    assert there.startswith("at [-0.20")
+    assert back.startswith(("at [0.00", "at [-0.00"))

@@ -1,0 +1,7 @@
+class SampleInfo:
+    instance_state: int
+    instance_handle: int
+    publication_handle: int
+
+class InvalidSample:
+    sample_info: SampleInfo
