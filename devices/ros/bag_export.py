@@ -17,7 +17,7 @@ from devices.ros.description import description
 from devices.ros.gateway import Gateway
 from devices.ros.outgoing import Source, State
 from devices.ros.row import Row
-from devices.ros.scenery import TF_PERIOD_NS, scenery
+from devices.ros.scenery import scenery, stride
 from hub import registry
 from hub.plan import Plan
 from hub.recording import Recording
@@ -131,8 +131,7 @@ class _Retold:
         self._periodic: list[tuple[Row, Source, int]] = [(row, states[port.name], 1) for row, port in periodic if row.topic in fed]
         for row in gateway.rows:
             if row.name in whole:
-                every = max(1, round(TF_PERIOD_NS / self._period_ns)) if row.name == "tf" else 1
-                self._periodic.append((row, whole[row.name], every))
+                self._periodic.append((row, whole[row.name], stride(row.name, self._period_ns)))
             elif row.name == "robot_description" and gateway.params.robot_description is not None:
                 self._describe(row, gateway.params.robot_description)
 

@@ -32,7 +32,6 @@ _ALWAYS = (Policy.Reliability.Reliable(0), Policy.DataRepresentation(use_cdrv0_r
 
 VOLATILE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(10))
 """As ROS programs have it: the last ten messages."""
-_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _LARGE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(60))
 """Of pictures, a second at 60 Hz. What is larger than a packet comes in parts, and a reader of Fast DDS 2.14 that has some of them never returns from its next
 take when it is told that the rest is gone (docs/decisions/0030): so the rest is there while a busy machine loses packets."""
@@ -67,7 +66,7 @@ class DdsTransport(Transport):
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         type_ = payload_type(row.type)
-        quality = LATCHED if row.latched else _LARGE if row.type in _PICTURES else VOLATILE
+        quality = LATCHED if row.latched else _LARGE if row.is_picture else VOLATILE
         writer = self._writer(f"rt{row.topic}", type_, quality, row.type)
         self._writers.append(writer)
         self._announce()

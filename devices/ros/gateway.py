@@ -23,7 +23,7 @@ from devices.ros.paper import paper_face
 from devices.ros.params import GatewayParams
 from devices.ros.refusals import Refusals
 from devices.ros.row import Row
-from devices.ros.scenery import TF_PERIOD_NS, scenery
+from devices.ros.scenery import scenery, stride
 from devices.ros.traffic import Traffic
 from devices.ros.transport import Handler, Transport
 from hub.participant import Device, Sample, Value
@@ -117,8 +117,7 @@ class Gateway(Device):
             elif row.port is not None:
                 self._events[row.port.name] = Event(publish, count)
             elif row.name in whole:
-                every = max(1, round(TF_PERIOD_NS / self.params.publish_period)) if row.name == "tf" else 1
-                periodic.append(Periodic(whole[row.name], publish, count, every))
+                periodic.append(Periodic(whole[row.name], publish, count, stride(row.name, self.params.publish_period)))
             elif self.params.robot_description is not None:
                 Event(publish, count).write(StringMessage(data=description(self.params.robot_description)))
         return periodic

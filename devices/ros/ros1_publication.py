@@ -14,7 +14,8 @@ __all__ = ["Publication"]
 _STATES_KEPT = 2
 """States and pictures that wait for a slow reader, beside what the system's buffers hold."""
 _EVENTS_KEPT = 1000
-_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo")
+_CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+"""Comes with each picture."""
 
 
 class Publication:
@@ -32,7 +33,7 @@ class Publication:
             "topic": self.topic,
             "type": self.type,
         }
-        self._keep = _STATES_KEPT if row.periodic or row.type in _PICTURES else _EVENTS_KEPT
+        self._keep = _STATES_KEPT if row.periodic or row.is_picture or row.type == _CAMERA_INFO else _EVENTS_KEPT
         self._readers: list[Connection] = []
         self._last: bytearray | None = None
         self._count = 0

@@ -9,6 +9,8 @@ from schemas.ports import Port
 
 __all__ = ["Row", "Way"]
 
+_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+
 Way = Literal["publish", "subscribe", "serve"]
 
 
@@ -33,6 +35,11 @@ class Row:
 
     is_real: bool = False
     """Whether it is of a real arm or pedal, that is listened to."""
+
+    @property
+    def is_picture(self) -> bool:
+        """Whether its messages are pictures, far larger than all others."""
+        return self.type in _PICTURES
 
     @property
     def name(self) -> str:

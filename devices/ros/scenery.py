@@ -19,10 +19,10 @@ from schemas.ports import Port
 from schemas.ros import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3
 from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["TF_PERIOD_NS", "scenery"]
+__all__ = ["scenery", "stride"]
 
 _JOINT_STATE = "sensor_msgs/msg/JointState"
-TF_PERIOD_NS = 20_000_000
+_TF_PERIOD_NS = 20_000_000
 """As on the dVRK (docs/pages/development/middleware.rst)."""
 _STAMP = Struct("<iI")
 _Edge = tuple[str, str, Callable[[], Vector | None]]
@@ -32,6 +32,11 @@ _Edge = tuple[str, str, Callable[[], Vector | None]]
 def scenery(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, Source]:
     """Return what is published of it, by the names of topics; `states` by the names of their ports."""
     return {"tf": _Transforms(params, states), "joint_states": _JointStates(params, states)}
+
+
+def stride(name: str, period_ns: int) -> int:
+    """Return at every how many of a gateway's periods topic `name` is published."""
+    return max(1, round(_TF_PERIOD_NS / period_ns)) if name == "tf" else 1
 
 
 class _Transforms:

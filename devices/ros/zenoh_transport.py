@@ -28,9 +28,6 @@ _HEARTBEAT_S = 0.5
 tells it once, and waits for every reader, we tell it all the time: a program that has stopped reading must hold up nobody."""
 
 
-_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
-
-
 class ZenohTransport(Transport):
     """Publishes, listens and answers under rmw_zenoh's keys, as one node.
 
@@ -69,7 +66,7 @@ class ZenohTransport(Transport):
                 publisher_detection=True,
             )
         else:
-            session = self._pictures if row.type in _PICTURES else self._session
+            session = self._pictures if row.is_picture else self._session
             publisher = session.declare_publisher(address, encoding=cdr, congestion_control=drop, priority=urgency)
         self._entities.append(publisher)
         gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
