@@ -19,13 +19,10 @@ from devices.ros.dds_graph import INFO_TOPIC, INFO_TYPE, entities_info
 from devices.ros.dds_programs import Programs
 from devices.ros.dds_types import Payload, payload_type
 from devices.ros.row import Row
-from devices.ros.transport import Client, Handler, Publisher, Taker, Transport
+from devices.ros.transport import NODE, Client, Handler, Publisher, Taker, Transport
 from schemas.codec import rihs01
 
-__all__ = ["NODE", "DdsTransport"]
-
-NODE = "/dvrk"
-"""Name of the node that all belongs to, as on the real system: jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7)."""
+__all__ = ["DdsTransport"]
 
 _ALWAYS = (Policy.Reliability.Reliable(0), Policy.DataRepresentation(use_cdrv0_representation=True))
 """A reader gets all that still is there when it asks; a writer waits 0 ns for one."""

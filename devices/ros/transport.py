@@ -12,7 +12,10 @@ from typing import Protocol
 
 from devices.ros.row import Row
 
-__all__ = ["Client", "Handler", "Publisher", "Taker", "Transport"]
+__all__ = ["NODE", "Client", "Handler", "Publisher", "Taker", "Transport"]
+
+NODE = "/dvrk"
+"""Name of the node of ROS 2 that all belongs to, as on the real one: jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7)."""
 
 Publisher = Callable[[bytes], None]
 """Sends one message (CDR). Never blocks: where a reader does not keep up, older messages are dropped for it. One thread at a time per publisher."""

@@ -11,17 +11,14 @@ from zenoh import ext
 from zenoh.handlers import Callback
 
 from devices.ros.row import Row
-from devices.ros.transport import Client, Handler, Publisher, Taker, Transport
+from devices.ros.transport import NODE, Client, Handler, Publisher, Taker, Transport
 from devices.ros.zenoh_graph import Graph, gid_of
 from devices.ros.zenoh_layout import LATCHED, VOLATILE, Attachment, Endpoint, Kind, graph_key, key, type_hash
 from schemas.errors import MessageError
 
-__all__ = ["NODE", "ZenohTransport"]
+__all__ = ["ZenohTransport"]
 
 log = logging.getLogger(__name__)
-
-NODE = "/dvrk"
-"""Name of the node that all belongs to, as on the real system: jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7)."""
 
 _HEARTBEAT_S = 0.5
 """How often a latched publisher repeats the number of its last message, from which a subscriber knows that it missed one: rmw_zenoh's period. Where that
