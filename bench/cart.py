@@ -21,12 +21,11 @@ import numpy as np
 
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
-from hub.endpoint import free_endpoint
-from hub.inputs import Inputs
-from hub.launch import plan_of
-from hub.participant import Setup
-from hub.plan import Member
-from hub.session import Session
+from hub.participant import Inputs, Setup
+from hub.planning.plan import Member
+from hub.session.launch import plan_of
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
 from schemas.lockstep import Report
 from schemas.scenario import Scenario
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.params import TeleoperationParams
-from hub.inputs import Inputs
-from hub.participant import Setup
+from hub.participant import Inputs, Setup
 from robots import rotation
 from schemas.ros import Joy
 

@@ -22,9 +22,7 @@ import mujoco
 import numpy as np
 
 from engines.bullet.engine import BulletEngine, BulletParams
-from hub.bond import MotionSide
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, MotionSide, Outputs, Params, Setup, Stepped, state_hash
 from hub.testing import run_in_process
 from schemas.errors import TrocarError
 from schemas.ports import BondSide

@@ -23,8 +23,7 @@ sys.path.remove(str(Path(__file__).parent))  # else this very file is the packag
 
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
-from hub.inputs import Inputs
-from hub.participant import BondPlan, Setup
+from hub.participant import BondPlan, Inputs, Setup
 from schemas.codec import decode, encode
 from schemas.ports import Port
 from schemas.vectors import VectorCodec

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Setup, Stepped
+from hub.participant import Inputs, Outputs, Setup, Stepped
 from schemas.ports import Port
 
 SIZE = 64

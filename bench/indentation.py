@@ -3,7 +3,7 @@
     python bench/indentation.py --json indentation.json --picture docs/pictures/indentation.png
 
 A block of 80 x 60 x 20 mm, 10 kPa, is pressed over a node, and in the middle of a face, where Bullet's contacts lose most. The truth is
-Newton's method on the same mesh with the same friction (tests/engines/finite_elements.py); `continuum` is that on a mesh of 2000 nodes,
+Newton's method on the same mesh with the same friction (tests/engines/bullet/finite_elements.py); `continuum` is that on a mesh of 2000 nodes,
 so it shows what the mesh costs. Written up in docs/decisions/0015-contact-force.md.
 """
 
@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' truth
 
 from engines.bullet.engine import BulletParams
 from schemas.vectors import Vector
-from tests.engines.bullet_rig import Rig
-from tests.engines.finite_elements import Body
+from tests.engines.bullet.finite_elements import Body
+from tests.engines.bullet.rig import Rig
 
 NODES = {"coarse": 250, "fine": 1000}
 TIMESTEP_S = {250: 1e-3, 1000: 0.5e-3}

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from hub.endpoint import free_endpoint
-from hub.launch import launch
-from hub.scenario_file import load
+from hub.planning.scenario_file import load
+from hub.session.launch import launch
+from hub.transport.endpoints import free_endpoint
 
 HERE = Path(__file__).parent
 SCENARIO = """\

@@ -21,11 +21,11 @@ from time import perf_counter, sleep
 import zenoh
 from zenoh.handlers import FifoChannel
 
-from hub.endpoint import free_endpoint
-from hub.launch import plan_of
 from hub.participant import Params
-from hub.session import Session
-from hub.wire import open_session
+from hub.session.launch import plan_of
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
+from hub.transport.zenoh_session import open_session
 from schemas.scenario import Scenario
 
 PAYLOAD = bytes(64 * 8)
@@ -118,8 +118,7 @@ def plain_loop(participants: int, steps: int) -> float:
     """Return the steps per second of calling the participants in a plain loop."""
     from exchange import Exchange
 
-    from hub.inputs import Inputs
-    from hub.participant import Setup
+    from hub.participant import Inputs, Setup
 
     made = [Exchange(str(i), Params()) for i in range(participants)]
     values = [dict(p.configure(Setup(period_ns=10**6, directory=Path()))) for p in made]

@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from engines.bullet.engine import BulletEngine, BulletParams
-from hub.inputs import Inputs
-from hub.participant import BondPlan, Setup
+from hub.participant import BondPlan, Inputs, Setup
 
 MS = 1_000_000
 NODES = (100, 250, 500, 1000, 2000, 5000)

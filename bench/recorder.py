@@ -24,7 +24,7 @@ from typing import BinaryIO, Protocol
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from hub.recorder import Recorder
+from hub.recording.recorder import Recorder
 
 CHANNELS = 10
 SMALL, LARGE, LARGE_EVERY = 100, 3000, 16

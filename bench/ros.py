@@ -26,11 +26,11 @@ from ros_client import percentiles
 from ros_figures import cpu_s, host_process
 from ros_places import PLACES, Place
 
-from hub.endpoint import free_endpoint
-from hub.launch import launch
-from hub.scenario_file import load
-from hub.session import Session
-from hub.wire import open_session
+from hub.planning.scenario_file import load
+from hub.session.launch import launch
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
+from hub.transport.zenoh_session import open_session
 
 HERE = Path(__file__).parent
 ARMS = {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400006"}, "ECM": {"start": ["0 deg", "0 deg", "50 mm", "0 deg"]}}

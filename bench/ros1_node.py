@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from devices.ros.ros1_transport import Ros1Transport
-from devices.ros.row import Row
+from devices.ros.ros1.transport import Ros1Transport
+from devices.ros.topics.row import Row
 from schemas.codec import encode
 from schemas.ros import JointState
 from tests.devices.ros.rospy_peer import Ros1, master, until

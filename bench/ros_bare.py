@@ -20,8 +20,8 @@ from ros_figures import cpu_s
 from ros_parts import EYES, picture
 
 from devices.ros.gateway import Gateway
-from hub.registry import make
-from hub.wire import open_session
+from hub.planning.registry import make
+from hub.transport.zenoh_session import open_session
 from schemas.trocar_msgs import GatewayStatus
 from schemas.vectors import VectorCodec
 

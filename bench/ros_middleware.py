@@ -23,7 +23,7 @@ class Zenoh:
     """The program that the tests have, written from rmw_zenoh's design on eclipse-zenoh and rosbags; `where` is the router's endpoint."""
 
     def __init__(self, where: str) -> None:
-        from tests.devices.ros import zenoh_peer
+        from tests.devices.ros.zenoh import zenoh_peer
 
         self._types = zenoh_peer.TYPES.types
         self._peer = zenoh_peer.Peer(where, "figures")

@@ -9,8 +9,7 @@ from time import time_ns
 import numpy as np
 from ros_client import MOVED_RAD
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from schemas.ports import Port
 from schemas.ros import Header, Image, JointState
 

@@ -1,7 +1,7 @@
-"""How well the stable-step rules of `hub.coupling` predict the largest stable step: 108 linear cases for each algorithm.
+"""How well the stable-step rules of `hub.planning.coupling` predict the largest stable step: 108 linear cases for each algorithm.
 
 A tool of mass m on a servo, its virtual coupling (k, b = 2 sqrt(k m_p)) and a proxy of mass m_p that presses on a spring make a linear
-system of four states. One communication step of it, taken through the code of `hub.bond`, is a matrix; the step is stable if its
+system of four states. One communication step of it, taken through the code of `hub.participant.bond`, is a matrix; the step is stable if its
 spectral radius is at most 1. A rule holds in a case if the step it allows is no longer than the largest stable one.
 """
 
@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from hub.bond import ForceSide, MotionSide
-from hub.coupling import bond_plans, stable_step_problem
-from hub.inputs import Inputs
+from hub.participant import ForceSide, Inputs, MotionSide
+from hub.planning.coupling import bond_plans, stable_step_problem
 from schemas.ports import BondSide
 from schemas.scenario import Bond
 

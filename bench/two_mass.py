@@ -20,9 +20,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples" / "two_m
 
 from two_mass import Mass, MassParams, SprungMass
 
-from hub.endpoint import free_endpoint
-from hub.session import Session
-from hub.wiring import make_plan
+from hub.planning.wiring import make_plan
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Scenario
 
 ONE = MassParams(mass=1, stiffness=10, damping=0.1, x=1)

@@ -10,8 +10,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError, StateError

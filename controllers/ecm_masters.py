@@ -17,14 +17,24 @@ from typing import ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
 from robots import rotation
 from robots.dvrk import ecm
 from schemas.crtk import OperatingState
 from schemas.ports import Port
 from schemas.quantity import Duration
-from schemas.ros import BoolMessage, Header, JointState, Joy, Quaternion, StringMessage, Time, Vector3, Wrench, WrenchStamped
+from schemas.ros import (
+    BoolMessage,
+    Header,
+    JointState,
+    Joy,
+    Quaternion,
+    StringMessage,
+    Time,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
 from schemas.vectors import Vector
 
 __all__ = ["EcmMasters", "EcmMastersParams"]

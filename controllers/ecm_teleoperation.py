@@ -21,8 +21,7 @@ from typing import ClassVar, Literal, Self, cast
 import numpy as np
 from pydantic import Field, model_validator
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, restore_arrays, state_hash
 from robots import rotation
 from robots.dvrk import ecm
 from robots.dvrk.parameters import EcmPositions, check_start

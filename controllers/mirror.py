@@ -19,8 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from controllers.motion.params import Arms, EcmParams, PsmParams
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
 from robots.serial_chain import Joint
 from schemas.crtk import OperatingState
 from schemas.ports import Port

@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from robots.dvrk.stitch_study import study
 from schemas.errors import StateError
 from schemas.ports import Port

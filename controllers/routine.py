@@ -12,8 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import UnitQuaternion
 from robots.dvrk.setup_joints import CartArm

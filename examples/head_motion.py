@@ -20,7 +20,18 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from robots import rotation
 from schemas.codec import encode, typestore
 from schemas.message import Message
-from schemas.ros import Header, Point, Pose, PoseStamped, Quaternion, StringMessage, Time, Twist, TwistStamped, Vector3
+from schemas.ros import (
+    Header,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    StringMessage,
+    Time,
+    Twist,
+    TwistStamped,
+    Vector3,
+)
 
 RATE_HZ = 100
 FRAME = "head_base"

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, entry_points
 from importlib.util import find_spec
 
-from hub import credentials, registry
-from hub.endpoint import free_endpoint
-from hub.wire import open_session
+from hub.planning import registry
+from hub.security import credentials
+from hub.transport.endpoints import free_endpoint
+from hub.transport.zenoh_session import open_session
 from schemas.errors import TrocarError
 
 __all__ = ["Finding", "as_json", "examine"]

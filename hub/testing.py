@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
-from hub.endpoint import free_endpoint
-from hub.inputs import Inputs
-from hub.launch import in_one_host
-from hub.participant import BondPlan, Device, Outputs, Sample, Setup, Stepped, Value
-from hub.session import Session
-from hub.summary import Summary
-from hub.wire import PortCodec
-from hub.wiring import make_plan
+from hub.observation.summary import Summary
+from hub.participant import BondPlan, Device, Inputs, Outputs, Sample, Setup, Stepped, Value
+from hub.planning.wiring import make_plan
+from hub.session.launch import in_one_host
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
+from hub.transport.port_codec import PortCodec
 from schemas.codec import encode
 from schemas.errors import MessageError, StateError, TrocarError
 from schemas.message import Message

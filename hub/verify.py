@@ -6,12 +6,12 @@ import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from hub import registry
-from hub.files import changed_files
-from hub.plan import Member, Plan
-from hub.recording import Recording
-from hub.session import Session
-from hub.summary import Progress
+from hub.observation.summary import Progress
+from hub.planning import registry
+from hub.planning.file_hashes import changed_files
+from hub.planning.plan import Member, Plan
+from hub.recording.recording import Recording
+from hub.session.session import Session
 from schemas.lockstep import Report
 from schemas.trocar_msgs import Ack
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from schemas.keys import valid_name
-from schemas.link import LinkSpec
+from schemas.network_link import LinkSpec
 from schemas.quantity import Duration
 
 __all__ = ["Bond", "Connection", "Endpoint", "Measure", "ParticipantSpec", "Scenario"]

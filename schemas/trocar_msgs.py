@@ -7,7 +7,20 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from schemas.message import Bool, Bytes, Float32Array, Float64, Float64Array, Int64, Message, String, UInt32, UInt32Array, UInt64, UInt64Array
+from schemas.message import (
+    Bool,
+    Bytes,
+    Float32Array,
+    Float64,
+    Float64Array,
+    Int64,
+    Message,
+    String,
+    UInt32,
+    UInt32Array,
+    UInt64,
+    UInt64Array,
+)
 from schemas.ros import Header, Vector3
 
 __all__ = [

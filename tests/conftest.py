@@ -6,7 +6,7 @@ import os
 
 from hypothesis import HealthCheck, settings
 
-from hub.blas import pin_blas
+from hub.hosting.blas import pin_blas
 
 pin_blas(os.environ)  # before any test imports numpy: a process with other kernels has other hashes
 settings.register_profile("trocar", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])

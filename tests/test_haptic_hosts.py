@@ -14,7 +14,7 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
-from hub.endpoint import free_endpoint
+from hub.transport.endpoints import free_endpoint
 from tests.devices.standins import build
 from tests.devices.standins.hd import VARIABLE, HdWorld, Row
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from devices.simulated_touch.device import SimulatedTouch
-from hub.endpoint import free_endpoint
-from hub.launch import in_one_host, plan_of
 from hub.participant import Sample
-from hub.scenario_file import load
-from hub.session import Session
+from hub.planning.scenario_file import load
+from hub.session.launch import in_one_host, plan_of
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
 from schemas.ros import PoseStamped, WrenchStamped
 
 PATH = [

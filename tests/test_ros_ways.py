@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from hub.endpoint import free_endpoint
-from hub.launch import launch, plan_of
-from hub.scenario_file import load
-from schemas.bag import Bag
+from hub.planning.scenario_file import load
+from hub.recording.bag import Bag
+from hub.session.launch import launch, plan_of
+from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Connection
 
 pytest.importorskip("mujoco")

@@ -17,9 +17,15 @@ from controllers.motion.gravity import KnownWeight
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import CARTESIAN_COMMANDS, COMMANDS, EQUIPMENT_COMMANDS, EVENTS, GRIPPER_COMMANDS
+from controllers.motion.ports import (
+    CARTESIAN_COMMANDS,
+    COMMANDS,
+    EQUIPMENT_COMMANDS,
+    EVENTS,
+    GRIPPER_COMMANDS,
+)
 from controllers.motion.telemetry import Telemetry
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import StringStamped
 from schemas.errors import MotionError

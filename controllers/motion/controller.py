@@ -9,8 +9,7 @@ from controllers.motion.frames import CART_FRAME, base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
 from controllers.motion.setup_joints import SetupJoints, joint_names
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, restore_arrays, state_hash
 from schemas.errors import MissingExtraError
 from schemas.ports import Port
 from schemas.vectors import Vector

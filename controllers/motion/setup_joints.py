@@ -16,7 +16,7 @@ from controllers.motion.messages import Messages
 from controllers.motion.operating_state import Repeats, State, refusal
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import SETUP_JOINT_COMMANDS, SETUP_JOINT_EVENTS
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from robots.dvrk import setup_joints
 from schemas.crtk import StringStamped
 

@@ -14,8 +14,7 @@ from controllers.teleoperation.ports import teleoperation_ports
 from controllers.teleoperation.pose_law import PoseLaw
 from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, restore_arrays, state_hash
 from robots import rotation
 from schemas.crtk import OperatingState
 from schemas.ports import Port

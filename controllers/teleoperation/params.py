@@ -11,7 +11,14 @@ from controllers.teleoperation.contact_model import ForceParams, PlanesParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import ArmName, InstrumentName, MountedPositions, UnitQuaternion, check_start, home
+from robots.dvrk.parameters import (
+    ArmName,
+    InstrumentName,
+    MountedPositions,
+    UnitQuaternion,
+    check_start,
+    home,
+)
 from robots.serial_chain import SerialChain
 from schemas.quantity import Angle, Duration
 

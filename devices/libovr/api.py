@@ -9,7 +9,20 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from ctypes import POINTER, Structure, c_byte, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_uint32, c_void_p
+from ctypes import (
+    POINTER,
+    Structure,
+    c_byte,
+    c_char,
+    c_char_p,
+    c_double,
+    c_float,
+    c_int,
+    c_int16,
+    c_int32,
+    c_uint32,
+    c_void_p,
+)
 from functools import cache
 from typing import Any
 

@@ -7,7 +7,16 @@ import ctypes
 import threading
 from time import perf_counter
 
-from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, FORCE_OUTPUT, PRIORITY_MAX, SCHEDULER_HERTZ, SERVO_CALLBACK, Hdapi, errors
+from devices.openhaptics.hdapi import (
+    CALLBACK_CONTINUE,
+    CALLBACK_DONE,
+    FORCE_OUTPUT,
+    PRIORITY_MAX,
+    SCHEDULER_HERTZ,
+    SERVO_CALLBACK,
+    Hdapi,
+    errors,
+)
 from devices.openhaptics.stylus import Phase, Stylus
 
 __all__ = ["Servo"]

@@ -12,7 +12,16 @@ from devices.haptics.limits import Limits
 from devices.haptics.loop import HapticLoop
 from devices.haptics.safety import Condition
 from devices.openhaptics.exchange import RingReader, RingWriter, planes_in
-from devices.openhaptics.hdapi import FORCE_OUTPUT, PLACEHOLDER_MM, Calibration, Code, Get, Hdapi, Style, errors
+from devices.openhaptics.hdapi import (
+    FORCE_OUTPUT,
+    PLACEHOLDER_MM,
+    Calibration,
+    Code,
+    Get,
+    Hdapi,
+    Style,
+    errors,
+)
 from devices.openhaptics.motion import Tip
 from devices.vendor_axes import Vector3
 

@@ -33,7 +33,7 @@ def ros(
     if context.invoked_subcommand is not None:
         return
     from devices.ros.watch import running_gateways
-    from hub.endpoint import listening_endpoints
+    from hub.transport.endpoints import listening_endpoints
 
     gateways = running_gateways(connect or listening_endpoints())
     if as_json:
@@ -55,8 +55,8 @@ def bag(
     as_json: Json = False,
 ) -> None:
     """Write what a recorded session has told ROS programs, and heard from them, as a bag with ROS names, for `ros2 bag play`."""
-    from devices.ros.bag_export import export
-    from hub.recording import Recording
+    from devices.ros.bags.export import export
+    from hub.recording.recording import Recording
 
     stem = recording.parent if recording.is_file() else recording
     show(asdict(export(Recording(recording), output or stem.with_name(f"{stem.resolve().name}-ros"), gateway)), as_json=as_json)

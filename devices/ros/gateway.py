@@ -1,6 +1,6 @@
 """A gateway to ROS, whatever the middleware: the base of kinds such as `ros2-zenoh`.
 
-It makes publishers, subscribers, services and ports from one table (`devices.ros.face`), and knows no physics. A gateway for another middleware is
+It makes publishers, subscribers, services and ports from one table (`devices.ros.topics.face`), and knows no physics. A gateway for another middleware is
 a `connect` that returns another transport.
 """
 
@@ -13,17 +13,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, cast
 
-from devices.ros.commander import Commander
-from devices.ros.description import description
-from devices.ros.face import face
-from devices.ros.incoming import Incoming
-from devices.ros.kinematics import kinematics_handler
-from devices.ros.outgoing import Event, Outgoing, Periodic, Source, State
-from devices.ros.paper import paper_face
 from devices.ros.params import GatewayParams
-from devices.ros.refusals import Refusals
-from devices.ros.row import Row
-from devices.ros.scenery import scenery, stride
+from devices.ros.topics.commander import Commander
+from devices.ros.topics.description import description
+from devices.ros.topics.face import face
+from devices.ros.topics.incoming import Incoming
+from devices.ros.topics.kinematics import kinematics_handler
+from devices.ros.topics.outgoing import Event, Outgoing, Periodic, Source, State
+from devices.ros.topics.refusals import Refusals
+from devices.ros.topics.row import Row
+from devices.ros.topics.scenery import scenery, stride
+from devices.ros.topics.vrep import paper_face
 from devices.ros.traffic import Traffic
 from devices.ros.transport import Handler, Transport
 from hub.participant import Device, Sample, Value

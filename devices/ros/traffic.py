@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from time import monotonic_ns
 
-from devices.ros.row import Row
+from devices.ros.topics.row import Row
 from devices.ros.transport import Client
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
 

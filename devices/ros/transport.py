@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from devices.ros.row import Row
+from devices.ros.topics.row import Row
 
 __all__ = ["NODE", "Client", "Handler", "Publisher", "Taker", "Transport"]
 

@@ -10,7 +10,7 @@ from time import sleep
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.wire import open_session
+from hub.transport.zenoh_session import open_session
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys

@@ -15,7 +15,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from devices.playback import Playback
 from hub.participant import Device, Params, Sample
-from schemas.bag import Bag, BagMessage, output_port
+from hub.recording.bag import Bag, BagMessage, output_port
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, RecordingError
 from schemas.message import Message

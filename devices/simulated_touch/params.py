@@ -11,8 +11,8 @@ from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInf
 from devices.haptics.limits import TOUCH
 from devices.haptics.params import SafetyParams
 from hub.participant import Params
+from hub.recording.bag import bag_file
 from robots.dvrk.parameters import UnitQuaternion
-from schemas.bag import bag_file
 from schemas.errors import RecordingError, ScenarioError
 from schemas.quantity import Damping, Duration, Length, Mass, Stiffness
 

@@ -16,8 +16,8 @@ import numpy as np
 from devices.haptics.contact import ZERO
 from devices.simulated_touch.params import LEVEL, Waypoint
 from devices.vendor_axes import Quaternion, Vector3
+from hub.recording.bag import Bag
 from robots import rotation
-from schemas.bag import Bag
 from schemas.codec import decode
 from schemas.errors import RecordingError
 from schemas.ros import Joy, PoseStamped

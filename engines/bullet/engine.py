@@ -15,8 +15,7 @@ from engines.bullet.grasp import Grasp, grasp_ports, nothing_held
 from engines.bullet.material import longest_step
 from engines.bullet.organ import Organ, OrganParams
 from engines.bullet.proxy import Coupling, Probe, ProbeParams
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import ScenarioError, StateError, did_you_mean
 from schemas.ports import BondSide, Port
 from schemas.quantity import Acceleration, Duration

@@ -19,7 +19,7 @@ _SAG_ITERATIONS, _SAG_TOLERANCE = 300, 0.1
 """Of conjugate gradients for the sag: enough to know the lowest frequency to one percent."""
 
 _LARGEST_PHASE = 4.0
-"""Largest timestep x highest frequency: a block pressed at a node is steady at 4.0 and chatters at 4.7 (tests/engines/test_bullet_limits.py)."""
+"""Largest timestep x highest frequency: a block pressed at a node is steady at 4.0 and chatters at 4.7 (tests/engines/bullet/test_limits.py)."""
 
 
 @dataclass(frozen=True)

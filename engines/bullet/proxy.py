@@ -11,9 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from engines.bullet.contact import COLLISION_MARGIN_M
 from engines.bullet.grasp import GraspParams
-from hub.bond import ForceSide
-from hub.inputs import Inputs
-from hub.participant import BondPlan
+from hub.participant import BondPlan, ForceSide, Inputs
 from schemas.errors import SessionError
 from schemas.ports import BondSide
 from schemas.quantity import Damping, Length, Mass, Stiffness

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.fmu.variables import LARGEST_EXACT, Variable
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 

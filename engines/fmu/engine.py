@@ -20,8 +20,7 @@ from engines.fmu.description import Description, describe
 from engines.fmu.fmi2 import Fmi2Instance
 from engines.fmu.fmi3 import Fmi3Instance
 from engines.fmu.instance import Instance
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from schemas.errors import ScenarioError, SessionError, StateError
 from schemas.ports import Port
 from schemas.quantity import Duration

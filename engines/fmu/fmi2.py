@@ -13,7 +13,7 @@ from engines.fmu.description import Description
 from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.log import fmi2_callbacks, wants_all
 from engines.fmu.start import Start
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from schemas.errors import SessionError
 
 __all__ = ["Fmi2Instance"]

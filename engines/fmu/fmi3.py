@@ -14,7 +14,7 @@ from engines.fmu.description import Description
 from engines.fmu.instance import Instance
 from engines.fmu.log import log_message, wants_all
 from engines.fmu.start import Start
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from schemas.errors import SessionError
 
 __all__ = ["Fmi3Instance"]

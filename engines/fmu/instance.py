@@ -18,7 +18,7 @@ from engines.fmu.blocks import WARNING, Block, grouped, prepared
 from engines.fmu.description import Description
 from engines.fmu.log import last_complaint
 from engines.fmu.start import Start
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from schemas.errors import ScenarioError, SessionError
 
 __all__ = ["DISCARD", "Instance"]

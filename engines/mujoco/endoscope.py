@@ -19,8 +19,7 @@ from engines.mujoco import opengl
 from engines.mujoco.endoscope_params import EndoscopeParams
 from engines.mujoco.positions import position_count
 from engines.mujoco.skins import SoftBody
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
 from schemas.errors import MissingExtraError, StateError
 from schemas.message import Message

@@ -15,8 +15,7 @@ import numpy as np
 from engines.mujoco import opengl
 from engines.mujoco.params import MujocoParams, PsmParams
 from engines.mujoco.ports import bond_sides, scene_ports
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, Value, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port
 from schemas.vectors import Vector
@@ -109,7 +108,7 @@ class MujocoEngine(Stepped):
     def _couple(self, setup: Setup) -> None:
         from engines.mujoco.probe import Probe
         from engines.mujoco.spheres import Spheres
-        from hub.bond import MotionSide
+        from hub.participant import MotionSide
 
         kinds = {"probe": Probe, "contact": Spheres}
         for bond in self.bonds:

@@ -7,8 +7,7 @@ import numpy as np
 
 from engines.mujoco.effective_mass import effective_mass
 from engines.mujoco.model import probe_body
-from hub.bond import MotionSide
-from hub.inputs import Inputs
+from hub.participant import Inputs, MotionSide
 from schemas.vectors import Vector
 
 __all__ = ["Probe"]

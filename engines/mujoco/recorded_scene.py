@@ -13,8 +13,8 @@ from engines.mujoco.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.endoscope_scene import EndoscopeScene
 from engines.mujoco.params import MujocoParams, SceneParams
 from engines.mujoco.skins import SoftBody
-from hub.recording import Recording
-from schemas.bag import output_port
+from hub.recording.bag import output_port
+from hub.recording.recording import Recording
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError, TrocarError
 from schemas.scenario import ParticipantSpec

@@ -39,7 +39,7 @@ def render(
     from PIL import Image
 
     from engines.mujoco.recorded_scene import RecordedScene
-    from hub.recording import Recording
+    from hub.recording.recording import Recording
 
     scene = RecordedScene(Recording(recording), robot)
     eyes = None if position is None else _point(position, "--from")

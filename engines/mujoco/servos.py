@@ -15,7 +15,7 @@ import numpy as np
 
 from engines.mujoco.model import FINGERS
 from engines.mujoco.params import EcmParams, PsmParams
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import SessionError

@@ -8,8 +8,7 @@ import numpy as np
 from engines.mujoco.effective_mass import effective_mass
 from engines.mujoco.model import CONTACT
 from engines.mujoco.moment import moment
-from hub.bond import MotionSide
-from hub.inputs import Inputs
+from hub.participant import Inputs, MotionSide
 
 __all__ = ["Spheres"]
 

@@ -6,9 +6,7 @@ and gives the force. Each is integrated in small sub-steps, so that all error se
 
 import numpy as np
 
-from hub.bond import ForceSide, MotionSide
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import ForceSide, Inputs, MotionSide, Outputs, Params, Setup, Stepped, state_hash
 from schemas.ports import BondSide, Port
 
 SUB_STEPS = 50

@@ -2,7 +2,7 @@
 
 import os
 
-from hub.blas import pin_blas
+from hub.hosting.blas import pin_blas
 
 pin_blas(os.environ)  # before anything imports numpy: participants may run in this process
 

@@ -30,7 +30,7 @@ Hosts = Annotated[list[str] | None, typer.Argument(metavar="HOST", help="A name 
 
 
 def _directory(given: Path | None) -> Path:
-    from hub.credentials import default_directory
+    from hub.security.credentials import default_directory
 
     return given or default_directory()
 
@@ -44,7 +44,7 @@ def init(
 ) -> None:
     """Make an authority and the certificate of this machine's hub: once, on the machine where the hub runs."""
     _needs_cryptography()
-    from hub.certs import found, names_of_this_machine
+    from hub.security.certs import found, names_of_this_machine
 
     file = found(_directory(directory), hosts or names_of_this_machine(), days)
     console.print(f"wrote {file}, for the hub, and the authority ca.pem with its key ca.key beside it: keep that key to yourself", soft_wrap=True)
@@ -61,7 +61,7 @@ def renew(
 ) -> None:
     """Make a new certificate for the hub, with the same names unless others are given."""
     _needs_cryptography()
-    from hub.certs import renew as make
+    from hub.security.certs import renew as make
 
     file = make(_directory(directory), hosts or (), days)
     console.print(f"wrote {file}; it counts from the next session on", soft_wrap=True)
@@ -77,8 +77,8 @@ def issue(
 ) -> None:
     """Make the certificate of one participant, for another machine; an older one stays valid as long as it is."""
     _needs_cryptography()
-    from hub.certs import issue as make
-    from hub.credentials import CONSOLE, OBSERVER
+    from hub.security.certs import issue as make
+    from hub.security.credentials import CONSOLE, OBSERVER
 
     file = make(_directory(directory), name, days)
     uses = {OBSERVER: "trocar ls --connect tls/HUB:7447", CONSOLE: "in the Zenoh settings of the ROS programs, to connect to tls/HUB:7447 (docs/ros.md)"}
@@ -92,7 +92,7 @@ def issue(
 @app.command()
 def show(*, directory: Directory = None) -> None:
     """List the certificates of this machine, until when they are valid and for what."""
-    from hub.credentials import CONSOLE, HUB, OBSERVER, examine, load
+    from hub.security.credentials import CONSOLE, HUB, OBSERVER, examine, load
 
     place = _directory(directory)
     rows: list[tuple[str, str, str]] = []
@@ -111,7 +111,7 @@ def show(*, directory: Directory = None) -> None:
 
 
 def _print_names(file: Path) -> None:
-    from hub.credentials import examine, load
+    from hub.security.credentials import examine, load
 
     console.print(f"other machines may reach it as {', '.join(examine(load(file.stem, file)).hosts)}", soft_wrap=True)
 

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
-from hub.summary import Progress
+from hub.observation.summary import Progress
 from schemas.scenario import Scenario
 
 __all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]

@@ -20,13 +20,13 @@ Certificates = Annotated[
 
 def engine(name: Participant, *, connect: Connect, session: SessionName = "*", directory: Directory = None, certs: Certificates = None) -> None:
     """Host one engine or controller of a scenario here, and join a hub elsewhere."""
-    from hub.host_process import run_host
+    from hub.hosting.host_process import run_host
 
     run_host(connect, session, f"remote/{name}", directory=directory, certificates=certs)
 
 
 def device(name: Participant, *, connect: Connect, session: SessionName = "*", directory: Directory = None, certs: Certificates = None) -> None:
     """Host one device of a scenario here: join a hub elsewhere, wait when it is gone, and join again."""
-    from hub.host_process import run_device
+    from hub.hosting.host_process import run_device
 
     run_device(connect, session, name, directory=directory, certificates=certs)

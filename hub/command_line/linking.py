@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from hub.command_line.display import console, show
 from hub.command_line.scenarios import Json
-from schemas.link import PRESETS
+from schemas.network_link import PRESETS
 
 __all__ = ["link"]
 
@@ -29,9 +29,9 @@ def link(
     as_json: Json = False,
 ) -> None:
     """Put delay, jitter, loss or an outage between a device and the hub while a session runs; what is not said stays as it is."""
-    from hub.endpoint import listening_endpoints
-    from hub.live import ask_about
-    from hub.relink import LinkReply, LinkRequest
+    from hub.devices.network_link_control import LinkReply, LinkRequest
+    from hub.remote.live_sessions import ask_about
+    from hub.transport.endpoints import listening_endpoints
 
     said = {"preset": preset, "delay": delay, "jitter": jitter, "loss": loss, "outage": outage}
     try:

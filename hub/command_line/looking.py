@@ -15,11 +15,11 @@ from hub import doctor as doctor_module
 from hub.command_line.display import LATENCY_COLUMNS, console, latency_rows, table
 from hub.command_line.hosting import Certificates
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
-from hub.latency import by_way
-from hub.launch import plan_of
-from hub.plan import Plan
-from hub.scenario_file import load
-from hub.scenario_schema import scenario_schema
+from hub.observation.latency import by_way
+from hub.planning.plan import Plan
+from hub.planning.scenario_file import load
+from hub.planning.scenario_schema import scenario_schema
+from hub.session.launch import plan_of
 from schemas.trocar_msgs import SessionStatus
 
 __all__ = ["check", "doctor", "ls", "schema"]
@@ -64,8 +64,8 @@ def ls(
     as_json: Json = False,
 ) -> None:
     """List the sessions that are running: participants, the clocks and links of devices, and how long things take."""
-    from hub.endpoint import listening_endpoints
-    from hub.live import live_sessions
+    from hub.remote.live_sessions import live_sessions
+    from hub.transport.endpoints import listening_endpoints
 
     sessions = live_sessions(connect or listening_endpoints(), certs)
     if as_json:

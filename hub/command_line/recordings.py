@@ -10,7 +10,7 @@ import typer
 
 from hub.command_line.display import RunProgress, console, show
 from hub.command_line.scenarios import Json, Listen
-from hub.recording import Recording
+from hub.recording.recording import Recording
 
 __all__ = ["recover", "replay", "report", "verify"]
 
@@ -38,9 +38,9 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Publish a recording again, so that consoles see it as they would see it live."""
-    from hub.endpoint import free_endpoint, require_loopback
-    from hub.replay import replay as publish
-    from hub.wire import open_session
+    from hub.recording.replay import replay as publish
+    from hub.transport.endpoints import free_endpoint, require_loopback
+    from hub.transport.zenoh_session import open_session
 
     endpoint = require_loopback(listen) if listen else free_endpoint()
     console.print(f"publishing on {endpoint}")
@@ -50,14 +50,14 @@ def replay(
 
 def recover(recording: RecordingPath, *, output: Output = None, as_json: Json = False) -> None:
     """Save what is whole of a recording that was cut short."""
-    from hub.recover import recover as save
+    from hub.recording.recover import recover as save
 
     show(asdict(save(recording, output)), as_json=as_json)
 
 
 def report(recording: RecordingPath, *, output: Output = None) -> None:
     """Write one self-contained HTML page of plots about a recording."""
-    from hub.report import report as write
+    from hub.recording.report import report as write
 
     page = output or recording.with_name(f"{recording.stem if recording.is_file() else recording.name}.html")
     write(Recording(recording), page)

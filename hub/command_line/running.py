@@ -10,9 +10,9 @@ import typer
 from hub.command_line.display import RunProgress, console, show
 from hub.command_line.hosting import Certificates
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
-from hub.endpoint import parted
-from hub.launch import launch
-from hub.scenario_file import load
+from hub.planning.scenario_file import load
+from hub.session.launch import launch
+from hub.transport.endpoints import parted
 
 __all__ = ["run"]
 

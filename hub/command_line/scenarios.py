@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from hub.scenario_file import installed_scenarios, located
-from hub.source import Source
+from hub.planning.scenario_file import installed_scenarios, located
+from hub.planning.scenario_source import Source
 from schemas.errors import ScenarioError
 
 __all__ = ["Json", "Listen", "Overrides", "ScenarioName", "locating"]

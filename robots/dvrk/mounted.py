@@ -9,7 +9,15 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import EcmPositions, HandPositions, InstrumentName, MountedPositions, UnitQuaternion, check_start, home
+from robots.dvrk.parameters import (
+    EcmPositions,
+    HandPositions,
+    InstrumentName,
+    MountedPositions,
+    UnitQuaternion,
+    check_start,
+    home,
+)
 from robots.serial_chain import SerialChain
 from schemas.quantity import Angle, Length
 

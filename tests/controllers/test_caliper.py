@@ -10,8 +10,7 @@ from controllers.routine import Routine, RoutineParams
 from engines.bullet.engine import BulletEngine, BulletParams
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
-from hub.inputs import Inputs
-from hub.participant import Setup
+from hub.participant import Inputs, Setup
 from hub.testing import check_engine, run_in_process
 from robots.dvrk.musha import HAND
 from schemas.errors import SessionError, StateError

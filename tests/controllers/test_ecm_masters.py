@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.ecm_masters import EcmMasters, EcmMastersParams
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from hub.testing import check_engine
 from robots import rotation
 from schemas.crtk import OperatingState

@@ -8,8 +8,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from controllers.ecm_teleoperation import EcmTeleoperation, EcmTeleoperationParams
-from hub.inputs import Inputs
-from hub.participant import Setup
+from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from robots import rotation
 from robots.dvrk import ecm, endoscope

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from controllers.mirror import Mirror, MirrorParams
-from hub.inputs import Inputs
+from hub.participant import Inputs
 from hub.testing import check_engine
 from schemas.crtk import OperatingState
 from schemas.errors import StateError
-from tests.controllers.motion_rig import Rig
+from tests.controllers.motion.rig import Rig
 
 ARMS = {"PSM1": {"instrument": "400006"}}
 H = 1_000_000

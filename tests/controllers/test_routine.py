@@ -3,8 +3,7 @@ import pytest
 from pydantic import ValidationError
 
 from controllers.routine import Routine, RoutineParams
-from hub.inputs import Inputs
-from hub.participant import Setup
+from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from schemas.crtk import OperatingState
 from schemas.errors import SessionError, StateError

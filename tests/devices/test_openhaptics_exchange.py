@@ -9,7 +9,17 @@ from hypothesis import strategies as st
 
 from devices.haptics.contact import Plane
 from devices.openhaptics import exchange
-from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, State, device_ends, model_doubles, planes_in, ring_size, servo_ends
+from devices.openhaptics.exchange import (
+    STYLUS_BYTES,
+    RingReader,
+    RingWriter,
+    State,
+    device_ends,
+    model_doubles,
+    planes_in,
+    ring_size,
+    servo_ends,
+)
 
 SLOTS, DOUBLES = 4, 3
 finite = st.floats(allow_nan=False)

@@ -23,12 +23,28 @@ from devices.haptics.limits import Limits
 from devices.haptics.safety import Condition
 from devices.openhaptics import diagnoses, hdapi
 from devices.openhaptics.callback import Servo
-from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, State, device_ends, model_doubles, servo_ends
+from devices.openhaptics.exchange import (
+    STYLUS_BYTES,
+    RingReader,
+    RingWriter,
+    State,
+    device_ends,
+    model_doubles,
+    servo_ends,
+)
 from devices.openhaptics.hdapi import CALLBACK_CONTINUE, CALLBACK_DONE, INVALID_HANDLE, Code
 from devices.openhaptics.stylus import Phase, Spec, Stylus
 from schemas.errors import DeviceError
 from tests.devices.standins import build
-from tests.devices.standins.hd import AUTO, ENCODER_RESET, INKWELL, NEEDS_MANUAL_INPUT, NEEDS_UPDATE, OK, HdWorld
+from tests.devices.standins.hd import (
+    AUTO,
+    ENCODER_RESET,
+    INKWELL,
+    NEEDS_MANUAL_INPUT,
+    NEEDS_UPDATE,
+    OK,
+    HdWorld,
+)
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 

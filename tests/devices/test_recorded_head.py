@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from devices.scripted.device import ScriptedDevice, ScriptedParams
-from hub.scenario_file import installed_scenarios
+from hub.planning.scenario_file import installed_scenarios
 from robots import rotation
 from robots.dvrk import ecm
 

@@ -4,8 +4,8 @@ import socket
 from pathlib import Path
 from typing import NamedTuple
 
-from hub import certs
-from hub.credentials import Credentials, load
+from hub.security import certs
+from hub.security.credentials import Credentials, load
 
 
 class Authority(NamedTuple):

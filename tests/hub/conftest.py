@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from hub import registry
-from hub.endpoint import free_endpoint
-from hub.launch import launch
-from hub.scenario_file import load
-from hub.session import Session
+from hub.planning import registry
+from hub.planning.scenario_file import load
+from hub.session.launch import launch
+from hub.session.session import Session
+from hub.transport.endpoints import free_endpoint
 
 PENDULUM = """
 from typing import Literal

@@ -1,7 +1,7 @@
 """Participants that only declare: for tests of the wiring."""
 
 from hub.participant import Device, Stepped
-from hub.wiring import make_plan
+from hub.planning.wiring import make_plan
 from schemas.ports import Port
 from schemas.scenario import Scenario
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hub.recorder import Recorder, RecorderSummary
+from hub.recording.recorder import Recorder, RecorderSummary
 from schemas.codec import encode
 from schemas.keys import Keys, topic
 from schemas.ports import BondSide, Port, bond_ports

@@ -13,10 +13,9 @@ from engines.bullet.engine import BulletEngine, BulletParams
 from engines.fmu.engine import FmuEngine, FmuParams
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
-from hub import registry
-from hub.bond import ForceSide
-from hub.participant import BondPlan, Params, Sample, Stepped, state_hash
-from hub.scenario_file import installed_scenarios
+from hub.participant import BondPlan, ForceSide, Params, Sample, Stepped, state_hash
+from hub.planning import registry
+from hub.planning.scenario_file import installed_scenarios
 from hub.testing import check_device, check_engine, run_in_process
 from robots.dvrk import psm
 from schemas.errors import StateError

@@ -2,9 +2,9 @@ import sys
 
 import pytest
 
-from hub.launch import launch
-from hub.recording import Recording
-from hub.scenario_file import load
+from hub.planning.scenario_file import load
+from hub.recording.recording import Recording
+from hub.session.launch import launch
 from hub.verify import verify
 from schemas.errors import RecordingError
 
@@ -52,7 +52,7 @@ def test_the_first_difference_is_named(recording, monkeypatch, step, participant
 
 
 def test_a_recording_of_something_else_is_refused(tmp_path):
-    from hub.scenario_file import installed_scenarios
+    from hub.planning.scenario_file import installed_scenarios
 
     with pytest.raises(RecordingError, match="holds no scenario: it was not recorded by `trocar run`"):
         verify(Recording(installed_scenarios()["palpation"].parent / "data" / "palpation_hand"))

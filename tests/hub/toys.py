@@ -14,8 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from hub.bond import ForceSide, MotionSide
-from hub.participant import Device, Params, Sample, Stepped, state_hash
+from hub.participant import Device, ForceSide, MotionSide, Params, Sample, Stepped, state_hash
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64MultiArray, Header, Joy, Point, Pose, PoseStamped, StringMessage, Time
 

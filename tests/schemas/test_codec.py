@@ -8,7 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from schemas.codec import MAX_MESSAGE_BYTES, decode, encode, message_type, message_types, rihs01, ros2msg_definition
+from schemas.codec import (
+    MAX_MESSAGE_BYTES,
+    decode,
+    encode,
+    message_type,
+    message_types,
+    rihs01,
+    ros2msg_definition,
+)
 from schemas.errors import MessageError
 from schemas.message import Message, msg_text
 from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage

@@ -5,7 +5,14 @@ from hypothesis import strategies as st
 
 from schemas.codec import decode, encode
 from schemas.errors import MessageError
-from schemas.lockstep import Permission, Report, pack_permission, pack_report, unpack_permission, unpack_report
+from schemas.lockstep import (
+    Permission,
+    Report,
+    pack_permission,
+    pack_report,
+    unpack_permission,
+    unpack_report,
+)
 from schemas.trocar_msgs import Ack, Grant, InletSample
 from tests.strategies import finite, messages
 

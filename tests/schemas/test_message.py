@@ -9,7 +9,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from schemas.message import Bytes, Float32Array, Float64Array, Int32Array, Message, UInt8, UInt64Array, fixed_float64, msg_text
+from schemas.message import (
+    Bytes,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Message,
+    UInt8,
+    UInt64Array,
+    fixed_float64,
+    msg_text,
+)
 from schemas.ros import Float64Message, Header, JointState, Time
 
 

@@ -8,7 +8,19 @@ them are ours, after the general appearance of the arm.
 from __future__ import annotations
 
 from engines.mujoco.looks.part import BLACK, BLUE, DARK, GREY, IVORY, SLATE, STEEL, Looks, Part
-from engines.mujoco.looks.solids import block, cannula, cheeks, circle, outline, part, plate, rod, taper, turned, union
+from engines.mujoco.looks.solids import (
+    block,
+    cannula,
+    cheeks,
+    circle,
+    outline,
+    part,
+    plate,
+    rod,
+    taper,
+    turned,
+    union,
+)
 from robots.dvrk.linkage import ECM
 
 __all__ = ["parts"]

@@ -13,7 +13,19 @@ from math import atan2, cos, degrees, hypot, sin
 from manifold3d import Manifold
 
 from engines.mujoco.looks.part import BLUE, DARK, GREY, IVORY, STEEL, Looks, Part
-from engines.mujoco.looks.solids import block, cannula, cheeks, circle, outline, part, plate, rod, taper, turned, union
+from engines.mujoco.looks.solids import (
+    block,
+    cannula,
+    cheeks,
+    circle,
+    outline,
+    part,
+    plate,
+    rod,
+    taper,
+    turned,
+    union,
+)
 from robots.dvrk.linkage import PSM
 
 __all__ = ["parts"]

@@ -6,7 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from controllers.teleoperation.contact_model import ContactModelBuilder, ForceParams, PlaneParams, PlanesParams
+from controllers.teleoperation.contact_model import (
+    ContactModelBuilder,
+    ForceParams,
+    PlaneParams,
+    PlanesParams,
+)
 from robots import rotation
 
 NONE, STRAIGHT = np.zeros(6), np.eye(3)

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from hub.endpoint import free_endpoint
-from hub.launch import launch
-from hub.scenario_file import installed_scenarios, load
+from hub.planning.scenario_file import installed_scenarios, load
+from hub.session.launch import launch
+from hub.transport.endpoints import free_endpoint
 
 pytest.importorskip("mujoco")
 

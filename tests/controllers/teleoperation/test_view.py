@@ -10,7 +10,7 @@ from engines.mujoco.model import build
 from engines.mujoco.params import MujocoParams
 from robots import rotation
 from robots.dvrk.endoscope import StereoCamera, optical_in_roll
-from tests.controllers.motion_rig import Rig
+from tests.controllers.motion.rig import Rig
 from tests.controllers.teleoperation.rig import Session
 
 DRIVER = "LARGE_NEEDLE_DRIVER_400006"

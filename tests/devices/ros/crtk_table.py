@@ -17,11 +17,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from devices.ros.gateway import Gateway
-from devices.ros.row import Row
+from devices.ros.topics.row import Row
 from hub.participant import Sample
 from robots.dvrk.kinematics_queries import KinematicsQueries
 from schemas.codec import encode, message_type
-from schemas.crtk import ForwardKinematicsRequest, ForwardKinematicsResponse, InverseKinematicsRequest, InverseKinematicsResponse
+from schemas.crtk import (
+    ForwardKinematicsRequest,
+    ForwardKinematicsResponse,
+    InverseKinematicsRequest,
+    InverseKinematicsResponse,
+)
 from schemas.message import Message
 from schemas.ros import Header, JointState, Pose, Quaternion, Time
 from schemas.vectors import Vector, VectorCodec

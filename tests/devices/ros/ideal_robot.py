@@ -8,8 +8,7 @@ import numpy as np
 
 from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
-from hub.inputs import Inputs
-from hub.participant import Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from schemas.ports import Port
 
 __all__ = ["IdealRobot", "motion"]

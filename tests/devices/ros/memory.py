@@ -9,7 +9,7 @@ from time import monotonic, sleep
 from typing import ClassVar
 
 from devices.ros.gateway import Gateway
-from devices.ros.row import Row
+from devices.ros.topics.row import Row
 from devices.ros.transport import Client, Handler, Publisher, Taker, Transport
 from schemas.codec import decode, encode, message_type
 from schemas.message import Message

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.console.controller import Console
-from controllers.console.params import ConsoleParams
-from controllers.paper import Paper, PaperParams
+from controllers.dvrk_console.controller import Console
+from controllers.dvrk_console.params import ConsoleParams
+from controllers.vrep import Paper, PaperParams
 from devices.ros.params import GatewayParams
 from hub.participant import Stepped
 from hub.testing import run_in_process

@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.ros.face import NOT_SERVED, face
-from devices.ros.paper import paper_face
 from devices.ros.params import GatewayParams
-from hub.launch import plan_of
-from hub.scenario_file import load
+from devices.ros.topics.face import NOT_SERVED, face
+from devices.ros.topics.vrep import paper_face
+from hub.planning.scenario_file import load
+from hub.session.launch import plan_of
+from tests.devices.ros.bags.test_player import joints, write
 from tests.devices.ros.crtk_table import WHOLE
-from tests.devices.ros.test_bag_player import joints, write
-from tests.devices.ros.test_zenoh_console import gated
-from tests.devices.ros.test_zenoh_gateway import JOINTS, STATE, until
-from tests.devices.ros.zenoh_peer import Peer
+from tests.devices.ros.zenoh.test_console import gated
+from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE, until
+from tests.devices.ros.zenoh.zenoh_peer import Peer
 
 __all__ = ["gated"]
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from hub.endpoint import free_endpoint
-from hub.launch import launch
-from hub.scenario_file import load
+from hub.planning.scenario_file import load
+from hub.session.launch import launch
+from hub.transport.endpoints import free_endpoint
+from tests.devices.ros.bags.test_bags import SCENARIO
+from tests.devices.ros.dds.test_gateway import domain
 from tests.devices.ros.rclpy_environment import rclpy_python
-from tests.devices.ros.test_bags import SCENARIO
-from tests.devices.ros.test_dds_gateway import domain
 
 __all__ = ["domain", "rclpy_python"]
 

@@ -5,8 +5,8 @@ from pydantic import ValidationError
 
 from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
-from devices.ros.face import NOT_SERVED, face
 from devices.ros.params import GatewayParams
+from devices.ros.topics.face import NOT_SERVED, face
 from schemas.codec import message_type
 from tests.devices.ros.crtk_table import PYTHON_CLIENT, WHOLE
 

@@ -11,14 +11,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from devices.ros import commander as commander_module
 from devices.ros.params import GatewayParams
+from devices.ros.topics import commander as commander_module
 from hub.testing import check_device
 from schemas.codec import encode
 from schemas.crtk import ForwardKinematicsRequest, OperatingState, StringStamped
 from schemas.errors import DeviceError, MessageError
 from schemas.message import Message
-from schemas.ros import EmptyMessage, Float64MultiArray, Header, Image, JointState, PoseStamped, StringMessage, TFMessage, Time
+from schemas.ros import (
+    EmptyMessage,
+    Float64MultiArray,
+    Header,
+    Image,
+    JointState,
+    PoseStamped,
+    StringMessage,
+    TFMessage,
+    Time,
+)
 from schemas.trocar_msgs import GatewayStatus
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise, sample
 from tests.devices.ros.memory import MemoryGateway, MemoryPeer
@@ -104,7 +114,7 @@ def test_states_are_published_at_its_own_rate_whatever_the_simulation_does(tmp_p
 
 
 def test_a_state_that_is_old_is_told_no_more(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("devices.ros.outgoing._SILENT_NS", 50_000_000)
+    monkeypatch.setattr("devices.ros.topics.outgoing._SILENT_NS", 50_000_000)
     gateway.write("PSM1/measured_js", np.arange(18.0))
     sleep(0.2)
     count = len(gateway.transport.published["/PSM1/measured_js"])
@@ -114,7 +124,7 @@ def test_a_state_that_is_old_is_told_no_more(gateway: MemoryGateway, monkeypatch
 
 def test_stamps_increase_though_the_clock_is_set_back(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter([10**18, 10**18, 5 * 10**17])
-    monkeypatch.setattr("devices.ros.stamps.time_ns", lambda: next(times))
+    monkeypatch.setattr("devices.ros.topics.stamps.time_ns", lambda: next(times))
     for _ in range(3):
         gateway.write("PSM1/operating_state", OperatingState(header=Header(stamp=Time(sec=3)), state="ENABLED"))
     stamps = [message.header.stamp.ns - 10**18 for message in gateway.transport.heard("/PSM1/operating_state") if isinstance(message, OperatingState)]
@@ -327,7 +337,7 @@ def test_ever_new_mistakes_are_not_quoted_for_ever(gateway: MemoryGateway) -> No
 
 def test_the_same_mistake_is_told_again_later_with_how_often_it_came(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [10**12]
-    monkeypatch.setattr("devices.ros.refusals.monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("devices.ros.topics.refusals.monotonic_ns", lambda: now[0])
     for _ in range(5):
         gateway.transport.send("/PSM1/servo_jp", joints(0.0))
     now[0] += 2_000_000_000

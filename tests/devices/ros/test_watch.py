@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from devices.ros.command_line import app
-from hub.endpoint import free_endpoint
-from hub.wire import open_session
+from hub.transport.endpoints import free_endpoint
+from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.keys import Keys
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic

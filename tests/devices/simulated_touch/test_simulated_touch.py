@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from devices.simulated_touch.device import SimulatedTouch
 from devices.simulated_touch.params import SimulatedTouchParams
 from hub.participant import Sample
-from hub.scenario_file import load
+from hub.planning.scenario_file import load
 from hub.testing import check_device
 from schemas.codec import encode
 from schemas.errors import MessageError, ScenarioError

@@ -1,0 +1,62 @@
+"""What a master with motors is told: to turn as the tip does, to float while it leads, to keep its orientation while the clutch is pressed.
+
+As jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp (RunAligningMTM, EnterEnabled, Clutch) does.
+"""
+
+from __future__ import annotations
+
+from math import radians
+
+import numpy as np
+
+from controllers.dvrk_console.ports import NO_GRIPPER
+from controllers.dvrk_console.voice import Voice
+from robots import rotation
+from schemas.ros import BoolMessage, EmptyMessage, Point, Pose, PoseStamped, Quaternion, WrenchStamped
+from schemas.vectors import Vector
+
+__all__ = ["Master", "offset", "opening"]
+
+_GRIPPER_ZERO, _GRIPPER_MAX = 0.0, radians(60.0)
+"""Angles of a gripper that is closed and open (mtsIntuitiveResearchKit.h: GripperZero, GripperMax)."""
+
+
+class Master:
+    """The commands to one master."""
+
+    def __init__(self, name: str, voice: Voice) -> None:
+        """Take the master's name, `MTMR`, and what speaks."""
+        self._name, self._voice = name, voice
+
+    def hold(self) -> None:
+        """Stay."""
+        self._voice.say(f"{self._name}/hold", EmptyMessage())
+
+    def turn(self, where: Vector, orientation: Vector) -> None:
+        """Stay at the pose `where` but turn to `orientation` (x, y, z, w), which is the tip's in the camera's frame."""
+        position = Point(**dict(zip("xyz", where[:3].tolist(), strict=True)))
+        pose = Pose(position=position, orientation=_quaternion(orientation))
+        self._voice.say(f"{self._name}/move_cp", PoseStamped(pose=pose))
+
+    def float(self, locked: Vector | None) -> None:
+        """Follow the hand without a force; keep the orientation `locked` (x, y, z, w), if it is not to turn."""
+        self._voice.say(f"{self._name}/use_gravity_compensation", BoolMessage(data=True))
+        self._voice.say(f"{self._name}/body/servo_cf", WrenchStamped())
+        if locked is None:
+            self._voice.say(f"{self._name}/unlock_orientation", EmptyMessage())
+        else:
+            self._voice.say(f"{self._name}/lock_orientation", _quaternion(locked))
+
+
+def opening(angle: float) -> float:
+    """Return the opening 0 .. 1 of a gripper at `angle` (rad); negative if there is none."""
+    return -1.0 if angle <= NO_GRIPPER else min(max((angle - _GRIPPER_ZERO) / (_GRIPPER_MAX - _GRIPPER_ZERO), 0.0), 1.0)
+
+
+def offset(master: Vector, tip: Vector) -> Quaternion:
+    """Return how the tip is turned as the master sees it; both quaternions (x, y, z, w) in frames whose axes stand for each other."""
+    return _quaternion(rotation.product(rotation.conjugate(master), tip))
+
+
+def _quaternion(value: Vector) -> Quaternion:
+    return Quaternion(**dict(zip("xyzw", (value / np.linalg.norm(value)).tolist(), strict=True)))

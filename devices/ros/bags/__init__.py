@@ -1,0 +1,1 @@
+"""ROS bags: played into a session, and made of its recording."""

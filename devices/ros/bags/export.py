@@ -1,0 +1,158 @@
+"""A session's recording as a bag with ROS names: what its gateway has published and heard, for `ros2 bag play`.
+
+Times are the session's start by the wall clock plus simulated time, in stamps too: a bag plays at the pace of the simulation, however fast that ran
+(docs/decisions/0033-bags.md).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from devices.ros.gateway import Gateway
+from devices.ros.topics.description import description
+from devices.ros.topics.outgoing import Source, State
+from devices.ros.topics.row import Row
+from devices.ros.topics.scenery import scenery, stride
+from hub.planning import registry
+from hub.planning.plan import Plan
+from hub.recording.recording import Recording
+from hub.recording.ros_bag_writer import BagWriter
+from hub.transport.port_codec import PortCodec
+from schemas.codec import decode, message_type
+from schemas.errors import DeviceError, MessageError, RecordingError, did_you_mean
+from schemas.keys import Keys, topic
+from schemas.ports import Port
+from schemas.ros import StringMessage
+from schemas.vectors import Vector
+
+__all__ = ["ExportSummary", "export"]
+
+log = logging.getLogger(__name__)
+
+_KEYS = Keys("any")
+_Routes = Mapping[str, Sequence[tuple[Row, Port]]]
+"""By the topics of a recording: the rows that are fed by it, each with the port that has written it."""
+
+
+@dataclass(frozen=True)
+class ExportSummary:
+    """What was written."""
+
+    bag: str
+    gateway: str
+    topics: int
+    messages: int
+    duration_s: float
+
+
+def export(recording: Recording, directory: Path, gateway: str | None = None) -> ExportSummary:
+    """Write what gateway `gateway` of a recorded session, by default its only one, has published and heard, to a new `directory`.
+
+    Raises RecordingError if the session has no such gateway, if the directory exists or cannot be written, or if the recording is damaged; ScenarioError
+    if the gateway's kind is not installed.
+    """
+    plan = recording.plan()
+    shown = _gateway(recording, plan, gateway)
+    routes = {name: rows for name, rows in _routes(plan, shown).items() if name in recording.topics}
+    with BagWriter(directory, recording.started_ns()) as bag:
+        retold, last_ns = _Retold(shown, routes, bag), -1
+        for message in recording.messages(*routes):
+            last_ns = max(last_ns, message.time_ns)
+            try:
+                retold.publish_before(message.time_ns)
+                for row, source in routes[message.topic]:
+                    retold.take(row, source, message.time_ns, message.payload)
+            except MessageError as error:
+                raise RecordingError(f"'{recording.file}': topic '{message.topic}' at {message.time_ns} ns: {error}") from error
+        retold.publish_before(last_ns + 1)
+    return ExportSummary(str(directory), shown.name, bag.topics, bag.messages, recording.duration_ns * 1e-9)
+
+
+def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
+    """Return the gateway that is meant, as the scenario declares it."""
+    kinds = {member.name: registry.load(member.kind) for member in plan.members.values() if member.role == "device"}
+    there = [device for device, kind in kinds.items() if issubclass(kind, Gateway)]
+    if name is None and len(there) != 1:
+        none = "no gateway to ROS, which would say what its topics are: put one into the scenario, with `motion.* -> ros.*`, and record again"
+        found = f"{len(there)} gateways to ROS ({', '.join(there)}): say which by --gateway" if there else none
+        raise RecordingError(f"session '{recording.session()}' in '{recording.file}' has {found}")
+    if name is not None and name not in there:
+        raise RecordingError(f"session '{recording.session()}' in '{recording.file}' has no gateway '{name}'.{did_you_mean(name, there)}")
+    meant = there[0] if name is None else name
+    made = registry.make(plan.members[meant].kind, meant, recording.scenario().participants[meant].params, recording.directory())
+    if not isinstance(made, Gateway):
+        raise TypeError(f"{made} is of a kind of gateways, and none itself")
+    return made
+
+
+def _routes(plan: Plan, gateway: Gateway) -> _Routes:
+    rows = {row.port.name: row for row in gateway.rows if row.port is not None}
+    routes: defaultdict[str, list[tuple[Row, Port]]] = defaultdict(list)
+    for link in plan.outlets:
+        if link.device == gateway.name:
+            source = plan.members[link.source].port(link.source_port)
+            routes[topic(_KEYS.output("engine", link.source, source.name))].append((rows[link.device_port], source))
+    for row in rows.values():
+        if row.way == "subscribe" and row.port is not None:
+            routes[topic(_KEYS.output("device", gateway.name, row.port.name))].append((row, row.port))
+    return routes
+
+
+class _Recorded(State):
+    """The newest recorded value of a state."""
+
+    def __init__(self, port: Port, source: Port) -> None:
+        """Take the gateway's port, and the one that has written the values."""
+        super().__init__(port)
+        self._reader = PortCodec(port.filled_from(source))
+        self.payload: bytes | None = None
+
+    @property
+    def value(self) -> Vector | None:
+        """The newest value, however old; None before the first."""
+        return None if self.payload is None else self._reader.accept(self.payload)
+
+
+class _Retold:
+    """What a gateway would publish, at its own period in simulated time, and its events when they come."""
+
+    def __init__(self, gateway: Gateway, routes: _Routes, bag: BagWriter) -> None:
+        """Take the gateway, what feeds it, and where all is written."""
+        self._bag, self._period_ns, self._due_ns = bag, gateway.params.publish_period, 0
+        fed = {row.topic: source for rows in routes.values() for row, source in rows}
+        periodic = [(row, row.port) for row in gateway.rows if row.periodic and row.port is not None]
+        self._recorded = {row.topic: _Recorded(port, fed[row.topic]) for row, port in periodic if row.topic in fed}
+        states: dict[str, State] = {port.name: self._recorded.get(row.topic) or State(port) for row, port in periodic}
+        whole: Mapping[str, Source] = scenery(gateway.params, states) if gateway.params.profile == "dvrk" else {}
+        self._periodic: list[tuple[Row, Source, int]] = [(row, states[port.name], 1) for row, port in periodic if row.topic in fed]
+        for row in gateway.rows:
+            if row.name in whole:
+                self._periodic.append((row, whole[row.name], stride(row.name, self._period_ns)))
+            elif row.name == "robot_description" and gateway.params.robot_description is not None:
+                self._describe(row, gateway.params.robot_description)
+
+    def _describe(self, row: Row, file: Path) -> None:
+        try:
+            self._bag.write(row, 0, StringMessage(data=description(file)))
+        except DeviceError as error:
+            log.warning("the bag is without %s: %s", row.topic, error)
+
+    def take(self, row: Row, source: Port, time_ns: int, payload: bytes) -> None:
+        """Take a recorded value. Raises MessageError if it is none of its port."""
+        if row.topic in self._recorded:
+            self._recorded[row.topic].payload = payload
+        elif row.way == "subscribe" or source.variability == "event" or time_ns > 0:  # a signal's value at time 0 is no message
+            self._bag.write(row, time_ns, decode(message_type(row.type), payload))
+
+    def publish_before(self, time_ns: int) -> None:
+        """Publish the newest of every state at each period before `time_ns`. Raises MessageError."""
+        while self._due_ns < time_ns:
+            period = self._due_ns // self._period_ns
+            for row, source, every in self._periodic:
+                if period % every == 0 and (payload := source.cdr(self._bag.stamp_ns(row, self._due_ns))) is not None:
+                    self._bag.write(row, self._due_ns, payload)
+            self._due_ns += self._period_ns

@@ -1,0 +1,72 @@
+"""What a scenario may say about a bag that is played into a session."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from devices.ros.bags.bag import BagTopic, RosBag
+from devices.ros.params import GatewayParams, HeardParams
+from devices.ros.topics.face import face
+from devices.ros.topics.row import Row
+from devices.ros.topics.vrep import paper_face
+from schemas.errors import RecordingError, did_you_mean
+from schemas.quantity import Duration
+
+__all__ = ["BagParams", "listed"]
+
+_NAMED = 6
+"""Topics that are named in one message."""
+
+
+class BagParams(HeardParams):
+    """Which bag is played, how, and what of it."""
+
+    bag: Path = Field(description="rosbag2 directory, .mcap, .db3, or .bag of ROS 1, relative to the scenario")
+    start: Duration = Field(default=0, ge=0, description="time of the bag at which playing begins")
+    rate: float = Field(default=1.0, gt=0.0, allow_inf_nan=False, description="speed of playing; 2 is twice as fast as recorded")
+    rename: Mapping[str, str] = Field(default={}, description="topics of the bag to topics of the dVRK: {/dvrk/PSM1/set_position_goal_joint: /PSM1/move_jp}")
+
+    @field_validator("bag")
+    @classmethod
+    def _find(cls, bag: Path, info: ValidationInfo) -> Path:
+        context: dict[str, Any] = info.context or {}
+        return (Path(context.get("directory", Path.cwd())) / bag).resolve()
+
+    @model_validator(mode="after")
+    def _has_something_to_play(self) -> Self:
+        try:
+            with RosBag(self.bag) as bag:
+                topics = bag.topics
+        except RecordingError as error:
+            raise ValueError(str(error)) from error
+        unknown = next((topic for topic in self.rename if topic not in topics), None)
+        if unknown is not None:
+            raise ValueError(f"rename: '{self.bag}' has no topic '{unknown}'.{did_you_mean(unknown, topics)}")
+        if not self.played(topics):
+            hearable = ", ".join(row.topic for row in self.heard.values()) or "none: `arms` and `listen` are empty"
+            raise ValueError(f"'{self.bag}' has nothing that could be played here. Its topics: {listed(topics) or 'none'}. Topics that are heard: {hearable}")
+        return self
+
+    @property
+    def heard(self) -> Mapping[str, Row]:
+        """What a gateway would subscribe to, by topic."""
+        shared = {name: getattr(self, name) for name in HeardParams.model_fields}
+        params = GatewayParams(**shared)
+        rows = face(params) if self.profile == "dvrk" else paper_face(params)
+        return {row.topic: row for row in rows if row.way == "subscribe" and row.port is not None}
+
+    def played(self, topics: Mapping[str, BagTopic]) -> Mapping[str, Row]:
+        """Return which topics of a bag are played, and as what."""
+        heard = self.heard
+        rows = {topic: heard.get(self.rename.get(topic, topic)) for topic, told in topics.items() if told.messages}
+        return {topic: row for topic, row in rows.items() if row is not None and row.type == topics[topic].type}
+
+
+def listed(topics: Mapping[str, BagTopic]) -> str:
+    """Return topics with their types and numbers of messages; of many, the first."""
+    named = [f"{topic} ({told.type}, {told.messages})" for topic, told in sorted(topics.items())]
+    return ", ".join(named[:_NAMED]) + (f" and {len(named) - _NAMED} more" if len(named) > _NAMED else "")

@@ -1,0 +1,1 @@
+"""The topics and services that every gateway serves."""

@@ -1,0 +1,47 @@
+"""CRTK's kinematics services of the simulated arms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from devices.ros.topics.outgoing import State
+from devices.ros.topics.row import Row
+from devices.ros.transport import Handler
+from robots.dvrk.kinematics_queries import KinematicsQueries
+from robots.serial_chain import SerialChain
+from schemas.codec import decode, encode
+from schemas.crtk import (
+    ForwardKinematicsRequest,
+    ForwardKinematicsResponse,
+    InverseKinematicsRequest,
+    InverseKinematicsResponse,
+)
+from schemas.ros import Point, Pose, Quaternion
+from schemas.vectors import Vector
+
+__all__ = ["kinematics_handler"]
+
+
+def kinematics_handler(row: Row, chain: SerialChain, base: State) -> Handler:
+    """Return what answers the service `row` of an arm with this kinematics; `base`: the pose of its base in its reference."""
+    queries = KinematicsQueries(chain)
+
+    def forward(payload: bytes) -> bytes:
+        stands = None if row.name.startswith("local/") else base.value
+        if stands is None and not row.name.startswith("local/"):
+            return encode(ForwardKinematicsResponse(message=f"nobody tells {base.port.name} now: is the session running?"))
+        answer = queries.forward(decode(ForwardKinematicsRequest, payload).jp, stands)
+        return encode(ForwardKinematicsResponse(cp=_pose(answer.value), result=answer.result, message=answer.message))
+
+    def inverse(payload: bytes) -> bytes:
+        request = decode(InverseKinematicsRequest, payload)
+        p, q = request.cp.position, request.cp.orientation
+        answer = queries.inverse(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]), request.jp)
+        return encode(InverseKinematicsResponse(jp=answer.value, result=answer.result, message=answer.message))
+
+    return inverse if row.name == "inverse_kinematics" else forward
+
+
+def _pose(value: Vector) -> Pose:
+    x, y, z, qx, qy, qz, qw = value.tolist()
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))

@@ -1,0 +1,122 @@
+"""What the simulation tells, on its way to ROS: the newest value of each state, and events at once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from time import monotonic_ns
+from typing import Protocol
+
+from devices.ros.topics.stamps import Stamps, stamped
+from devices.ros.traffic import Count
+from devices.ros.transport import Publisher
+from hub.participant import Value
+from schemas.codec import encode
+from schemas.errors import DeviceError
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.vectors import Vector, VectorCodec
+
+__all__ = ["Event", "Outgoing", "Periodic", "Source", "State"]
+
+_SILENT_NS = 1_000_000_000
+"""A state that is older is not published any more: a program is to see that nothing comes, as a CRTK client does after this time (its connection_timeout)."""
+
+
+class State:
+    """The newest value of a signal from the simulation. Written by one thread, read by another."""
+
+    def __init__(self, port: Port) -> None:
+        """Take the port on which it comes."""
+        self.port = port
+        self._codec = VectorCodec(port)
+        self._newest: tuple[Vector, int] | None = None
+
+    def write(self, value: Vector) -> None:
+        """Take the newest value."""
+        self._newest = value, monotonic_ns()
+
+    @property
+    def value(self) -> Vector | None:
+        """The newest value; None if none has come within a second."""
+        newest = self._newest
+        return newest[0] if newest is not None and monotonic_ns() - newest[1] < _SILENT_NS else None
+
+    def cdr(self, stamp_ns: int) -> bytes | None:
+        """Return the newest value as a message with this stamp; None if there is none."""
+        value = self.value
+        return None if value is None else self._codec.encode(value, stamp_ns)
+
+
+class Source(Protocol):
+    """What is published all the time."""
+
+    def cdr(self, stamp_ns: int) -> bytes | None:
+        """Return the message of now with this stamp; None if there is nothing to say."""
+        ...
+
+
+class Periodic:
+    """One topic that is published all the time."""
+
+    def __init__(self, source: Source, publish: Publisher, count: Count, every: int = 1) -> None:
+        """Take what is published, where, what counts it, and at every how many periods."""
+        self._source, self._publish, self._count, self._every = source, publish, count, every
+        self._stamps = Stamps()
+
+    def publish(self, period: int) -> None:
+        """Publish what there is, if it is due in this period."""
+        if period % self._every == 0 and (payload := self._source.cdr(self._stamps.next_ns())) is not None:
+            self._publish(payload)
+            self._count.messages += 1
+
+
+class Event:
+    """One topic of which every message is published at once, by whatever thread brings it."""
+
+    def __init__(self, publish: Publisher, count: Count) -> None:
+        """Take where it goes, and what counts its messages."""
+        self._publish, self._count, self._stamps = publish, count, Stamps()
+        self._publishing = threading.Lock()
+
+    def write(self, value: Value) -> None:
+        """Publish a message, or several in their order, stamped now."""
+        for message in value if isinstance(value, tuple) else (value,):
+            if isinstance(message, Message):
+                with self._publishing:
+                    self._publish(encode(stamped(message, self._stamps.next_ns())))
+                    self._count.messages += 1
+
+
+class Outgoing:
+    """The thread that publishes all states at the gateway's period, whatever the simulation's is."""
+
+    def __init__(self, name: str, topics: Sequence[Periodic], period_ns: int) -> None:
+        """Take the gateway's name, what is published and how often, and begin."""
+        self._topics, self._period_ns = topics, period_ns
+        self._ending = threading.Event()
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name=f"gateway {name}", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        due_ns, period = monotonic_ns(), 0
+        try:
+            while not self._ending.wait(max(due_ns - monotonic_ns(), 0) / 1e9):
+                for topic in self._topics:
+                    topic.publish(period)
+                period += 1
+                due_ns = max(due_ns + self._period_ns, monotonic_ns() - self._period_ns)  # at most one period is caught up
+        except Exception as error:  # noqa: BLE001  # it is raised where the device is read
+            self._failure = error
+
+    def check(self) -> None:
+        """Raise DeviceError if the thread has ended by an error."""
+        if self._failure is not None:
+            raise DeviceError(f"publishing has failed: {type(self._failure).__name__}: {self._failure}") from self._failure
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._ending.set()
+        if self._thread is not threading.current_thread():
+            self._thread.join(timeout=2.0)

@@ -1,0 +1,142 @@
+"""What ROS programs are told of the whole cart at once: /tf, from the cart to each tip and camera, and /joint_states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from struct import Struct
+
+import numpy as np
+
+from devices.ros.params import GatewayParams
+from devices.ros.topics.outgoing import Source, State
+from robots import rotation
+from robots.dvrk.cart import inverse_pose
+from robots.dvrk.ecm import tip
+from robots.dvrk.endoscope import BASELINE, optical_in_roll
+from robots.dvrk.mounted import MountedArm, MountedEcm
+from schemas.codec import encode
+from schemas.ports import Port
+from schemas.ros import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3
+from schemas.vectors import Vector, VectorCodec
+
+__all__ = ["scenery", "stride"]
+
+_JOINT_STATE = "sensor_msgs/msg/JointState"
+_TF_PERIOD_NS = 20_000_000
+"""As on the dVRK (docs/pages/development/middleware.rst)."""
+_STAMP = Struct("<iI")
+_Edge = tuple[str, str, Callable[[], Vector | None]]
+"""Parent frame, child frame, and what returns the pose, shape (7,), of the one in the other."""
+
+
+def scenery(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, Source]:
+    """Return what is published of it, by the names of topics; `states` by the names of their ports."""
+    return {"tf": _Transforms(params, states), "joint_states": _JointStates(params, states)}
+
+
+def stride(name: str, period_ns: int) -> int:
+    """Return at every how many of a gateway's periods topic `name` is published."""
+    return max(1, round(_TF_PERIOD_NS / period_ns)) if name == "tf" else 1
+
+
+class _Transforms:
+    """The tree of frames: world or cart, `<arm>_base`, `<arm>` (its tip), and under the endoscope's tip the left camera's optical frame."""
+
+    def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
+        """Take what is shown, and the states by the names of their ports."""
+        self._edges: list[_Edge] = []
+        for name, arm in params.arms.shown.items():
+            self._edges += [_base(name, arm, params, states), (f"{name}_base", name, _newest(states[f"{name}/local/measured_cp"]))]
+            if isinstance(arm, MountedEcm):
+                self._edges += [(name, f"{camera}_left_optical", _fixed(_left_camera(arm))) for camera in params.cameras]
+
+        self._template = _Template(())
+
+    def cdr(self, stamp_ns: int) -> bytes | None:
+        """Return all transforms that are known now, as a TFMessage; None if there are none."""
+        known = [(parent, child, pose) for parent, child, newest in self._edges if (pose := newest()) is not None]
+        if not known:
+            return None
+        edges = tuple((parent, child) for parent, child, _ in known)
+        if edges != self._template.edges:
+            self._template = _Template(edges)
+        return self._template.filled(stamp_ns, [pose for _, _, pose in known])
+
+
+class _Template:
+    """The bytes of a TFMessage between given frames, of which only stamps and poses change: 21 us instead of 540 through the models."""
+
+    def __init__(self, edges: tuple[tuple[str, str], ...]) -> None:
+        """Serialise once, with numbers that occur nowhere else, to find where the stamps and the poses stand."""
+        self.edges = edges
+        marks = np.random.default_rng(0).random((len(edges), 7))
+        stamps = [Time(sec=10**9 + index, nanosec=10**8 + index) for index in range(len(edges))]
+        transforms = [
+            TransformStamped(header=Header(stamp=stamp, frame_id=parent), child_frame_id=child, transform=_transform(pose))
+            for (parent, child), stamp, pose in zip(edges, stamps, marks, strict=True)
+        ]
+        self._bytes = encode(TFMessage(transforms=transforms))
+        self._stamps = [self._bytes.index(_STAMP.pack(stamp.sec, stamp.nanosec)) for stamp in stamps]
+        self._poses = [self._bytes.index(pose.tobytes()) for pose in marks]
+
+    def filled(self, stamp_ns: int, poses: Sequence[Vector]) -> bytes:
+        """Return the message with this stamp and these poses."""
+        buffer, stamp = bytearray(self._bytes), _STAMP.pack(*divmod(stamp_ns, 10**9))
+        for at, start, pose in zip(self._stamps, self._poses, poses, strict=True):
+            buffer[at : at + _STAMP.size] = stamp
+            buffer[start : start + pose.nbytes] = pose.tobytes()
+        return bytes(buffer)
+
+
+def _base(name: str, arm: MountedArm, params: GatewayParams, states: Mapping[str, State]) -> _Edge:
+    """Return the edge to an arm's base: as the motion controller tells it where it can move, else as the scenario has it."""
+    child = f"{name}_base"
+    if params.mounting == "cart":
+        return "Cart", child, _newest(states[f"SUJ/{name}/local/measured_cp"])
+    if params.reference == "world":
+        return "world", child, _newest(states[f"SUJ/{name}/measured_cp"])
+    return "world", child, _fixed(np.array([*arm.position, *arm.orientation]))
+
+
+def _left_camera(arm: MountedEcm) -> Vector:
+    """Return the left camera's optical frame in the frame of the ECM's tip, as a pose, shape (7,)."""
+    left = np.eye(4)
+    left[0, 3] = -0.5 * BASELINE
+    frame = inverse_pose(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left
+    return np.concatenate([frame[:3, 3], rotation.from_matrix(frame)])
+
+
+def _newest(state: State) -> Callable[[], Vector | None]:
+    return lambda: state.value
+
+
+def _fixed(pose: Vector) -> Callable[[], Vector | None]:
+    return lambda: pose
+
+
+def _transform(pose: Vector) -> Transform:
+    x, y, z, qx, qy, qz, qw = pose.tolist()
+    return Transform(translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+class _JointStates:
+    """The joints of all arms and of what they hold, called `<arm>_<joint>` as in the robot's description."""
+
+    def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
+        """Take what is shown, and the states by the names of their ports."""
+        found = ((arm, states.get(f"{arm}/{part}measured_js")) for arm in params.arms.shown for part in ("", "jaw/", "hand/"))
+        self._parts = [(arm, state) for arm, state in found if state is not None]
+        self._known: tuple[str, ...] = ()
+        self._codec: VectorCodec | None = None
+
+    def cdr(self, stamp_ns: int) -> bytes | None:
+        """Return the joints that are known now, as a JointState; None if there are none."""
+        known = [(arm, state, value) for arm, state in self._parts if (value := state.value) is not None]
+        if not known:
+            return None
+        names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
+        if self._codec is None or names != self._known:
+            fields = ("position", "velocity", "effort")
+            self._known, self._codec = names, VectorCodec(Port(name="joint_states", causality="input", type=_JOINT_STATE, names=names, fields=fields))
+        rows = [value.reshape(3, -1) for _, _, value in known]  # position, velocity, effort of each arm
+        return self._codec.encode(np.concatenate(rows, axis=1).ravel(), stamp_ns)

@@ -1,0 +1,1 @@
+"""ROS 2 over Zenoh, as rmw_zenoh lays it out."""

@@ -1,0 +1,115 @@
+"""How ROS 2 lies on Zenoh: keys of topics and services, tokens of the graph, and what goes along with every message, as rmw_zenoh has them in Jazzy.
+
+Source: ros2/rmw_zenoh, docs/design.md, and for what that leaves open rmw_zenoh_cpp/src/detail/liveliness_utils.cpp (commit 3411fdec), attachment_helpers.cpp
+and rmw_publisher_data.cpp (commit 3e19ec73).
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Literal
+
+from devices.ros.zenoh.service_hash import service_hash
+from schemas.codec import message_type, rihs01
+from schemas.errors import MessageError
+from schemas.message import msg_text
+
+__all__ = ["LATCHED", "VOLATILE", "Attachment", "Endpoint", "Kind", "graph_key", "key", "type_hash"]
+
+Kind = Literal["NN", "MP", "MS", "SS", "SC"]
+"""Node, publisher, subscriber, server and client of a service."""
+
+_ATTACHMENT = struct.Struct("<qqB16s")
+_GID_BYTES = 16
+
+VOLATILE = "::,10:,:,:,,"
+"""Quality of service, of which only what differs from the default is said: the last ten messages."""
+
+LATCHED = ":1:,1:,:,:,,"
+"""Transient local, the last message."""
+
+
+def key(domain: int, topic: str, type_: str) -> str:
+    """Return the key of a topic or a service (`/PSM1/measured_js`) of ROS type `type_`."""
+    return f"{domain}/{topic.strip('/')}/{_dds_name(type_)}/{type_hash(type_)}"
+
+
+def graph_key(domain: int) -> str:
+    """Return the key of all tokens."""
+    return f"@ros2_lv/{domain}/**"
+
+
+def type_hash(type_: str) -> str:
+    """Return the hash (REP-2016) of a message or a service."""
+    if "/srv/" not in type_:
+        return rihs01(type_)
+    return service_hash(type_, *(msg_text(message_type(f"{type_}_{part}")) for part in ("Request", "Response")))
+
+
+def _dds_name(type_: str) -> str:
+    """`sensor_msgs/msg/JointState` to `sensor_msgs::msg::dds_::JointState_`."""
+    package, group, name = type_.split("/")
+    return f"{package}::{group}::dds_::{name}_"
+
+
+def _mangled(name: str) -> str:
+    return name.replace("/", "%") or "%"
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """What a token of the graph tells: a node, or what it publishes, hears, serves or asks."""
+
+    session: str
+    """Zenoh's id of the program's session."""
+    number: int
+    """Of the entity within its session."""
+    kind: Kind
+    node: str
+    """Name with namespace: `/dvrk`."""
+    topic: str = ""
+    """Of a topic or a service; empty for a node."""
+    type: str = ""
+    hash: str = ""
+    quality: str = ""
+
+    def token(self, domain: int) -> str:
+        """Return the key of the liveliness token."""
+        namespace, _, name = self.node.rpartition("/")
+        parts = ["@ros2_lv", str(domain), self.session, "0", str(self.number), self.kind, "%", _mangled(namespace), name]
+        if self.kind != "NN":
+            parts += [_mangled(self.topic), _dds_name(self.type), self.hash, self.quality]
+        return "/".join(parts)
+
+    @classmethod
+    def of(cls, token: str) -> Endpoint | None:
+        """Return what a token tells; None if it is none that we know how to read."""
+        parts = token.split("/")
+        if len(parts) not in (9, 13) or parts[5] not in ("NN", "MP", "MS", "SS", "SC") or not parts[4].isdecimal():
+            return None
+        topic, type_, hash_, quality = (parts[9].replace("%", "/"), *parts[10:]) if len(parts) > 9 else ("", "", "", "")
+        return cls(parts[2], int(parts[4]), parts[5], f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}", topic, type_, hash_, quality)
+
+
+@dataclass(frozen=True, slots=True)
+class Attachment:
+    """What goes along with every message and request; a response brings back that of its request."""
+
+    sequence: int
+    stamp_ns: int
+    """When it was sent, by the wall clock of its sender."""
+    gid: bytes
+    """16 bytes: which publisher or client sent it."""
+
+    def pack(self) -> bytes:
+        """Return the 33 bytes."""
+        return _ATTACHMENT.pack(self.sequence, self.stamp_ns, _GID_BYTES, self.gid)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Attachment:
+        """Raises MessageError if the bytes are none."""
+        if len(data) != _ATTACHMENT.size or data[16] != _GID_BYTES:
+            raise MessageError(f"{len(data)} bytes are no attachment of ROS 2 (allowed: sequence number, stamp and 16 bytes of id, {_ATTACHMENT.size} in all)")
+        sequence, stamp_ns, _, gid = _ATTACHMENT.unpack(data)
+        return cls(sequence, stamp_ns, gid)

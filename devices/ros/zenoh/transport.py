@@ -1,0 +1,131 @@
+"""ROS 2 as rmw_zenoh lays it out, on the router of a hub."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from time import time_ns
+
+import zenoh
+from zenoh import ext
+from zenoh.handlers import Callback
+
+from devices.ros.topics.row import Row
+from devices.ros.transport import NODE, Client, Handler, Publisher, Taker, Transport
+from devices.ros.zenoh.graph import Graph, gid_of
+from devices.ros.zenoh.layout import LATCHED, VOLATILE, Attachment, Endpoint, Kind, graph_key, key, type_hash
+from schemas.errors import MessageError
+
+__all__ = ["ZenohTransport"]
+
+log = logging.getLogger(__name__)
+
+_HEARTBEAT_S = 0.5
+"""How often a latched publisher repeats the number of its last message, from which a subscriber knows that it missed one: rmw_zenoh's period. Where that
+tells it once, and waits for every reader, we tell it all the time: a program that has stopped reading must hold up nobody."""
+
+
+class ZenohTransport(Transport):
+    """Publishes, listens and answers under rmw_zenoh's keys, as one node.
+
+    Nothing that is published waits for a reader: what a program does not take is dropped for it, and of a latched topic it asks for the last message again.
+    States and events queue apart, and pictures have a session of their own: where one program does not take them, the router tries for 50 ms before it drops
+    the rest of a picture, and meanwhile reads nothing else of that session.
+    """
+
+    def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
+        """Join the graph of `domain` with sessions that `connect` opens."""
+        self._session, self._pictures = connect(), connect()
+        self._domain, self._id = domain, str(self._session.zid())
+        self._graph = Graph(self._id)
+        self._topics: set[str] = set()
+        self._entities: list[ext.AdvancedPublisher | zenoh.Publisher | zenoh.Subscriber[None] | zenoh.Queryable[None] | zenoh.LivelinessToken] = []
+        self._number = 0
+        self._closed = False
+        watch = Callback(self._came_or_went, indirect=False)  # in the thread that also brings messages: no message comes before its sender
+        liveliness = self._session.liveliness()
+        self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
+        self._entities.append(liveliness.declare_token(Endpoint(self._id, 0, "NN", NODE).token(domain)))
+
+    def advertise(self, row: Row) -> Publisher:  # noqa: D102
+        address, cdr, drop = key(self._domain, row.topic, row.type), zenoh.Encoding.APPLICATION_CDR, zenoh.CongestionControl.DROP
+        urgency = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH
+        if row.latched:
+            last, numbered = ext.CacheConfig(max_samples=1), ext.MissDetectionConfig(heartbeat=_HEARTBEAT_S)
+            publisher = ext.declare_advanced_publisher(
+                self._session,
+                address,
+                encoding=cdr,
+                congestion_control=drop,
+                priority=urgency,
+                cache=last,
+                sample_miss_detection=numbered,
+                publisher_detection=True,
+            )
+        else:
+            session = self._pictures if row.is_picture else self._session
+            publisher = session.declare_publisher(address, encoding=cdr, congestion_control=drop, priority=urgency)
+        self._entities.append(publisher)
+        gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
+        sequence = 0
+
+        def publish(message: bytes) -> None:
+            nonlocal sequence
+            sequence += 1
+            publisher.put(message, attachment=Attachment(sequence, time_ns(), gid).pack())
+
+        return publish
+
+    def subscribe(self, row: Row, take: Taker) -> None:  # noqa: D102
+        topic = row.topic
+
+        def heard(sample: zenoh.Sample) -> None:
+            try:
+                attached = Attachment.unpack(b"" if sample.attachment is None else sample.attachment.to_bytes())
+            except MessageError as error:
+                log.warning("%s: a message is not heeded: %s", topic, error)
+                return
+            take(sample.payload.to_bytes(), self._graph.sender(topic, attached.gid))
+
+        self._entities.append(self._session.declare_subscriber(key(self._domain, topic, row.type), Callback(heard, indirect=False)))
+        self._announce("MS", row, VOLATILE)
+
+    def serve(self, row: Row, handle: Handler) -> None:  # noqa: D102
+        address = key(self._domain, row.topic, row.type)
+
+        def asked(query: zenoh.Query) -> None:
+            with query:
+                request, attachment = query.payload, query.attachment
+                try:
+                    attached = Attachment.unpack(b"" if attachment is None else attachment.to_bytes())
+                    response = handle(b"" if request is None else request.to_bytes())
+                except MessageError as error:
+                    query.reply_err(f"{row.topic}: {error}")
+                    return
+                back = Attachment(attached.sequence, time_ns(), attached.gid).pack()
+                query.reply(address, response, encoding=zenoh.Encoding.APPLICATION_CDR, attachment=back)
+
+        self._entities.append(self._session.declare_queryable(address, Callback(asked, indirect=True), complete=True))
+        self._announce("SS", row, VOLATILE)
+
+    def clients(self) -> tuple[Client, ...]:  # noqa: D102
+        return self._graph.clients(self._topics)
+
+    def close(self) -> None:  # noqa: D102
+        if not self._closed:
+            self._closed = True
+            for entity in self._entities:
+                entity.undeclare()
+            self._session.close()
+            self._pictures.close()
+
+    def _announce(self, kind: Kind, row: Row, quality: str) -> str:
+        """Tell the graph of a publisher, subscriber or server; return its token."""
+        self._number += 1
+        self._topics.add(row.topic)
+        token = Endpoint(self._id, self._number, kind, NODE, row.topic, row.type, type_hash(row.type), quality).token(self._domain)
+        self._entities.append(self._session.liveliness().declare_token(token))
+        return token
+
+    def _came_or_went(self, sample: zenoh.Sample) -> None:
+        (self._graph.went if sample.kind == zenoh.SampleKind.DELETE else self._graph.came)(str(sample.key_expr))

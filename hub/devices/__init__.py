@@ -1,0 +1,1 @@
+"""Devices on their way into simulated time: inlets, network links, clocks."""

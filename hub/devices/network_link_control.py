@@ -1,0 +1,87 @@
+"""Changes to what lies between devices and the hub, while a session runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import zenoh
+from pydantic import BaseModel, ConfigDict, Field
+
+from hub.devices.network_link import Link, LinkOrder, in_words
+from hub.planning.plan import Plan
+from schemas.codec import encode
+from schemas.errors import MessageError, did_you_mean
+from schemas.keys import Keys
+from schemas.network_link import LinkSpec, Preset
+from schemas.quantity import Duration
+from schemas.ros import StringMessage
+
+__all__ = ["LinkReply", "LinkRequest", "Relink"]
+
+
+class LinkRequest(BaseModel):
+    """Change the link of a device; what is not said stays as it is. A preset or a delay takes the place of the other."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    device: str
+    preset: Preset | None = None
+    delay: Duration | None = None
+    jitter: Duration | None = None
+    loss: float | None = None
+    outage: Duration = Field(default=0, ge=0)
+    """Let nothing through for so long from now on."""
+
+
+class LinkReply(BaseModel):
+    """How the link of a device is from now on."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    device: str
+    link: LinkSpec
+    description: str
+    """The same in words; empty: nothing."""
+
+
+class Relink:
+    """Knows the present link of every device, and has it changed where the device is."""
+
+    def __init__(self, plan: Plan, session: zenoh.Session, keys: Keys, simulated: Mapping[str, Link]) -> None:
+        """`simulated`: the links of the devices that follow the clock; the others are told over Zenoh."""
+        self._specs = {m.name: m.link or LinkSpec() for m in plan.members.values() if m.role == "device"}
+        self._simulated = simulated
+        away = [name for name in self._specs if name not in simulated]
+        block, cdr = zenoh.CongestionControl.BLOCK, zenoh.Encoding.APPLICATION_CDR
+        self._publishers = {name: session.declare_publisher(keys.link(name), encoding=cdr, congestion_control=block) for name in away}
+        self._changed: set[str] = set()
+
+    def change(self, request: LinkRequest) -> LinkReply:
+        """Change a link; raises MessageError if there is no such device, ValueError if the link cannot be so."""
+        name = request.device
+        if name not in self._specs:
+            raise MessageError(f"there is no device '{name}'.{did_you_mean(name, self._specs)}")
+        said: dict[str, Any] = request.model_dump(mode="json", exclude={"device", "outage"}, exclude_none=True)
+        replaced = {"preset": None, "delay": 0} if said.keys() & {"preset", "delay"} else {}
+        self._specs[name] = LinkSpec.model_validate(self._specs[name].model_dump(mode="json") | replaced | said)
+        self._order(name, request.outage)
+        return LinkReply(device=name, link=self._specs[name], description=in_words(self._specs[name], outage_ns=request.outage))
+
+    def repeat(self, device: str) -> None:
+        """Tell the host of a device that has joined anew how its link was changed before."""
+        if device in self._changed:
+            self._order(device, 0)
+
+    def _order(self, name: str, outage_ns: int) -> None:
+        order = LinkOrder(spec=self._specs[name], outage_ns=outage_ns)
+        self._changed.add(name)
+        if name in self._simulated:
+            self._simulated[name].order(order)
+        else:
+            self._publishers[name].put(encode(StringMessage(data=order.model_dump_json())))
+
+    def undeclare(self) -> None:
+        """Change nothing any more."""
+        for publisher in self._publishers.values():
+            publisher.undeclare()

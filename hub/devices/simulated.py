@@ -1,0 +1,107 @@
+"""Devices that follow the clock: read, and written to, at communication points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from hub.devices.network_link import Link
+from hub.observation.latency import Latencies
+from hub.participant import Device, Sample, Value
+from hub.planning.plan import Member, Plan
+from hub.transport.cells import INITIAL
+from hub.transport.envelope import Stamp
+from hub.transport.reader import Feed
+from hub.transport.refusals import Drops
+from schemas.codec import encode
+from schemas.errors import ParticipantError
+
+__all__ = ["SimulatedDevices", "open_device"]
+
+Take = Callable[[str, Sample, bytes, int, Stamp], None]
+"""Gets a sample: device, sample, its bytes, when it arrived (simulated ns), and its stamp."""
+
+
+class SimulatedDevices:
+    """The devices of the hub's process that follow the clock.
+
+    One that is written to, or sits behind a link, is met at every period of its own, wherever the participants are that feed it: first it is
+    written what they had computed by then, and then it is read. Any other is read whenever the hub looks.
+    """
+
+    def __init__(self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, Feed], drops: Drops) -> None:
+        """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a link."""
+        meetings = {member.name for member in plan.meetings()}
+        self._devices = [_Simulated(plan.members[n], device, feeds[n], n in meetings, drops) for n, device in devices.items()]
+        self.links = {device.name: device.link for device in self._devices}
+        self.latencies = Latencies()
+        """From a value to the device."""
+
+    def open(self, directory: Path) -> None:
+        """Open all; raises ParticipantError naming the one that cannot be."""
+        for one in self._devices:
+            open_device(one.name, one.device, directory)
+
+    def exchange(self, time_ns: int, step: int, take: Take) -> None:
+        """Write to all devices that are due, and hand on what they have; raises ParticipantError."""
+        for one in self._devices:
+            if one.meets and step % one.member.period:
+                continue
+            try:
+                one.write(time_ns, step, self.latencies)
+                for sample, payload, arrival_ns, stamp in one.read(time_ns):
+                    take(one.name, sample, payload, arrival_ns, stamp)
+            except Exception as error:
+                raise ParticipantError(one.name, step, f"{type(error).__name__}: {error}") from error
+
+    def close(self) -> None:
+        """Close all."""
+        for one in self._devices:
+            one.device.close()
+
+
+class _Simulated:
+    """One device, its link, and how far its samples have been counted."""
+
+    def __init__(self, member: Member, device: Device, feed: Feed, meets: bool, drops: Drops) -> None:
+        self.name, self.member, self.device, self.meets = member.name, member, device, meets
+        self.link = Link(member.link)
+        self._feed, self._drops = feed, drops
+        self._ports = {port.name: port for port in member.ports}
+        self._sequence = dict.fromkeys(self._ports, 0)
+        self._newest_ns = dict.fromkeys(self._ports, INITIAL)
+
+    def write(self, time_ns: int, step: int, latencies: Latencies) -> None:
+        """Write what has arrived from the simulation."""
+        self.link.settle(time_ns)
+        for port, valid_ns, value in self._feed.due(step):
+            self.link.line(self._ports[port]).send(valid_ns, (valid_ns, value))
+        for port in self._ports.values():
+            for _, (valid_ns, value) in self.link.line(port).arrived(time_ns) if port.causality == "input" else ():
+                self._write_one(port.name, valid_ns, value)
+                latencies.add("state to force", f"{self.name}.{port.name}", time_ns - valid_ns)
+
+    def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
+        newest_ns = self._newest_ns[port]
+        if valid_ns < newest_ns:
+            self._drops.refuse(f"{self.name}.{port}", f"the value of {valid_ns / 1e9:g} s comes late: that of {newest_ns / 1e9:g} s was here before it")
+            return
+        self._newest_ns[port] = valid_ns
+        self.device.write(port, value)
+
+    def read(self, time_ns: int) -> Iterator[tuple[Sample, bytes, int, Stamp]]:
+        """Yield the samples that have arrived at the hub: sample, its bytes, time of arrival, stamp."""
+        for sample in self.device.read(time_ns):
+            number = self._sequence[sample.port] = self._sequence[sample.port] + 1
+            self.link.line(self._ports[sample.port]).send(time_ns, (sample, encode(sample.message), Stamp(0, number, time_ns)))
+        for port in self._ports.values():
+            for arrival_ns, (sample, payload, stamp) in self.link.line(port).arrived(time_ns) if port.causality == "output" else ():
+                yield sample, payload, arrival_ns, stamp
+
+
+def open_device(name: str, device: Device, directory: Path) -> None:
+    """Open a device; raises ParticipantError with its name."""
+    try:
+        device.open(directory)
+    except Exception as error:
+        raise ParticipantError(name, -1, f"cannot be opened: {error}") from error

@@ -1,0 +1,1 @@
+"""Hosts: the processes that step participants."""

@@ -1,0 +1,131 @@
+"""What the hub knows of its run, and how it tells it: a status for consoles, a progress line, and a summary at the end."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Callable
+from time import monotonic_ns
+
+from hub.devices.session_devices import Intake
+from hub.observation.latency import Histogram, by_way
+from hub.observation.observers import Observers
+from hub.observation.summary import Progress, Summary
+from hub.planning.plan import Member, Plan
+from hub.recording.recorder import RecorderSummary
+from hub.session.clock import Clock
+from hub.transport.refusals import Drops
+from schemas.lockstep import Report
+from schemas.scenario import Scenario
+from schemas.trocar_msgs import Latency, ParticipantStatus, SessionStatus
+
+__all__ = ["Account"]
+
+
+class Account:
+    """The account of one run."""
+
+    def __init__(self, scenario: Scenario, plan: Plan, run: int, clock: Clock, drops: Drops, observers: Observers, intake: Intake) -> None:
+        """Take what is told of: `run` is its number; `drops` counts what the hub refuses beside what `observers` do."""
+        self.phase = "starting"
+        """`starting`, `running`, `paused`, `done` or `failed`."""
+        self.detail = ""
+        """Why the run has failed."""
+        self._scenario = scenario
+        self._plan = plan
+        self._run = run
+        self._clock = clock
+        self._drops = drops
+        self._observers = observers
+        self._intake = intake
+        self._answers = Histogram()
+        self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
+        self._last_steps = dict.fromkeys(plan.order, -1)
+        self._started_ns: int | None = None
+        self._wall_ns: int | None = None
+
+    def start(self) -> None:
+        """Count wall time from here: the run begins to step."""
+        self.phase = "running"
+        self._started_ns = monotonic_ns()
+
+    def stop(self) -> None:
+        """Count wall time no further: the last step is done."""
+        self._wall_ns = self._wall_so_far_ns
+
+    def acknowledged(self, granted_ns: int) -> None:
+        """All steps of a grant that was given at `granted_ns` (monotonic) are done."""
+        self._answers.add(monotonic_ns() - granted_ns)
+
+    def book(self, member: Member, report: Report) -> int:
+        """Book the hashes and the last step that a participant reports; return the simulated time (ns) at the end of that step."""
+        self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
+        first = report.step + -report.step % member.period
+        last = self._last_steps[member.name] = first + (len(report.state_hash) - 1) * member.period
+        return (last + member.period) * self._plan.step_ns
+
+    def progress(self) -> Progress:
+        """Return where the run is now."""
+        sim_s, wall_ns = self._clock.time_ns / 1e9, self._wall_so_far_ns
+        factor = sim_s / (wall_ns / 1e9) if wall_ns else 0.0
+        return Progress(self._clock.step, self._clock.steps, sim_s, factor, self._clock.late_steps, self._observers.measures.live())
+
+    def status(self, pid: Callable[[str], int]) -> SessionStatus:
+        """Return what the session is doing now; `pid` knows the process of a host."""
+        members = [
+            ParticipantStatus(name=m.name, role=m.role, host=m.host, pid=pid(m.host), step=self._last_steps.get(m.name, self._clock.step))
+            for m in self._plan.members.values()
+        ]
+        progress = self.progress()
+        return SessionStatus(
+            session=self._scenario.name,
+            run=self._run,
+            state=self.phase,
+            step=progress.step,
+            sim_time_ns=self._clock.time_ns,
+            real_time_factor=progress.real_time_factor,
+            late_steps=progress.late_steps,
+            dropped_messages=self._dropped,
+            detail=self.detail,
+            participants=members,
+            devices=self._intake.statuses,
+            latencies=self._latencies,
+        )
+
+    def summary(self, recorded: RecorderSummary | None) -> Summary:
+        """Return what the run was like."""
+        digest = hashlib.blake2b(digest_size=16)
+        for name, part in sorted(self._digests.items()):
+            digest.update(name.encode() + part.digest())
+        progress = self.progress()
+        return Summary(
+            session=self._scenario.name,
+            state=self.phase,
+            steps=progress.step,
+            sim_time_s=progress.sim_time_s,
+            wall_time_s=(self._wall_ns or 0) / 1e9,
+            real_time_factor=progress.real_time_factor,
+            late_steps=progress.late_steps,
+            dropped_messages=self._dropped,
+            state_hash=digest.hexdigest(),
+            recording=None if recorded is None else str(recorded.path),
+            recording_complete=None if recorded is None else recorded.complete,
+            energy_residual_j=self._observers.energy.residual_j,
+            latency=by_way(self._latencies),
+            measures=self._observers.measures.results(),
+        )
+
+    @property
+    def _wall_so_far_ns(self) -> int:
+        if self._started_ns is None:
+            return 0
+        return monotonic_ns() - self._started_ns if self._wall_ns is None else self._wall_ns
+
+    @property
+    def _latencies(self) -> list[Latency]:
+        answers = [self._answers.message("grant to state", "all participants")] if self._answers.count else []
+        return [*answers, *self._intake.latencies]
+
+    @property
+    def _dropped(self) -> int:
+        return self._drops.total + self._observers.drops.total

@@ -1,0 +1,51 @@
+"""The energy book of every bond: what the motion side gave, what the force side got, and what the coupling made or lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hub.planning.plan import Plan, PlannedBond
+from schemas.lockstep import Report
+from schemas.ros import Header, Time
+from schemas.trocar_msgs import CouplingEnergy
+
+__all__ = ["EnergyBooks"]
+
+
+@dataclass
+class _Book:
+    planned: PlannedBond
+    motion_j: float = 0.0
+    force_j: float = 0.0
+
+
+class EnergyBooks:
+    """Reads the work of both sides of each bond from the acks."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._books = [_Book(planned) for planned in plan.bonds]
+        self._rows: dict[str, list[tuple[_Book, str]]] = {}
+        for book in self._books:
+            bond = book.planned.bond
+            self._rows.setdefault(bond.motion.participant, []).append((book, "motion_j"))
+            self._rows.setdefault(bond.force.participant, []).append((book, "force_j"))
+
+    def take(self, participant: str, report: Report) -> None:
+        """Book the work (J since the start) that a participant states in the last step of its report."""
+        rows = self._rows.get(participant)
+        if rows and len(report.work_j) >= len(rows):
+            for (book, side), work in zip(rows, report.work_j[-len(rows) :], strict=True):
+                setattr(book, side, work)
+
+    @property
+    def residual_j(self) -> float:
+        """Sum over all bonds of what the force side got beyond what the motion side gave (J)."""
+        return sum(book.force_j - book.motion_j for book in self._books)
+
+    def messages(self, time_ns: int) -> list[CouplingEnergy]:
+        """Return the state of every book."""
+        header = Header(stamp=Time.from_ns(time_ns))
+        return [
+            CouplingEnergy(header=header, bond=b.planned.bond.name, motion_work_j=b.motion_j, force_work_j=b.force_j, residual_j=b.force_j - b.motion_j)
+            for b in self._books
+        ]

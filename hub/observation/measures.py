@@ -1,0 +1,95 @@
+"""Measures: the numbers a scenario wants in its summary, taken from the values of output ports as they come."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from hub.planning.plan import Plan
+from hub.planning.wiring import measured_port
+from schemas.scenario import Measure, Scenario
+from schemas.vectors import Vector
+
+__all__ = ["Measures"]
+
+
+class _Meter:
+    def __init__(self, measure: Measure, part: slice, period: float) -> None:
+        self.live = measure.live
+        self.unit = measure.unit
+        self.now = 0.0
+        self._kind = measure.kind
+        self._part = part
+        self._after = measure.after
+        self._peak: float | None = None
+        self._least = inf
+        size = part.stop - part.start
+        self._low: Vector = np.full(size, inf)
+        self._high: Vector = np.full(size, -inf)
+        self._drop = 0.0
+        self._level, self._period = measure.level, period
+        self._above = self._longest = 0
+        self._sum = 0.0
+        self._count = 0
+
+    def take(self, value: Vector, time_ns: int) -> None:
+        part = value[self._part]
+        self.now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
+        if time_ns < self._after:
+            return
+        self._least = min(self._least, self.now)
+        if self._kind == "swing":
+            self._low, self._high = np.minimum(self._low, part), np.maximum(self._high, part)
+        if self._peak is None or self.now > self._peak:
+            self._peak, self._drop = self.now, 0.0
+        self._drop = max(self._drop, self._peak - self.now)
+        if self._level is not None:
+            self._above = self._above + 1 if self.now >= self._level else 0
+            self._longest = max(self._longest, self._above)
+        self._sum += self.now
+        self._count += 1
+
+    @property
+    def result(self) -> float | None:
+        if not self._count:
+            return None
+        results = {"peak-norm": self._peak, "peak": self._peak, "least": self._least, "mean": self._sum / self._count, "final": self.now}
+        return (results | {"drop": self._drop, "swing": float(np.max(self._high - self._low)), "time-above": self._longest * self._period})[self._kind]
+
+
+class Measures:
+    """All measures of a session. Values of one port come from one thread, in order."""
+
+    def __init__(self, scenario: Scenario, plan: Plan) -> None:
+        self._meters: dict[str, _Meter] = {}
+        self.by_port: dict[tuple[str, str], list[_Meter]] = {}
+        self._lock = threading.Lock()
+        for name, measure in scenario.measure.items():
+            member = plan.members[measure.of.participant]
+            port, part = measured_port(member, measure.of.port)
+            period = 1e-9 * (member.read_ns or plan.step_ns * plan.stride(member.name, port.name))
+            meter = self._meters[name] = _Meter(measure, part, period)
+            self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
+
+    @property
+    def ports(self) -> list[tuple[str, str]]:
+        """The (participant, port) pairs that are measured."""
+        return list(self.by_port)
+
+    def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
+        """Take the value of an output port at a time."""
+        for meter in self.by_port.get((participant, port), ()):
+            with self._lock:
+                meter.take(value, time_ns)
+
+    def live(self) -> Mapping[str, tuple[float, str]]:
+        """Return the present value and unit of each measure that the progress line shows."""
+        return {name: (meter.now, meter.unit) for name, meter in self._meters.items() if meter.live}
+
+    def results(self) -> dict[str, float | None]:
+        """Return every measure's result; None if its port never spoke."""
+        return {name: meter.result for name, meter in self._meters.items()}

@@ -1,0 +1,172 @@
+"""Everything that watches a session without taking part in it: recorder, measures and energy books."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from hub.observation.energy import EnergyBooks
+from hub.observation.measures import Measures
+from hub.planning.plan import Member, Plan
+from hub.recording.recorder import Recorder
+from hub.transport.cells import INITIAL
+from hub.transport.envelope import Tag
+from hub.transport.lane import has_lane
+from hub.transport.port_codec import PortCodec
+from hub.transport.refusals import Drops
+from schemas.codec import encode
+from schemas.errors import MessageError
+from schemas.keys import Keys, topic
+from schemas.lockstep import Permission, Report, pack_report
+from schemas.ports import Port
+from schemas.trocar_msgs import Ack, CouplingEnergy, Grant, InletSample, SessionStatus
+
+__all__ = ["Observers"]
+
+_ENERGY_PERIOD_NS = 10_000_000
+"""The books change at every step; 100 Hz shows all that a plot can."""
+
+
+@dataclass
+class _Watched:
+    member: Member
+    port: Port
+    codec: PortCodec
+    channel: int
+    newest: tuple[int, int] = (INITIAL - 1, 0)
+    """Step and place in its batch of the last value."""
+
+
+class Observers:
+    """Sees every grant, ack and output value of one run, from this process or from others."""
+
+    def __init__(self, plan: Plan, keys: Keys, run: int, measures: Measures, recorder: Recorder | None) -> None:
+        self.measures = measures
+        self.energy = EnergyBooks(plan)
+        self.drops = Drops()
+        self._run = run
+        self._plan = plan
+        self._keys = keys
+        self._recorder = recorder
+        self._watched: dict[str, _Watched] = {}
+        self._channels: dict[str, int] = {}
+        self._next_energy_ns = 0
+        for member in plan.members.values():
+            for port in member.ports:
+                if port.causality == "output":
+                    key = keys.output(member.key_role, member.name, port.name)
+                    self._watched[key] = _Watched(member, port, PortCodec(port), self._channel(key, port.type))
+
+    def _channel(self, key: str, type_name: str) -> int:
+        if self._recorder is None:
+            return 0
+        if key not in self._channels:
+            self._channels[key] = self._recorder.channel(topic(key), type_name)
+        return self._channels[key]
+
+    @property
+    def watches_values(self) -> bool:
+        """Say whether output values matter here at all."""
+        return self._recorder is not None or bool(self.measures.by_port)
+
+    @property
+    def away(self) -> dict[str, tuple[str, str]]:
+        """Participant and port of every output of another process that is to be watched, by key."""
+        away = {key: w for key, w in self._watched.items() if w.member.host != "hub" and w.member.role != "device" and not self._comes_by_lane(w)}
+        measured = set(self.measures.ports)
+        return {key: (w.member.name, w.port.name) for key, w in away.items() if self._recorder is not None or (w.member.name, w.port.name) in measured}
+
+    def _comes_by_lane(self, watched: _Watched) -> bool:
+        """Say whether the hub's own host reads the value anyway, past Zenoh, and shows it to `value`."""
+        name, port = watched.member.name, watched.port
+        readers = {self._plan.members[link.target].host for link in self._plan.links if (link.source, link.source_port) == (name, port.name)}
+        return "hub" in readers and has_lane(port, watched.member.host, "hub")
+
+    def linked(self) -> bool:
+        """Say whether the value at time 0 of every watched output of another process has been heard."""
+        return all(self._watched[key].newest >= (INITIAL, 0) for key in self.away)
+
+    def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
+        """Take an output value of a participant in this process, or one that came here by a lane."""
+        if (member.name, port.name) in self.measures.by_port and step > INITIAL:
+            self.measures.take(member.name, port.name, value, time_ns)
+        if self._recorder is not None:
+            watched = self._watched[self._keys.output(member.key_role, member.name, port.name)]
+            for item in value if watched.codec.is_event else (value,):
+                self._recorder.write(watched.channel, time_ns, watched.codec.encode(item, time_ns))
+
+    def sample(self, sample: zenoh.Sample) -> None:
+        """Take an output value of a participant in another process, as it comes from the wire."""
+        watched = self._watched.get(str(sample.key_expr))
+        try:
+            tag = Tag.of(sample)
+            if watched is None or tag.run != self._run:
+                raise MessageError("belongs to no port of this run")
+            if (tag.step, tag.index) <= watched.newest:
+                return
+            if not tag.count:
+                watched.newest = (tag.step, 0)
+                return
+            payload = sample.payload.to_bytes()
+            value = watched.codec.decode(payload)
+        except MessageError as error:
+            self.drops.count(sample, error)
+            return
+        watched.newest = (tag.step, tag.index)
+        if tag.step > INITIAL and not watched.codec.is_event:
+            self.measures.take(watched.member.name, watched.port.name, value, tag.time_ns)
+        if self._recorder is not None:
+            self._recorder.write(watched.channel, tag.time_ns, payload)
+
+    def watches(self, device: str, port: str) -> bool:
+        """Say whether anybody wants to see what a device says on a port, whether or not it enters the simulation."""
+        return self._recorder is not None or (device, port) in self.measures.by_port
+
+    def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
+        """Take what a device said; what enters the simulation is recorded with its grant. Raises MessageError if it is none of the port."""
+        watched = self._watched[self._keys.output("device", device, port)]
+        measured = (device, port) in self.measures.by_port
+        if measured or not enters:
+            value = watched.codec.accept(payload)
+            if measured:
+                self.measures.take(device, port, value, time_ns)
+        if self._recorder is not None and not enters:
+            self._recorder.write(watched.channel, time_ns, payload)
+
+    def grant(self, grant: Permission, payload: bytes) -> None:
+        """Take a grant and the device samples in it."""
+        if self._recorder is None:
+            return
+        self._recorder.write(self._channel(self._keys.grant, Grant.ros_type), grant.start_ns, payload)
+        for sample in grant.inlets:
+            self._inlet(sample, grant.start_ns)
+
+    def _inlet(self, sample: InletSample, time_ns: int) -> None:
+        watched = self._watched.get(self._keys.output("device", sample.participant, sample.port))
+        if watched is not None and sample.payload.size and self._recorder is not None:
+            self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())
+
+    def report(self, member: Member, report: Report, time_ns: int, payload: bytes | None) -> None:
+        """Take a report; `payload` are its bytes if it came from the wire."""
+        self.energy.take(member.name, report)
+        if self._recorder is not None:
+            channel = self._channel(self._keys.ack(member.name), Ack.ros_type)
+            self._recorder.write(channel, time_ns, pack_report(report) if payload is None else payload)
+
+    def books(self, time_ns: int) -> list[CouplingEnergy]:
+        """Return (and record) the energy books when they are due."""
+        if time_ns < self._next_energy_ns:
+            return []
+        self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
+        messages = self.energy.messages(time_ns)
+        if self._recorder is not None:
+            for message in messages:
+                self._recorder.write(self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message))
+        return messages
+
+    def status(self, status: SessionStatus) -> None:
+        """Record a status of the session."""
+        if self._recorder is not None:
+            self._recorder.write(self._channel(self._keys.status, status.ros_type), status.sim_time_ns, encode(status))

@@ -1,0 +1,10 @@
+"""The interface that engines, controllers and devices build on. It knows neither processes nor Zenoh."""
+
+from hub.participant.base import Outputs, Params, Participant, Value
+from hub.participant.bond import ForceSide, MotionSide
+from hub.participant.device import Device, Sample
+from hub.participant.inputs import Inputs
+from hub.participant.state import restore_arrays, state_hash
+from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
+
+__all__ = ["BondPlan", "Correction", "Device", "ForceSide", "Inputs", "MotionSide", "Outputs", "Params", "Participant", "Sample", "Setup", "Stepped", "Value", "restore_arrays", "state_hash"]

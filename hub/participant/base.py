@@ -1,0 +1,55 @@
+"""What every participant is: a name, parameters and ports."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, ConfigDict
+
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.vectors import Vector
+
+__all__ = ["Outputs", "Params", "Participant", "Value"]
+
+Value = Vector | Message | tuple[Message, ...]
+"""A signal with a fixed layout is a vector, any other signal a message, an event port a tuple of messages."""
+
+
+Outputs = Mapping[str, Value]
+"""Port name to value. The arrays may be the same ones at every step: whoever keeps a value copies it."""
+
+
+class Params(BaseModel):
+    """Base of the parameters of a participant kind, as they stand in a scenario. SI units after validation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Participant(ABC):
+    params_model: ClassVar[type[Params]] = Params
+    """The pydantic model of the kind's parameters."""
+
+    def __init__(self, name: str, params: Any) -> None:
+        """Take the participant's name and an instance of `params_model`. Cheap: no package of an extra is imported here."""
+        self.name = name
+        self.params = params
+
+    @property
+    @abstractmethod
+    def ports(self) -> tuple[Port, ...]:
+        """Inputs and outputs, readable before anything is started; those of bonds not among them."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give everything back. May be called twice, and before or after a failed `configure` or `open`."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+

@@ -1,0 +1,139 @@
+"""The two sides of a power bond inside an engine's step: prediction, virtual coupling forces and work.
+
+The force side goes through its sub-steps on the predicted motion of the other side and sums impulse and work; the
+motion side applies the wrench it was given and sums the work it does. Frames (dof 6) use the convention pose
+(x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's frame. In the shapes
+`size` and `linear` are those of the `BondSide`.
+Scheme and rules: docs/decisions/0004-coupling.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hub.participant.inputs import Inputs
+from hub.participant.stepped import BondPlan
+from schemas.ports import BondSide, bond_ports
+from schemas.vectors import Vector
+
+__all__ = ["ForceSide", "MotionSide"]
+
+
+class ForceSide:
+    """The force side's view of a bond: where the other side is inside the step, and what was exchanged."""
+
+    def __init__(self, bond: BondSide, plan: BondPlan) -> None:
+        """Take the declared bond and its plan."""
+        self._position, self._velocity, self.force_port = (port.name for port in bond_ports(bond))
+        self._plan = plan
+        self._size = bond.size
+        self._linear = bond.linear
+        self.work_port = f"{bond.name}/work"
+        self._work = np.zeros(1)
+        self._x = np.zeros(self._linear)
+        self._v = self._v_before = np.zeros(self._size)
+        self._a = np.zeros(self._size)
+        self._spring = np.zeros(self._linear)
+        self._stiffness = bond.stiffness or 0.0
+        self._duration = 0.0
+        self._started = False
+
+    def begin(self, inputs: Inputs, h: float) -> None:
+        """Take the motion at the start of a step of `h` seconds.
+
+        Where the motion that came out differs by d from the predicted one, the spring is displaced by d at once: it takes
+        the work F d + k d^2 / 2, with F its force at the end of the last step.
+        """
+        x, v = inputs[self._position][: self._linear], inputs[self._velocity]
+        if self._started:
+            jump = x - self.position(self._duration)
+            self._work[0] += float(self._spring @ jump + 0.5 * self._stiffness * (jump @ jump))
+            if self._plan.prediction == "slope":
+                self._a = (v - self._v_before) / h
+        self._x, self._v, self._v_before = x.copy(), v.copy(), v.copy()
+        self._duration = h
+        self._started = True
+        self._impulse = np.zeros(self._size)
+        self._summed = 0.0
+
+    def position(self, tau: float) -> Vector:
+        """Return the predicted position (m), shape (linear,), `tau` seconds into the step."""
+        if self._plan.prediction == "hold":
+            return self._x
+        return self._x + tau * (self._v[: self._linear] + 0.5 * tau * self._a[: self._linear])
+
+    def velocity(self, tau: float) -> Vector:
+        """Return the predicted twist (m/s, rad/s), shape (size,), `tau` seconds into the step."""
+        return self._v + tau * self._a
+
+    def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
+        """Count the forces (N, N m; shape (size,)) with which the other side pushes, in a sub-step of `dt` seconds around `tau`."""
+        force = spring + damper
+        self._impulse += dt * force
+        self._summed += dt
+        moved = damper if self._plan.prediction == "hold" else force
+        self._work[0] += dt * float(moved @ self.velocity(tau))
+
+    def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
+        """Return the outputs of the bond: the reaction on the other side (minus the mean force, or the one at the end), and the work.
+
+        `spring`, `damper`: forces (N, N m; shape (size,)) at the end of the step, on the predicted motion.
+        """
+        self._spring = spring[: self._linear].copy()
+        force = self._impulse / self._summed if self._plan.mean else spring + damper
+        return {self.force_port: -force, self.work_port: self._work.copy()}
+
+    @property
+    def state(self) -> Vector:
+        """All that this side remembers between steps, for hash, save and restore."""
+        return np.concatenate([self._work, self._x, self._v, self._v_before, self._a, self._spring, [self._duration, float(self._started)]])
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        sizes = np.cumsum([1, self._linear, self._size, self._size, self._size, self._linear, 1])
+        self._work, self._x, self._v, self._v_before, self._a, self._spring, duration, started = np.split(state.copy(), sizes)
+        self._duration, self._started = float(duration[0]), bool(started[0])
+
+
+class MotionSide:
+    """The motion side's view of a bond: the force to apply in each sub-step, and the work it does."""
+
+    def __init__(self, bond: BondSide, plan: BondPlan) -> None:
+        """Take the declared bond and its plan."""
+        self.position_port, self.velocity_port, self.force_port = (port.name for port in bond_ports(bond))
+        self._correction = plan.correction
+        self._linear = bond.linear
+        self.work_port = f"{bond.name}/work"
+        self._work = np.zeros(1)
+
+    def begin(self, inputs: Inputs, position: Vector, velocity: Vector) -> None:
+        """Take the reaction for this step, and the motion at its start, from which the other side predicted."""
+        self._reaction = inputs[self.force_port]
+        if self._correction is not None:
+            self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
+
+    def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
+        """Return the force (N, N m; shape (size,)) on this side in the sub-step that begins `tau` seconds into the step, given where it is then."""
+        if self._correction is None:
+            return self._reaction
+        c, force = self._correction, self._reaction.copy()
+        behind = self._x + tau * self._v - position[: self._linear]
+        force[: self._linear] += c.gain * (c.stiffness * behind + c.damping * (self._v - velocity[: self._linear]))
+        return force
+
+    def add(self, force: Vector, displacement: Vector) -> None:
+        """Count the work done against `force` over `displacement` (m, rad; shape (size,)) of one sub-step."""
+        self._work[0] -= force.dot(displacement)
+
+    def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:
+        """Return the outputs of the bond at the end of the step; the work's array is the same one at every step."""
+        return {self.position_port: position, self.velocity_port: velocity, self.work_port: self._work}
+
+    @property
+    def state(self) -> Vector:
+        """All that this side remembers between steps."""
+        return self._work.copy()
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        self._work[:] = state

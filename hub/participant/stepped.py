@@ -1,0 +1,78 @@
+"""The interface of engines and controllers."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hub.participant.base import Outputs, Participant
+from hub.participant.inputs import Inputs
+from schemas.errors import StateError
+from schemas.ports import BondSide
+
+__all__ = ["BondPlan", "Correction", "Setup", "Stepped"]
+
+@dataclass(frozen=True)
+class Correction:
+    """The motion side's share of `impulse-linearised`: F_tool = -F_mean - gain [k (x - x_pred) + b (v - v_pred)]."""
+
+    gain: float
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class BondPlan:
+    """How one bond of this participant is coupled."""
+
+    prediction: str
+    """What the force side assumes of the motion inside a step: `hold`, `velocity` (x + v t) or `slope` (x + v t + a t^2/2)."""
+    mean: bool
+    """The force side returns its mean force over the step; otherwise the force at its end."""
+    correction: Correction | None = None
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All that a participant learns when it is configured."""
+
+    period_ns: int
+    """Its step, in nanoseconds."""
+    directory: Path
+    """Where relative paths of the scenario start."""
+    bonds: Mapping[str, BondPlan] = field(default_factory=dict[str, BondPlan])
+
+
+class Stepped(Participant):
+    """An engine or a controller: advances when, and as far as, it is told to."""
+
+    @property
+    def bonds(self) -> tuple[BondSide, ...]:
+        """Power bonds that may be connected; after `configure` with their effective masses."""
+        return ()
+
+    @abstractmethod
+    def configure(self, setup: Setup) -> Outputs:
+        """Build the model, and return every output at time 0."""
+
+    @abstractmethod
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+        """Advance from `t` to `t + h`, both in nanoseconds, and return the outputs at `t + h`.
+
+        The work of a bond since the start (J) is returned as a float vector of one element under `<bond>/work`.
+        """
+
+    @abstractmethod
+    def state_hash(self) -> int:
+        """Return 64 bits that differ whenever any bit of the state differs; equal runs have equal hashes."""
+
+    def save(self) -> bytes:
+        """Return the whole state. Raises StateError where the participant cannot."""
+        raise StateError(f"participant '{self.name}' ({type(self).__name__}) cannot save its state")
+
+    def restore(self, state: bytes) -> None:  # noqa: ARG002
+        """Return to a saved state, bit for bit. Raises StateError where the participant cannot."""
+        raise StateError(f"participant '{self.name}' ({type(self).__name__}) cannot restore a state")
+

@@ -1,0 +1,1 @@
+"""From a scenario file to a plan: who runs where, and every connection and bond resolved."""

@@ -1,0 +1,100 @@
+"""Scenarios as files: found, read, overridden and validated, with a line and a column for everything wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import ValidationError
+
+from hub.participant import Params
+from hub.planning import registry
+from hub.planning.scenario_source import Location, Source, read
+from hub.planning.validation_errors import problems
+from schemas.errors import ScenarioError, did_you_mean
+from schemas.scenario import ParticipantSpec, Scenario
+
+__all__ = ["ScenarioFile", "installed_scenarios", "load", "located"]
+
+
+@dataclass(frozen=True)
+class ScenarioFile:
+    """A valid scenario, the validated parameters of its participants by name, and where it came from."""
+
+    scenario: Scenario
+    params: Mapping[str, Params]
+    source: Source
+
+
+def installed_scenarios() -> dict[str, Path]:
+    """Return the scenarios that come with Trocar, by name."""
+    return {file.stem: file for file in sorted(Path(str(files("configs"))).glob("*.yaml"))}
+
+
+def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
+    """Return the scenario that is installed under a name or stands in a file, with `a.b.c=value` overrides applied.
+
+    Raises ScenarioError with one line for each thing that is wrong.
+    """
+    source = read(_find(name_or_path))
+    for override in overrides:
+        source.override(override)
+    found: list[str] = []
+    params = _all_params(source, found)
+    try:
+        scenario = Scenario.model_validate(source.tree)
+    except ValidationError as error:
+        raise ScenarioError("\n".join([*problems(error, Scenario, (), source), *found])) from error
+    if found:
+        raise ScenarioError("\n".join(found))
+    return ScenarioFile(scenario, params, source)
+
+
+def located(error: ScenarioError, source: Source) -> ScenarioError:
+    """Return `error` with its place in the file in front of the message, if it says which value it is about."""
+    return ScenarioError(source.line(error.path, str(error))) if error.path else error
+
+
+def _find(name_or_path: str) -> Path:
+    path = Path(name_or_path)
+    if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
+        if not path.is_file():
+            raise ScenarioError(f"there is no scenario file '{path}' (looked in {Path.cwd()})")
+        return path
+    known = installed_scenarios()
+    if name_or_path not in known:
+        raise ScenarioError(f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} A file of your own is named with its .yaml.")
+    return known[name_or_path]
+
+
+def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
+    """Return the parameters of every participant; what is wrong with them goes into `found`."""
+    participants = source.tree.get("participants")
+    params: dict[str, Params] = {}
+    for name, spec in cast("dict[str, Any]", participants if isinstance(participants, dict) else {}).items():
+        if not isinstance(spec, dict) or not isinstance(cast("dict[str, Any]", spec).get("kind"), str):
+            continue  # the scenario's own validation says so
+        try:
+            params[name] = _params(("participants", name), cast("dict[str, Any]", spec), source)
+        except ScenarioError as error:
+            found.append(str(located(error, source)))
+    return params
+
+
+def _params(at: Location, spec: dict[str, Any], source: Source) -> Params:
+    """Return the validated parameters of one participant, and see that what it needs is installed, if it runs here."""
+    kind = spec["kind"]
+    try:
+        model = registry.load(kind).params_model
+        if spec.get("host") != "remote":
+            registry.require_extra(kind)
+    except ScenarioError as error:
+        raise ScenarioError(str(error), path=(*at, "kind")) from error
+    given = {key: value for key, value in spec.items() if key not in ParticipantSpec.RESERVED}
+    try:
+        return model.model_validate(given, context={"directory": source.directory})
+    except ValidationError as error:
+        raise ScenarioError("\n".join(problems(error, model, at, source))) from error

@@ -1,0 +1,41 @@
+"""The JSON schema of a scenario with the parameters of every installed kind, for editors (yaml-language-server)."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from hub.planning import registry
+from schemas.scenario import ParticipantSpec, Scenario
+
+__all__ = ["scenario_schema"]
+
+_PORT = r"\s*[A-Za-z][A-Za-z0-9_]*\.\S+\s*"
+_TEXT_FORMS = {"Endpoint": rf"^{_PORT}$", "Connection": rf"^{_PORT}->{_PORT}$"}
+"""Parts of a scenario that may also be written as one line of text."""
+
+
+def scenario_schema() -> str:
+    """Return the schema as JSON text. A kind that cannot be loaded is left out."""
+    schema = Scenario.model_json_schema()
+    definitions: dict[str, Any] = schema["$defs"]
+    for name, pattern in _TEXT_FORMS.items():
+        definitions[name] = {"anyOf": [{"type": "string", "pattern": pattern}, definitions[name]]}
+    common = definitions["ParticipantSpec"]["properties"]
+    definitions["ParticipantSpec"] = _participant(common, definitions)
+    return json.dumps({"$schema": "http://json-schema.org/draft-07/schema#", **schema}, indent=2) + "\n"
+
+
+def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a participant, told apart by `kind`: an editor then reports against the one that is meant."""
+    broken = registry.broken()
+    kinds = [kind for name, kind in sorted(registry.kinds().items()) if name not in broken]
+    branches: list[dict[str, Any]] = []
+    for kind in kinds:
+        params = registry.load(kind.name).params_model.model_json_schema(ref_template=f"#/$defs/{kind.name}.{{model}}")
+        definitions.update({f"{kind.name}.{name}": definition for name, definition in params.pop("$defs", {}).items()})
+        properties = {key: value for key, value in common.items() if key in ParticipantSpec.RESERVED} | params.get("properties", {})
+        then = {"properties": properties, "required": params.get("required", []), "additionalProperties": False}
+        branches.append({"if": {"properties": {"kind": {"const": kind.name}}}, "then": then})
+    kind_schema = common["kind"] | {"enum": [kind.name for kind in kinds]}
+    return {"type": "object", "properties": common | {"kind": kind_schema}, "required": ["kind"], "allOf": branches}

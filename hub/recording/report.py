@@ -1,0 +1,146 @@
+"""One self-contained HTML page about a recorded session."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from hub.recording.recording import Recording
+from hub.recording.report_figures import (
+    BondTrace,
+    Figure,
+    energy_figures,
+    force_figure,
+    motion_figure,
+    pace_figure,
+    press_figure,
+    step_time_figures,
+)
+from schemas.errors import RecordingError
+from schemas.keys import Keys, topic
+from schemas.scenario import Bond, Scenario
+from schemas.trocar_msgs import SessionStatus
+from schemas.vectors import Vector
+
+__all__ = ["report"]
+
+_KEYS = Keys("any")
+
+
+def report(recording: Recording, output: Path) -> None:
+    """Write the page about `recording` to the file `output`; it loads nothing from anywhere.
+
+    Raises MissingExtraError without matplotlib, RecordingError if the recording is not one of a session or `output` cannot be written.
+    """
+    scenario = recording.scenario()
+    traces = [trace for bond in scenario.bonds if (trace := _trace(recording, bond)) is not None]
+    books = {bond.name: _book(recording, bond) for bond in scenario.bonds}
+    statuses = list(recording.statuses())
+    page = Template((files("hub") / "report_page.html").read_text(encoding="utf-8"))
+    text = page.substitute(
+        title=escape(scenario.name),
+        description=escape(scenario.description),
+        numbers=_numbers(recording, scenario, statuses[-1][1] if statuses else None, traces, books),
+        bonds=_sections(_bond_figures(traces, books)),
+        steps=_sections(_step_figures(recording, scenario, statuses)),
+        ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
+        scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
+        versions=_table(("package", "version"), sorted(recording.versions().items())),
+        file=escape(recording.file.name),
+    )
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"cannot write the report to '{output}': {error.strerror}") from error
+
+
+def _trace(recording: Recording, bond: Bond) -> BondTrace | None:
+    """Return what is recorded of both sides of `bond`, at the times of the force; None if a side is not recorded."""
+    motion = _first(recording, f"{bond.motion.participant}", bond.motion.port, ("pose", "position"))
+    force = _first(recording, f"{bond.force.participant}", bond.force.port, ("wrench", "force"))
+    if motion is None or force is None:
+        return None
+    (motion_s, motion_values), (force_s, force_values) = recording.series(motion), recording.series(force)
+    if not (len(motion_s) and len(force_s)):
+        return None
+    dof = min(3, motion_values.shape[1], force_values.shape[1])
+    position = np.stack([np.interp(force_s, motion_s, motion_values[:, i]) for i in range(dof)], axis=1)
+    return BondTrace(bond.name, force_s, position, force_values[:, :dof])
+
+
+def _first(recording: Recording, participant: str, bond: str, names: Iterable[str]) -> str | None:
+    topics = (topic(_KEYS.output("engine", participant, f"{bond}/{name}")) for name in names)
+    return next((name for name in topics if name in recording.topics), None)
+
+
+def _book(recording: Recording, bond: Bond) -> tuple[Vector, Vector, Vector]:
+    """Return times (s), work given and work taken (J) of the energy book, each of shape (n,)."""
+    rows = [(time_ns * 1e-9, entry.motion_work_j, entry.force_work_j) for time_ns, entry in recording.energy(bond.name)]
+    table = np.array(rows, np.float64).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]
+
+
+def _bond_figures(traces: Iterable[BondTrace], books: dict[str, tuple[Vector, Vector, Vector]]) -> Iterator[Figure]:
+    for trace in traces:
+        yield from (press_figure(trace), force_figure(trace), motion_figure(trace))
+    for bond, (times_s, given, taken) in books.items():
+        if len(times_s):
+            yield from energy_figures(bond, times_s, given, taken)
+
+
+def _step_figures(recording: Recording, scenario: Scenario, statuses: list[tuple[int, SessionStatus]]) -> Iterator[Figure]:
+    compute: dict[str, tuple[Vector, Vector]] = {}
+    for name, spec in scenario.participants.items():
+        period_ns = spec.period or scenario.step
+        rows = [(ack.step * scenario.step + i * period_ns, spent) for ack in recording.acks(name) for i, spent in enumerate(ack.compute_ns.tolist())]
+        if rows:
+            times_ns, spent_ns = np.array(rows, np.float64).T
+            compute[name] = (times_ns * 1e-9, spent_ns * 1e-9)
+    if compute:
+        yield from step_time_figures(compute, scenario.step * 1e-9)
+    pace = np.array([(time_ns * 1e-9, status.real_time_factor) for time_ns, status in statuses if status.step > 0], np.float64).reshape(-1, 2)
+    if len(pace) > 1:
+        yield pace_figure(pace[:, 0], pace[:, 1])
+
+
+def _numbers(
+    recording: Recording, scenario: Scenario, status: SessionStatus | None, traces: list[BondTrace], books: dict[str, tuple[Vector, Vector, Vector]]
+) -> str:
+    """Return the summary as a definition list."""
+    rows: list[tuple[str, str]] = []
+    if status is not None:
+        rows += [
+            ("ended", status.state + (f" ({status.detail})" if status.detail else "")),
+            ("steps", f"{status.step:,}"),
+            ("simulated time", f"{status.sim_time_ns * 1e-9:.3f} s"),
+            ("real-time factor", f"{status.real_time_factor:.2f}"),
+            ("late steps", f"{status.late_steps:,}"),
+            ("dropped messages", f"{status.dropped_messages:,}"),
+        ]
+    rows.append(("communication step", f"{scenario.step * 1e-6:g} ms"))
+    rows += [(f"peak force, {trace.name}", f"{trace.magnitude.max(initial=0):.3f} N") for trace in traces]
+    rows += [(f"energy residual, {bond}", f"{(taken[-1] - given[-1]) * 1e6:.3g} µJ") for bond, (_, given, taken) in books.items() if len(given)]
+    rows += [("messages", f"{sum(recording.counts.values()):,}"), ("recording", f"{recording.file.stat().st_size / 1e6:.1f} MB")]
+    return "\n".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in rows)
+
+
+def _ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
+    seconds = recording.duration_ns * 1e-9
+    for name, count in sorted(recording.counts.items()):
+        yield name, recording.topics[name], f"{count:,}", f"{count / seconds:.1f}" if seconds else ""
+
+
+def _sections(figures: Iterable[Figure]) -> str:
+    return "\n".join(f"<figure><h3>{escape(f.title)}</h3>{f.svg}<figcaption>{escape(f.caption)}</figcaption></figure>" for f in figures)
+
+
+def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in heads)
+    body = "\n".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    region = f'<div class="scroll" tabindex="0" role="region" aria-label="by {escape(heads[0])}">'
+    return f"{region}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"

@@ -1,0 +1,132 @@
+"""A process that holds one device and stays: it joins a session, waits when the hub is gone, and joins again, also a later session."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+import zenoh
+from zenoh.handlers import Callback
+
+from hub.devices.clock_watch import ClockWatch
+from hub.devices.loop import DeviceLoop
+from hub.devices.uplink import DeviceUplink, Run
+from hub.participant import Device
+from hub.planning.registry import make
+from hub.transport.control_client import ask, present
+from hub.transport.control_messages import Empty, JoinReply, JoinRequest
+from hub.transport.refusals import Drops
+from schemas.codec import encode
+from schemas.errors import ConnectError, MessageError, ParticipantError
+from schemas.keys import Keys
+from schemas.ros import StringMessage
+
+__all__ = ["DeviceHost"]
+
+log = logging.getLogger(__name__)
+
+_RETRY_S = 0.5
+_LOOK_S = 0.2
+"""A wait that is this short can be interrupted on every system."""
+
+
+class DeviceHost:
+    """Keeps one device open, and takes part with it in whatever run of its session there is."""
+
+    def __init__(self, name: str, connect: Callable[[], zenoh.Session], keys: Keys, request: JoinRequest, directory: Path | None) -> None:
+        """Take the device's name, what opens a Zenoh session with the hub, and where relative paths start (None: where the hub has them).
+
+        `keys`: of the session to join, or of `*` for whatever the hub has.
+        """
+        self._name, self._connect, self._keys, self._request, self._directory = name, connect, keys, request, directory
+        self._loop: DeviceLoop | None = None
+        self._held: tuple[Any, ...] = ()
+        self._failure: ParticipantError | None = None
+        self._over = threading.Event()
+        """The run is over: the hub is gone, or the device has failed."""
+
+    def serve(self) -> None:
+        """Take part in one run after the other, for ever.
+
+        Raises ConnectError or MessageError if the first one cannot be joined, and ParticipantError if the device fails.
+        """
+        joined, told = False, ""
+        try:
+            while True:
+                try:
+                    with self._connect() as session:
+                        reply = present(session, self._keys, self._request)
+                        joined, told = True, ""
+                        self._take_part(session, reply)
+                    log.warning("device '%s': the hub is gone; nothing is written to it any more, and it joins again when the hub is back", self._name)
+                except (ConnectError, MessageError) as error:
+                    if not joined:
+                        raise
+                    if str(error) != told:
+                        told = str(error)
+                        log.info("device '%s' waits for the hub: %s", self._name, told)
+                    sleep(_RETRY_S)
+        finally:
+            if self._loop is not None:
+                self._loop.close()
+
+    def _take_part(self, session: zenoh.Session, reply: JoinReply) -> None:
+        """Go along with a run until it is over."""
+        keys, member = Keys(reply.session), reply.plan.members[self._name]
+        self._over.clear()
+        run = Run(reply.plan, keys, reply.run, reply.admission)
+        with ExitStack() as stack:
+            gone = session.liveliness().declare_subscriber(keys.alive("hub", "hub"), Callback(self._hub_came_or_went, indirect=True), history=True)
+            stack.callback(gone.undeclare)
+            refused = session.declare_publisher(keys.refused("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR)
+            drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
+            try:
+                loop = self._device_loop(reply)
+            except ParticipantError as error:
+                self._say(session, self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}))
+                raise
+            clock = stack.enter_context(ClockWatch(session, keys))
+            uplink = DeviceUplink(member, run, session, loop, drops, clock.offset)
+            stack.callback(uplink.close)
+            loop.attach(uplink)
+            token = session.liveliness().declare_token(keys.alive("device", self._name))
+            stack.callback(token.undeclare)
+            self._say(session, self._request.model_copy(update={"ready": True}))
+            log.info("device '%s' takes part in session '%s'", self._name, keys.session)
+            while not self._over.wait(_LOOK_S):
+                pass
+            if self._failure is not None:
+                self._say(session, self._request.model_copy(update={"failed": f"{self._failure.participant}: {self._failure.cause}"}))
+                raise self._failure
+
+    def _device_loop(self, reply: JoinReply) -> DeviceLoop:
+        """Return the loop of the device, which stays open from one run to the next unless the scenario wants another one."""
+        member, params = reply.plan.members[self._name], reply.params[self._name]
+        wanted = (member.kind, params, member.read_ns, reply.directory)
+        if self._loop is None or self._held != wanted:
+            if self._loop is not None:
+                self._loop.close()
+            directory = self._directory or Path(reply.directory)
+            device = make(member.kind, self._name, params, directory)
+            if not isinstance(device, Device):
+                raise ParticipantError(self._name, -1, f"'{member.kind}' is no device here")
+            device.learn_hub(self._connect)
+            self._loop, self._held = DeviceLoop(self._name, device, member.read_ns, failed=self._device_failed), wanted
+            self._loop.start(directory)
+        return self._loop
+
+    def _say(self, session: zenoh.Session, request: JoinRequest) -> None:
+        ask(session, self._keys.join(self._request.host), request, Empty)
+
+    def _hub_came_or_went(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._over.set()
+
+    def _device_failed(self, name: str, cause: str) -> None:
+        self._failure = ParticipantError(name, -1, cause)
+        self._over.set()

@@ -1,0 +1,1 @@
+"""Certificates, access rules, and the gate through which other machines join."""

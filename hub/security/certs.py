@@ -1,0 +1,148 @@
+"""The authority of a hub: it makes the certificates by which hub and participants know each other (docs/decisions/0027-remote-hosts.md).
+
+Keys are of the elliptic curve P-256, which every TLS library has. Needs the extra `certs`.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    load_pem_private_key,
+)
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from hub.security.credentials import CONSOLE, HUB, OBSERVER, examine, load
+from schemas.errors import ConnectError, ScenarioError
+from schemas.keys import valid_name
+
+__all__ = ["found", "issue", "names_of_this_machine", "renew"]
+
+_AUTHORITY_DAYS = 3650
+_SKEW = timedelta(hours=1)
+"""Certificates are valid from that long ago: the clock of the other machine may be behind."""
+
+
+def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
+    """Make an authority in `directory`, and the hub's certificate for the names and addresses `hosts`; return the file of the latter.
+
+    Raises ScenarioError if there is an authority already: what it has issued would be worth nothing.
+    """
+    key_file, certificate_file = directory / "ca.key", directory / "ca.pem"
+    if key_file.exists() or certificate_file.exists():
+        raise ScenarioError(
+            f"{directory} has an authority already, and the certificates in use are of it. For a new certificate of the hub alone: "
+            "trocar certs renew. To begin anew, move that directory away"
+        )
+    directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = _named(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])  # longer ones are refused (RFC 5280, ub-common-name)
+    signs = dict.fromkeys(("key_cert_sign", "crl_sign"), True)
+    other = ("digital_signature", "content_commitment", "key_encipherment", "data_encipherment", "key_agreement", "encipher_only", "decipher_only")
+    builder = _builder(name, name, key, datetime.now(UTC) + timedelta(days=_AUTHORITY_DAYS))
+    builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+    builder = builder.add_extension(x509.KeyUsage(**signs, **dict.fromkeys(other, False)), critical=True)
+    _write(key_file, _key_pem(key))
+    _write(certificate_file, builder.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM))
+    return _issue(directory, HUB, days, hosts)
+
+
+def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
+    """Replace the hub's certificate, for `hosts` or (if empty) those of the present one; return its file.
+
+    Raises ConnectError if the present one says nothing about that: it is not there, or not valid any more.
+    """
+    if not hosts:
+        try:
+            hosts = examine(load(HUB, directory)).hosts
+        except ConnectError as error:
+            raise ConnectError(f"the hub's names cannot be taken from its present certificate; give them: trocar certs renew HOST ... ({error})") from error
+    return _issue(directory, HUB, days, hosts)
+
+
+def issue(directory: Path, name: str, days: float) -> Path:
+    """Make a certificate for the participant `name`, `observer` or `console`, in place of an older one; return its file, which is all the other machine needs.
+
+    Raises ScenarioError if nobody can have that name, ConnectError if `directory` has no authority.
+    """
+    if not valid_name(name) or name in (HUB, "ca"):
+        whose = f"the name of a participant that the scenario places with 'host: remote', '{OBSERVER}', or '{CONSOLE}' for ROS programs"
+        raise ScenarioError(f"'{name}' cannot have a certificate: give {whose}")
+    return _issue(directory, name, days)
+
+
+def names_of_this_machine() -> list[str]:
+    """Return the names and addresses by which other machines may reach this one."""
+    names = {socket.gethostname(), socket.getfqdn(), "localhost"}
+    with suppress(OSError):
+        names |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None)}
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(("192.0.2.1", 9))  # an address of nobody (RFC 5737): nothing is sent, only which of ours is on the way there is wanted
+        names.add(probe.getsockname()[0])
+    return sorted(name for name in names if "%" not in name)  # an address that holds for one network card only
+
+
+def _issue(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -> Path:
+    authority_key, authority = _authority(directory)
+    key = ec.generate_private_key(ec.SECP256R1())
+    until = min(datetime.now(UTC) + timedelta(days=days), authority.not_valid_after_utc)
+    purpose = ExtendedKeyUsageOID.SERVER_AUTH if name == HUB else ExtendedKeyUsageOID.CLIENT_AUTH
+    builder = _builder(_named(name), authority.subject, key, until)
+    builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+    builder = builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+    if hosts:
+        builder = builder.add_extension(x509.SubjectAlternativeName([_host(host) for host in hosts]), critical=False)
+    file = directory / f"{name}.pem"
+    file.unlink(missing_ok=True)
+    chain = builder.sign(authority_key, hashes.SHA256()), authority
+    _write(file, _key_pem(key) + b"".join(certificate.public_bytes(Encoding.PEM) for certificate in chain))
+    return file
+
+
+def _authority(directory: Path) -> tuple[ec.EllipticCurvePrivateKey, x509.Certificate]:
+    try:
+        key = load_pem_private_key((directory / "ca.key").read_bytes(), None)
+        certificate = x509.load_pem_x509_certificate((directory / "ca.pem").read_bytes())
+    except (OSError, ValueError) as error:
+        raise ConnectError(f"{directory} has no authority that can be read ({error}). To make one, on the hub's machine: trocar certs init") from error
+    if not isinstance(key, ec.EllipticCurvePrivateKey) or certificate.public_key() != key.public_key():
+        raise ConnectError(f"{directory / 'ca.key'} is not the key of {directory / 'ca.pem'}")
+    return key, certificate
+
+
+def _builder(subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, until: datetime) -> x509.CertificateBuilder:
+    return x509.CertificateBuilder(issuer, subject, key.public_key(), x509.random_serial_number(), datetime.now(UTC) - _SKEW, until)
+
+
+def _named(name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+
+
+def _host(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ip_address(host))
+    except ValueError:
+        return x509.DNSName(host)
+
+
+def _key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+
+
+def _write(file: Path, content: bytes) -> None:
+    """Write a new file that only its owner may read."""
+    with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as out:
+        out.write(content)

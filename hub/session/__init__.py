@@ -1,0 +1,1 @@
+"""One session: its clock, its members, its beginning and its end."""

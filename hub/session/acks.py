@@ -1,0 +1,79 @@
+"""What stepped participants of other processes report to the hub: acks of grants, and failures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+
+import zenoh
+from zenoh.handlers import FifoChannel
+
+from hub.planning.plan import Member, Plan
+from hub.transport.refusals import Drops
+from schemas.errors import MessageError, ParticipantError
+from schemas.keys import Keys
+from schemas.lockstep import Permission, Report, unpack_report
+
+__all__ = ["Accepted", "Acks"]
+
+Accepted = tuple[Member, Report, bytes]
+"""Who reports what, and the bytes of it."""
+
+_NO_STEPS: Mapping[str, int] = {}
+
+
+class Acks:
+    """The acks of one run. Whatever is none of it is dropped and counted."""
+
+    def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, drops: Drops) -> None:
+        self._session, self._key, self._run, self._drops = session, keys.ack("hub"), run, drops
+        self._members = {keys.ack(name): plan.members[name] for name in plan.order}
+        self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
+
+    def receive(self, waiting: Sequence[str], grant: Permission, steps: Mapping[str, int]) -> Accepted | None:
+        """Wait for a message, and return it if it is a valid report of one of `waiting` on `grant`, in which participants take `steps`.
+
+        Raises ParticipantError if it reports a failure. Returns None for anything else, and when `wake` was called.
+        """
+        return self._accept(self._subscriber.recv(), waiting, grant.step, steps)
+
+    def ready(self, waiting: Sequence[str]) -> str | None:
+        """Return which of `waiting` has reported to be ready, if a message of one is here; raises ParticipantError."""
+        sample = self._subscriber.try_recv()
+        accepted = None if sample is None else self._accept(sample, waiting, -1, _NO_STEPS)
+        return None if accepted is None else accepted[0].name
+
+    def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], step: int, steps: Mapping[str, int]) -> Accepted | None:
+        key = str(sample.key_expr)
+        if key == self._key and not sample.payload:
+            return None
+        try:
+            member = self._members.get(key)
+            if member is None:
+                raise MessageError("belongs to no participant of this run")
+            payload = sample.payload.to_bytes()
+            count = steps.get(member.name, 0)
+            report = unpack_report(payload, count, count * len(member.bonds))
+            if report.run != self._run:
+                raise MessageError(f"belongs to run {report.run:x}, this is run {self._run:x}")
+            if report.error:
+                raise ParticipantError(member.name, report.step, report.error)
+            if member.name not in waiting or report.step != step:
+                raise MessageError(f"reports on step {report.step}, for which nobody waits")
+        except MessageError as error:
+            self._drops.count(sample, error)
+            return None
+        return member, report, payload
+
+    def raise_failure(self) -> None:
+        """Raise the failure that a participant has reported in its own words, if there is one among what is here."""
+        while (sample := self._subscriber.try_recv()) is not None:
+            member = self._members.get(str(sample.key_expr))
+            with suppress(MessageError):
+                report = unpack_report(sample.payload.to_bytes(), 0, 0)
+                if member is not None and report.run == self._run and report.error:
+                    raise ParticipantError(member.name, report.step, report.error)
+
+    def wake(self) -> None:
+        """Make `receive` return."""
+        self._session.put(self._key, b"")

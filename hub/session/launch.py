@@ -1,0 +1,85 @@
+"""From a scenario to a session that is ready to run."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import distributions
+from pathlib import Path
+from time import time_ns
+from typing import Any
+
+from hub.participant import Device, Params, Stepped
+from hub.planning import registry
+from hub.planning.file_hashes import file_hashes
+from hub.planning.plan import Plan
+from hub.planning.scenario_file import ScenarioFile
+from hub.planning.wiring import make_plan
+from hub.security.access import access_settings
+from hub.security.credentials import HUB, examine, load
+from hub.security.gate import Gate
+from hub.session.session import Session
+from schemas.scenario import Scenario
+
+__all__ = ["in_one_host", "launch", "plan_of"]
+
+
+def plan_of(scenario: Scenario, params: Mapping[str, Params]) -> tuple[Plan, dict[str, Stepped | Device]]:
+    """Return the wiring of `scenario`, and its participants as they declare themselves; raises ScenarioError."""
+    kinds = {name: spec.kind for name, spec in scenario.participants.items()}
+    participants = {name: registry.load(kind)(name, params[name]) for name, kind in kinds.items()}
+    return make_plan(scenario, participants, {name: registry.find(kind).role for name, kind in kinds.items()}), participants
+
+
+def in_one_host(scenario: Scenario) -> Scenario:
+    """Return `scenario` with every participant in the hub's own process."""
+    participants = {name: spec.model_copy(update={"host": "hub"}) for name, spec in scenario.participants.items()}
+    return scenario.model_copy(update={"participants": participants})
+
+
+def launch(
+    loaded: ScenarioFile,
+    *,
+    endpoint: str | None = None,
+    outside: Sequence[str] = (),
+    certificates: Path | None = None,
+    record: Path | None = None,
+    one_host: bool = False,
+) -> Session:
+    """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
+
+    `outside`: where other machines may join by TLS, with the hub's certificate; that is looked for in `certificates`, by default in this user's directory.
+    """
+    scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
+    plan, participants = plan_of(scenario, loaded.params)
+    here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
+    directory = loaded.source.directory
+    attachments = {} if record is None else _attachments(scenario, plan, loaded)
+    foreign = {name: p.foreign_keys for name, p in participants.items() if isinstance(p, Device) and p.foreign_keys}
+    gate = _gate(outside, certificates, access_settings(plan, scenario.name, foreign)) if outside else None
+    return Session(scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments)
+
+
+def _gate(endpoints: Sequence[str], certificates: Path | None, access: dict[str, Any]) -> Gate:
+    """Return a gate with rules of `access`; raises ConnectError if the hub has no valid certificate."""
+    credentials = load(HUB, certificates)
+    examine(credentials)
+    return Gate(endpoints, credentials.listening() | access)
+
+
+def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:
+    """Return what a recording needs to be understood and re-simulated elsewhere."""
+    source = loaded.source
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}
+    read_here = [params for name, params in loaded.params.items() if scenario.participants[name].host != "remote"]
+    origin = {"directory": str(source.directory), "overrides": sorted(set(source.overrides.values())), "started_ns": time_ns()}
+    return {
+        "scenario.yaml": source.file.read_bytes(),
+        "scenario.json": scenario.model_dump_json(indent=2).encode(),
+        "plan.json": plan.model_dump_json(indent=2).encode(),
+        "origin.json": json.dumps(origin, indent=2).encode(),
+        "files.json": json.dumps(file_hashes(read_here, source.directory), indent=2).encode(),
+        "versions.json": json.dumps(versions, indent=2).encode(),
+    }

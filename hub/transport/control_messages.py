@@ -1,0 +1,73 @@
+"""Requests and replies of the control queryables: `std_msgs/String` messages that hold JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from hub.planning.plan import Plan
+from schemas.ports import BondSide
+
+__all__ = ["ClockReply", "Empty", "JoinReply", "JoinRequest", "Refusal", "SetRequest", "StepRequest"]
+
+class _Json(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Empty(_Json):
+    """Nothing to say."""
+
+
+class Refusal(_Json):
+    """The reply to a request that is refused."""
+
+    refused: str
+
+
+class StepRequest(_Json):
+    """Take this many steps, then pause."""
+
+    steps: int = Field(default=1, ge=1)
+
+
+class SetRequest(_Json):
+    """Write `value` to an input that nothing feeds: numbers for a vector, else the message as JSON."""
+
+    participant: str
+    port: str
+    value: Any
+
+
+class JoinRequest(_Json):
+    """A host process presents itself (first request), and says that its participants are configured (second)."""
+
+    host: str
+    pid: int
+    ready: bool = False
+    bonds: dict[str, tuple[BondSide, ...]] = {}
+    failed: str = ""
+    """Why the host cannot go on: `participant: cause`."""
+
+
+class ClockReply(_Json):
+    """What time it is by the hub's monotonic clock: when the question came, and when the answer went."""
+
+    received_ns: int
+    replied_ns: int
+
+
+class JoinReply(_Json):
+    """All that a host needs to make its participants."""
+
+    session: str
+    run: int
+    admission: int
+    """Counts the hosts that were let in: a device's samples carry it, so that those of a host before it are known."""
+    plan: Plan
+    """For another machine, the part of it that concerns the host."""
+    params: dict[str, dict[str, Any]]
+    directory: str
+    watched: list[tuple[str, str]]
+    """Outputs, as participant and port, whose every value the hub wants: for a recording or a measure."""
+

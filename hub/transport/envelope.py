@@ -1,0 +1,68 @@
+"""The attachments of values and samples on Zenoh: which run and step they belong to, and when they were sent."""
+
+from __future__ import annotations
+
+import struct
+from time import monotonic_ns
+from typing import NamedTuple
+
+import zenoh
+
+from schemas.errors import MessageError
+
+__all__ = ["Stamp", "Tag"]
+
+_TAG = struct.Struct("<QIqqHHq")
+
+
+_STAMP = struct.Struct("<QQq")
+
+
+class Tag:
+    """The attachment of every value.
+
+    Run, epoch, step in which it was computed, time it is valid at, index and count of an event batch, and when it was published (by the
+    monotonic clock of its host).
+    """
+
+    __slots__ = ("count", "epoch", "index", "run", "sent_ns", "step", "time_ns")
+
+    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int, sent_ns: int) -> None:
+        self.run, self.epoch, self.step, self.time_ns, self.index, self.count, self.sent_ns = run, epoch, step, time_ns, index, count, sent_ns
+
+    @staticmethod
+    def pack(run: int, epoch: int, step: int, time_ns: int, index: int = 0, count: int = 1) -> bytes:
+        """Return the bytes of a tag of a value that is published now."""
+        return _TAG.pack(run, epoch, step, time_ns, index, count, monotonic_ns())
+
+    @classmethod
+    def of(cls, sample: zenoh.Sample) -> Tag:
+        """Return the tag of `sample`; raises MessageError if it has none."""
+        raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(raw) != _TAG.size:
+            raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {_TAG.size}")
+        return cls(*_TAG.unpack(raw))
+
+
+class Stamp(NamedTuple):
+    """The attachment of every sample of a device."""
+
+    admission: int
+    """The hub counts the hosts that it lets join; a device that joined anew begins to count its samples anew."""
+    sequence: int
+    """Counts the samples of one port."""
+    sent_ns: int
+    """When the device had it, by the clock of the device: the monotonic clock of its host, or simulated time."""
+
+    def pack(self) -> bytes:
+        """Return the bytes of a stamp."""
+        return _STAMP.pack(*self)
+
+    @classmethod
+    def of(cls, sample: zenoh.Sample) -> Stamp:
+        """Return the stamp of `sample`; raises MessageError if it has none."""
+        raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(raw) != _STAMP.size:
+            raise MessageError(f"attachment of {len(raw)} bytes, a device's sample has {_STAMP.size}")
+        return cls(*_STAMP.unpack(raw))
+

@@ -1,0 +1,42 @@
+"""Values of one port to CDR and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hub.participant import Value
+from schemas.codec import decode, encode, message_type
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.vectors import VectorCodec, has_vector
+
+__all__ = ["PortCodec"]
+
+class PortCodec:
+    """Values of one port to CDR and back, whatever its type."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self.is_event = port.variability == "event"
+        self.vector = VectorCodec(port) if has_vector(port.type) and not self.is_event else None
+        self._model = message_type(port.type)
+
+    def encode(self, value: Any, time_ns: int) -> bytes:
+        """Return one vector or message as CDR."""
+        return self.vector.encode(value, time_ns) if self.vector is not None else encode(value)
+
+    def decode(self, payload: bytes) -> Any:
+        """Return the vector or message in `payload` written by a `PortCodec` of the same port; raises MessageError."""
+        return self.vector.decode(payload) if self.vector is not None else decode(self._model, payload)
+
+    def accept(self, payload: bytes) -> Any:
+        """Return the vector or message in `payload` written by anybody (joints in any order, frame left out); raises MessageError."""
+        if self.vector is not None and self.vector.fits(payload):
+            return self.vector.decode(payload)
+        message = decode(self._model, payload)
+        return self.vector.from_message(message) if self.vector is not None else message
+
+    def batch(self, value: Value) -> tuple[Message, ...]:
+        """Return the messages of an event port's value."""
+        return value if isinstance(value, tuple) else ()
+

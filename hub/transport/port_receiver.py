@@ -1,0 +1,77 @@
+"""Receives the values of an output port of another process from Zenoh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import zenoh
+from zenoh.handlers import FifoChannel
+
+from hub.transport.cells import INITIAL
+from hub.transport.envelope import Tag
+from hub.transport.port_codec import PortCodec
+from hub.transport.refusals import Drops
+from schemas.errors import MessageError
+from schemas.message import Message
+from schemas.ports import Port
+
+__all__ = ["PortReceiver"]
+
+class PortReceiver:
+    """Receives the values of one output port of another process, in order; invalid and foreign messages are dropped and counted."""
+
+    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, drops: Drops) -> None:
+        self._codec = PortCodec(port)
+        self._run = run
+        self._drops = drops
+        self._newest = self._batch_step = INITIAL - 1
+        self._batch: tuple[Message, ...] = ()
+        self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
+
+    def receive(self) -> tuple[int, Any]:
+        """Wait for the next valid value and return it with its tag's step."""
+        while True:
+            arrived = self._accept(self._subscriber.recv())
+            if arrived is not None:
+                return arrived
+
+    def poll(self) -> tuple[int, Any] | None:
+        """Return the next valid value if one is here."""
+        while (sample := self._subscriber.try_recv()) is not None:
+            arrived = self._accept(sample)
+            if arrived is not None:
+                return arrived
+        return None
+
+    def _accept(self, sample: zenoh.Sample) -> tuple[int, Any] | None:
+        try:
+            tag = Tag.of(sample)
+            if tag.run != self._run:
+                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
+            if tag.step <= self._newest:
+                if tag.step == INITIAL:
+                    return None  # it is sent until every host has it
+                raise MessageError(f"the value of step {tag.step} has been here already")
+            payload = sample.payload.to_bytes()
+            value = self._batched(tag, payload) if self._codec.is_event else self._codec.decode(payload)
+        except MessageError as error:
+            self._drops.count(sample, error)
+            return None
+        if value is None:
+            return None
+        self._newest = tag.step
+        return tag.step, value
+
+    def _batched(self, tag: Tag, payload: bytes) -> tuple[Message, ...] | None:
+        """Put an event to those of the same step; return them once they are all here."""
+        batch = self._batch if tag.step == self._batch_step else ()
+        if tag.index != len(batch):
+            raise MessageError(f"event {tag.index} of step {tag.step} comes where event {len(batch)} is due")
+        events = (self._codec.decode(payload),) if payload or tag.count else ()
+        self._batch_step, self._batch = tag.step, (*batch, *events)
+        return self._batch if tag.index + 1 >= tag.count else None
+
+    def close(self) -> None:
+        """Stop receiving."""
+        self._subscriber.undeclare()
+

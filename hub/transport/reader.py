@@ -1,0 +1,78 @@
+"""How an input is read from the cell of its source, and what a device that follows the clock is fed from such readings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hub.participant import Value
+from hub.transport.cells import INITIAL, Cell
+from hub.transport.port_codec import PortCodec
+from schemas.message import Message
+from schemas.ports import Port
+
+__all__ = ["Feed", "Reader", "as_messages"]
+
+Messages = Callable[[Any, int], tuple[Message, ...]]
+"""Takes a value and the time (ns) at which it is valid."""
+
+
+@dataclass(slots=True)
+class Reader:
+    """An input port, the cell that feeds it, and how it is read."""
+
+    port: str
+    cell: Cell
+    fresh: bool
+    linear: bool
+    messages: Messages | None
+    """For an event port: what makes its messages of a value of the source; None for a signal."""
+    stride_s: float
+    seen: int = INITIAL
+
+    def events(self, step: int, step_ns: int) -> list[tuple[int, Message]]:
+        """Return what is new to an event port in `step`, oldest first, each with the time (ns) at which it is valid."""
+        if self.messages is None:
+            raise ValueError(f"'{self.port}' is a signal")
+        cell, tag = self.cell, self.cell.tag(step, fresh=self.fresh)
+        arrived: list[tuple[int, Message]] = []
+        while self.seen < tag:
+            self.seen = cell.after(self.seen)
+            time_ns = cell.valid_from(self.seen) * step_ns
+            arrived.extend((time_ns, message) for message in self.messages(cell.get(self.seen), time_ns))
+        return arrived
+
+
+class Feed:
+    """What one device that follows the clock is written: at a communication point, what all participants had computed by then."""
+
+    def __init__(self, readers: Sequence[Reader], step_ns: int) -> None:
+        """Take the readers of the device's connected inputs."""
+        self._events = [reader for reader in readers if reader.messages is not None]
+        self._signals = [reader for reader in readers if reader.messages is None]
+        self._newest = {reader.port: INITIAL - 1 for reader in self._signals}
+        self._step_ns = step_ns
+
+    def due(self, step: int) -> Iterator[tuple[str, int, Value]]:
+        """Yield port, time (ns) at which it is valid and value: every event, and the newest value of each signal that has a new one."""
+        for reader in self._signals:
+            tag = reader.cell.tag(step, fresh=False)
+            if tag > self._newest[reader.port]:
+                self._newest[reader.port] = tag
+                yield reader.port, reader.cell.valid_from(tag) * self._step_ns, reader.cell.get(tag)
+        for reader in self._events:
+            for time_ns, message in reader.events(step, self._step_ns):
+                yield reader.port, time_ns, message
+
+
+def as_messages(source: Port, target: Port) -> Messages | None:
+    """Return what makes the messages of an event port `target` of a value of `source`; None if the target is a signal."""
+    if target.variability == "signal":
+        return None
+    if source.variability == "event":
+        return lambda value, _: value
+    codec = PortCodec(source.filled_from(target)).vector
+    if codec is None:
+        return lambda value, _: (value,)
+    return lambda value, time_ns: (codec.to_message(value, time_ns),)

@@ -1,0 +1,51 @@
+"""Opens Zenoh sessions, all with the same settings."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import zenoh
+
+from schemas.errors import ConnectError
+
+__all__ = ["LEASE_MS", "open_session"]
+
+LEASE_MS = 10_000
+"""A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
+
+
+_EVENT_BATCHES = 16
+"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures. With its default, two, the second picture of a stereo pair was dropped now and
+then while the first one was on its way."""
+
+
+def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = (), security: Mapping[str, Any] | None = None) -> zenoh.Session:
+    """Open a Zenoh session that scouts for nobody: it listens and connects where it is told to.
+
+    `security`: Zenoh's settings of TLS and of access, as `hub.security.credentials` and `hub.security.access` make them.
+
+    Raises ConnectError if an endpoint cannot be opened or reached.
+    """
+    config = zenoh.Config()
+    settings: dict[str, Any] = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "listen/endpoints": list(listen),
+        "connect/endpoints": list(connect),
+        "connect/timeout_ms": 5000,
+        "connect/exit_on_failure": True,
+        "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/queue/size/interactive_high": _EVENT_BATCHES,
+        "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
+        **(security or {}),
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        where = f"listen on {', '.join(listen)}" if listen else f"reach {', '.join(connect)}"
+        raise ConnectError(f"cannot {where}: {error}") from error
+

@@ -1,0 +1,121 @@
+"""Links of a ROS 1 node to those that publish, without a master and without ROS: which messages count as kept from before, and programs that go wrong."""
+
+import socket
+import threading
+from contextlib import contextmanager
+from queue import Queue
+
+import pytest
+
+from devices.ros.ros1 import subscription as ros1_subscription
+from devices.ros.ros1.api import Answer, ProgramServer, said
+from devices.ros.ros1.transport import Ros1Transport
+from devices.ros.topics.row import Row
+from schemas.codec import encode
+from schemas.ros import StringMessage
+from tests.devices.ros.rospy_peer import until
+from tests.hub.authorities import free_port
+
+TOPIC, WORD = "/PSM1/set_tool_type", StringMessage.ros_type
+LATCHED, HEARD = Row(TOPIC, WORD, "publish", latched=True), Row(TOPIC, WORD, "subscribe")
+
+
+@contextmanager
+def node(name):
+    transport = Ros1Transport(f"http://127.0.0.1:{free_port()}", name, "127.0.0.1")
+    try:
+        yield transport
+    finally:
+        transport.close()
+
+
+@pytest.fixture
+def listening(monkeypatch):
+    """A node that listens, and a queue of when its senders were connected (0: what they say is meant now)."""
+    monkeypatch.setattr(ros1_subscription, "_SOONEST_S", 0.05)
+    with node("/listener") as listener:
+        linked = Queue()
+        listener.subscribe(HEARD, lambda payload, client, /, *, linked_ns=0: linked.put(linked_ns))
+        yield listener, linked
+
+
+@pytest.fixture
+def publisher():
+    with node("/publisher") as it:
+        yield it
+
+
+def say(publisher):
+    publisher.advertise(LATCHED)(encode(StringMessage(data="400006")))
+
+
+def is_told_of(listener, *uris, by_answer=False):
+    listener._subscriptions.update(TOPIC, uris, there_before=by_answer)
+
+
+def test_one_that_comes_later_means_what_it_has_kept(listening, publisher):
+    listener, linked = listening
+    is_told_of(listener, by_answer=True)
+    say(publisher)
+    is_told_of(listener, publisher._server.uri)
+    assert linked.get(timeout=5.0) == 0
+
+
+@pytest.mark.parametrize("by_answer", [True, False])
+def test_one_that_may_have_been_there_before_does_not(listening, publisher, by_answer):
+    listener, linked = listening
+    say(publisher)
+    is_told_of(listener, publisher._server.uri, by_answer=by_answer)  # False: another one has made itself known while we did
+    is_told_of(listener, publisher._server.uri, by_answer=not by_answer)
+    assert linked.get(timeout=5.0) > 0
+
+
+def test_one_that_was_not_reached_at_first_does_not(listening, publisher):
+    listener, linked = listening
+    is_told_of(listener, by_answer=True)
+    is_told_of(listener, publisher._server.uri)  # and does not publish it yet
+    assert until(lambda: any(link.delay for links in listener._subscriptions._links.values() for link in links.values()))
+    say(publisher)
+    assert linked.get(timeout=5.0) > 0
+
+
+NOWHERE = [["TCPROS", "127.0.0.1"], ["TCPROS", "127.0.0.1", 70000], ["TCPROS", 5, 5], ["TCPROS", "a" * 300, 5], 0]
+
+
+@pytest.mark.parametrize("answer", [*(said(place) for place in NOWHERE), Answer(0, "", 0), "none"], ids=repr)
+def test_one_that_names_no_place_is_asked_again(listening, answer):
+    listener, _ = listening
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        answers = iter([answer])
+        program = ProgramServer("127.0.0.1", {"requestTopic": lambda *_: next(answers, said(["TCPROS", *server.getsockname()]))})
+        try:
+            is_told_of(listener, program.uri)
+            server.settimeout(5.0)
+            server.accept()[0].close()
+        finally:
+            program.close()
+
+
+@pytest.mark.parametrize("uri", ["rosrpc://127.0.0.1:5/", "http://[::1:5/", "", "nowhere"])
+def test_an_address_that_is_none_leaves_no_thread(listening, uri):
+    listener, _ = listening
+    is_told_of(listener, uri)
+    assert until(lambda: any(link.delay for link in listener._subscriptions._links[uri].values())), "it is tried again"
+    is_told_of(listener)
+    assert until(lambda: uri not in listener._subscriptions._links)
+    assert until(lambda: not any(thread.name == f"ROS 1 {uri}" for thread in threading.enumerate()))
+
+
+def test_a_failure_nobody_thought_of_is_not_made_again_with_the_same_bytes(listening, publisher, caplog):
+    listener, _ = listening
+    taken = []
+
+    def fail(payload, client, /, *, linked_ns=0):
+        taken.append(payload)
+        raise RuntimeError("unthought of")
+
+    listener.subscribe(HEARD, fail)
+    say(publisher)
+    is_told_of(listener, publisher._server.uri)
+    assert until(lambda: len(taken) == 2), "connected again, and told the last message again"
+    assert caplog.text.count("RuntimeError: unthought of") == 2

@@ -1,0 +1,131 @@
+"""The model's equations of motion: against the identified ones, their energy, gravity compensation, and where a servo comes to rest."""
+
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from engines.mujoco.engine import MujocoEngine
+from engines.mujoco.model import build
+from engines.mujoco.model.dynamics import dynamics
+from engines.mujoco.params import MujocoParams, SceneParams
+from hub.participant import Inputs, Setup
+from robots import rotation
+from robots.dvrk.dynamics import of_ecm, of_psm
+from robots.dvrk.instruments import instrument
+
+REFERENCE = json.loads((Path(__file__).parents[2] / "robots" / "data" / "reference_dynamics.json").read_text())
+NEEDLE_DRIVER = "LARGE_NEEDLE_DRIVER_400006"
+TILTS = [np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.2, -0.4, 0.1, 0.889])]
+
+
+def tilted(arm, tilt, **params):
+    orientation = (tilt / np.linalg.norm(tilt)).tolist()
+    return {"arms": {arm: {"orientation": orientation, **params}}, "looks": False}
+
+
+@pytest.mark.parametrize("case", REFERENCE["cases"][:6] + REFERENCE["cases"][-3:], ids=lambda case: str(case["q"]))
+def test_the_model_has_the_identified_dynamics(case):
+    found = dynamics("PSM1", NEEDLE_DRIVER, case["q"], [0.0] * 6)
+    assert np.allclose(found.inertia[:3, :3], case["inertia"], rtol=0.0, atol=0.05 * np.max(case["inertia"]))
+    assert np.allclose(found.gravity[:3], case["gravity"], rtol=0.0, atol=0.05 * np.max(np.abs(case["gravity"])))
+    if "elastic" in case:
+        assert np.allclose(found.elastic[:4], case["elastic"], atol=1e-6)
+
+
+@pytest.mark.parametrize("arm", ["PSM1", "ECM"])
+def test_the_model_moves_as_the_closed_form_says(arm):
+    """Two ways to the same numbers: MuJoCo's tree with its linkage, and the sum over displacements."""
+    q = np.array([0.4, -0.5, 0.13, 0.7, 0.3, -0.6])[: 4 if arm == "ECM" else 6]
+    closed = of_ecm() if arm == "ECM" else of_psm(instrument(NEEDLE_DRIVER))
+    found = dynamics(arm, "straight" if arm == "ECM" else NEEDLE_DRIVER, q.tolist(), [0.0] * q.size)
+    assert np.allclose(found.inertia, closed.inertia_matrix(q), atol=1e-6)
+    assert np.allclose(found.gravity, closed.gravity(q), atol=1e-5)
+
+
+class Run:
+    """An engine with one arm, stepped by hand."""
+
+    def __init__(self, arm, scene):
+        self.arm = arm
+        self.engine = MujocoEngine("robot", MujocoParams.model_validate(scene))
+        self.outputs = self.engine.configure(Setup(period_ns=1_000_000, directory=Path(), bonds={}))
+        starts = {port.name: np.array(port.start, float) for port in self.engine.ports if port.causality == "input"}
+        self.command, self.mode = starts[f"{arm}/servo_jp"], starts[f"{arm}/control_mode"]
+        self.inputs, self.t = Inputs(starts), 0
+
+    def steps(self, count):
+        for _ in range(count):
+            self.outputs = self.engine.step(self.t, 1_000_000, self.inputs)
+            self.t += 1_000_000
+        return self
+
+    @property
+    def q(self):
+        return self.outputs[f"{self.arm}/measured_js"][: self.command.size].copy()
+
+
+@pytest.mark.parametrize("tilt", TILTS, ids=str)
+@pytest.mark.parametrize(("arm", "start"), [("PSM1", [-0.054, -0.2134, 0.2, -1.52, 0.2, -0.4]), ("ECM", [0.5, 0.8, 0.1, 0.4])])  # springs at rest
+def test_gravity_compensation_holds_the_arm_however_its_base_stands(arm, start, tilt):
+    run = Run(arm, tilted(arm, tilt, start=start))
+    run.mode[:] = [2.0, 2.0]
+    run.steps(5)
+    before = run.q
+    run.steps(300)
+    assert np.allclose(run.q, before, atol=1e-6)
+
+
+@pytest.mark.parametrize("arm", ["PSM1", "ECM"])
+def test_without_torque_the_arm_sinks_unless_it_has_brakes(arm):
+    start = [0.0, 0.3, 0.1, 0.0, 0.0, 0.0] if arm == "PSM1" else [0.0, 0.3, 0.1, 0.0]
+    run = Run(arm, tilted(arm, np.array([0.0, 0.7, 0.0, 0.7]), start=start))
+    run.mode[:] = 0.0
+    run.steps(400)
+    assert (np.abs(run.q - start).max() > 1e-2) == (arm == "PSM1")
+
+
+@pytest.mark.parametrize("goal", [[0.5, -0.4, 0.2, 1.0, 0.5, -0.4], [-1.2, 0.8, 0.05, -2.0, -0.6, 0.7], [0.05, 0.02, 0.11, 0.05, 0.02, 0.03]], ids=str)
+def test_the_servo_comes_to_rest_where_it_is_told(goal):
+    run = Run("PSM1", tilted("PSM1", TILTS[1], instrument=NEEDLE_DRIVER))
+    start, goal, seconds = run.q, np.array(goal), 2.0
+    for i in range(int(seconds * 1000)):
+        s = (i + 1) / (seconds * 1000)
+        run.command[:] = start + (goal - start) * s**3 * (10 - 15 * s + 6 * s**2)
+        run.steps(1)
+    run.steps(500)
+    error = np.abs(run.q - goal)
+    assert error[2] < 0.05e-3
+    assert np.delete(error, 2).max() < np.radians(0.05)
+
+
+def test_a_free_arm_without_friction_keeps_its_energy():
+    model = build(SceneParams.model_validate({"arms": {"PSM1": {"instrument": NEEDLE_DRIVER}}, "looks": False}), 1e-4)
+    model.dof_damping[:] = model.dof_frictionloss[:] = model.tendon_damping[:] = model.tendon_frictionloss[:] = 0.0
+    model.actuator_gainprm[:] = model.actuator_biasprm[:] = model.body_gravcomp[:] = 0.0
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    start = data.energy.copy()
+    kinetic = 0.0
+    for _ in range(4000):
+        mujoco.mj_step(model, data)
+        kinetic = max(kinetic, float(data.energy[1]))
+    assert kinetic > 0.005  # J: it does move
+    assert abs(data.energy.sum() - start.sum()) < 0.02 * kinetic
+
+
+def test_the_wrist_of_a_tilted_base_feels_gravity_turned():
+    tilt = TILTS[2] / np.linalg.norm(TILTS[2])
+    model = build(SceneParams.model_validate(tilted("PSM1", tilt, instrument=NEEDLE_DRIVER)))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    names = [f"PSM1/{name}" for name in ("yaw", "pitch", "insertion", "counterweight", "pitch_back", "pitch_front", "pitch_bottom", "pitch_top")]
+    follow = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [0, 1, 0], [0, 1, 0], [0, -1, 0], [0, -1, 0]])
+    found = follow.T @ [data.qfrc_bias[int(model.joint(name).dofadr[0])] for name in names]
+    pull = rotation.matrix(tilt).T @ [0.0, 0.0, -9.81]
+    assert np.allclose(found, of_psm(instrument(NEEDLE_DRIVER)).gravity(np.zeros(6), pull)[:3], atol=1e-4)

@@ -1,0 +1,181 @@
+"""Devices of the wall clock, in the hub's process, in another one, and lost on the way."""
+
+import subprocess
+import sys
+import threading
+from time import sleep
+
+import pytest
+
+from hub.recording.recording import Recording
+from hub.remote.live_sessions import live_sessions
+from hub.verify import verify
+from schemas.errors import ParticipantError
+
+SCENARIO = """\
+name: hand
+step: 1 ms
+pace: realtime
+duration: 60 s
+participants:
+  player: {kind: "toys:Player", clock: wall, max_age_ms: 60, period: 2 ms}
+  deaf: {kind: "toys:Deaf"}
+connections:
+  - player.hand -> deaf.hand
+  - player.buttons -> deaf.buttons
+measure:
+  fresh_steps: {kind: final, of: deaf.fresh_steps, live: true}
+  pressed: {kind: final, of: deaf.pressed, live: true}
+"""
+
+
+def until(session, enough):
+    """Return what shuts `session` down once enough has happened: of the steps, the fresh ones, the presses."""
+
+    def look(progress):
+        if enough(progress.step, *(progress.live[name][0] for name in ("fresh_steps", "pressed"))):
+            session.state.shutdown()
+
+    return look
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_samples_enter_as_they_come(prepare, host):
+    session = prepare(SCENARIO, f"participants.player.host={host}")
+    summary = session.run(until(session, lambda steps, fresh, pressed: fresh > 100 and pressed > 50))
+    assert summary.dropped_messages == 0
+    assert summary.sim_time_s < 60
+
+
+def test_a_device_that_falls_silent_is_marked_stale(prepare):
+    session = prepare(SCENARIO, "participants.player.silent_after_ms=1000")
+    summary = session.run(until(session, lambda steps, fresh, _: 0 < fresh < steps - 200))
+    assert summary.sim_time_s < 60
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+@pytest.mark.parametrize("when", ["open", "read"])
+def test_a_device_that_fails_ends_the_run(prepare, host, when):
+    with pytest.raises(ParticipantError, match=r"'player' failed.*the cable is out") as raised:
+        prepare(SCENARIO, f"participants.player.host={host}", f"participants.player.fails={when}").run()
+    assert raised.value.participant == "player"
+
+
+def test_a_remote_device_may_go_and_come_back(prepare):
+    session = prepare(SCENARIO, "participants.player.host=remote")
+    outcome, hosts, fresh_steps = [], [], [0.0]
+
+    def join():
+        command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", session.endpoint, "--session", "hand"]
+        hosts.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+
+    def wait_until(true):
+        for _ in range(300):
+            if any(true(status) for status in live_sessions([session.endpoint])):
+                return
+            sleep(0.02)
+        raise TimeoutError
+
+    def go_and_come_back():
+        try:
+            wait_until(lambda status: status.state == "starting")
+            join()
+            wait_until(lambda status: status.step > 50)
+            hosts[0].kill()
+            wait_until(lambda status: status.participants[0].pid == 0)
+            join()
+            wait_until(lambda status: status.participants[0].pid == hosts[1].pid)
+            before = fresh_steps[-1]
+            wait_until(lambda status: fresh_steps[-1] > before + 20)
+        except TimeoutError as error:
+            outcome.append(error)
+        finally:
+            session.state.shutdown()
+
+    console = threading.Thread(target=go_and_come_back)
+    console.start()
+    summary = session.run(lambda progress: fresh_steps.append(progress.live["fresh_steps"][0]))
+    console.join()
+    with pytest.raises(subprocess.TimeoutExpired):  # it waits for the next session of this name
+        hosts[1].wait(0.5)
+    hosts[1].terminate()
+    codes = [host.wait(10) for host in hosts]
+    assert outcome == []
+    assert codes == [-9, 0]
+    assert summary.state == "done"
+    assert 0 < summary.measures["fresh_steps"] < summary.steps - 60
+
+
+TOLD = """\
+name: told
+step: 1 ms
+pace: realtime
+participants:
+  talker: {kind: "toys:Talker"}
+  mixer: {kind: "toys:Mixer", out_every: 2}
+  pad: {kind: "toys:Pad"}
+connections:
+  - talker.words -> pad.words
+  - mixer.out -> pad.numbers
+"""
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_a_device_is_told_every_event_and_each_value_of_a_signal_once(prepare, tmp_path, host):
+    file = tmp_path / "told.txt"
+    session = prepare(TOLD, f"participants.pad.file={file}", f"participants.talker.host={host}")
+
+    def lines(port):
+        return [line.partition(" ")[2] for line in file.read_text().splitlines() if line.startswith(f"{port} ")]
+
+    def enough(progress):
+        if min(len(lines("words")), len(lines("numbers"))) > 20:
+            session.state.shutdown()
+
+    summary = session.run(enough)
+    assert summary.dropped_messages == 0
+    words, numbers = lines("words"), lines("numbers")
+    assert words == [f"word {i}" for i in range(len(words))]
+    assert len(numbers) == len(set(numbers)) <= 1 + summary.steps // 2
+
+
+SLOW = """\
+name: slow
+step: 2 ms
+pace: realtime
+duration: 3 s
+participants:
+  mixer: {kind: "toys:Mixer", step_ns: 2000000}
+  console: {kind: "toys:Slow"}
+connections:
+  - mixer.out -> console.numbers
+"""
+
+
+def test_a_device_that_is_slow_is_told_what_is_new_and_misses_the_rest(prepare):
+    summary = prepare(SLOW).run()
+    told = summary.latency["state to force"]["mixer.out -> console.numbers"]
+    assert told["count"] < summary.steps / 5
+    assert told["largest_s"] < 0.25 * summary.wall_time_s  # in a queue the last would have waited for nearly all of it
+
+
+@pytest.mark.parametrize("host", ["hub", "other"])
+def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connected(prepare, tmp_path, host):
+    scenario = SCENARIO.replace("  - player.buttons -> deaf.buttons\n", "") + "  x: {kind: peak-norm, of: player.hand.position}\n"
+    session = prepare(scenario, f"participants.player.host={host}", record=tmp_path / "recording")
+    summary = session.run(until(session, lambda steps, fresh, pressed: fresh > 200))
+    assert summary.dropped_messages == 0
+    assert summary.measures["x"] > 0.1 / 7
+    recording = Recording(tmp_path / "recording")
+    counts = recording.counts
+    assert counts["/device/player/out/buttons"] > 20
+    assert counts["/device/player/out/hand"] > 20
+    assert verify(recording).same
+
+
+def test_a_device_that_sends_more_than_it_may_is_held_to_it(prepare, caplog):
+    session = prepare(SCENARIO, "participants.player.rate_limit=50")
+    summary = session.run(until(session, lambda steps, fresh, pressed: steps > 1500))
+    assert summary.dropped_messages > 500
+    assert "device 'player' sends more than 50 messages/s on port 'buttons' (rate_limit)" in caplog.text
+    assert summary.measures["pressed"] < 50 * (1.0 + summary.wall_time_s) + 60

@@ -1,0 +1,229 @@
+"""One host without a network: what it asks of its participants, and what it says when they do not keep to it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hub.hosting.host import Host
+from hub.participant import Params
+from hub.testing import run_in_process
+from schemas.errors import ParticipantError, StateError
+from schemas.lockstep import Permission
+from tests.hub.parts import Part, into, out, plan_of
+
+MS = 1_000_000
+
+
+class Scripted(Part):
+    """Returns one item of a list after the other; an exception in it is raised."""
+
+    def __init__(self, name, items, *ports):
+        super().__init__(name, *ports)
+        self._items = list(items)
+        self.closed = 0
+
+    def configure(self, setup):
+        return self.step(0, 0, None)
+
+    def step(self, t, h, inputs):
+        item = self._items.pop(0)
+        if isinstance(item, Exception):
+            raise item
+        return item
+
+    def close(self):
+        self.closed += 1
+        if self.closed == 1:
+            raise OSError("stuck")
+
+
+def host_of(*parts, **scenario):
+    return Host("hub", plan_of(*parts, **scenario), {part.name: part for part in parts})
+
+
+def run(host, steps, start=0):
+    reports = []
+    host.run(Permission(1, 0, start, start * MS, (start + steps) * MS), lambda member, report: reports.append((member.name, report)))
+    return reports
+
+
+GOOD = {"out": np.zeros(2)}
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({}, "output 'out' is missing"),
+        ({"out": np.zeros(3)}, r"port 'out': float64 of shape \(3,\), expected float64 of shape \(2,\)"),
+        ({"out": np.array([0.0, np.inf])}, "not all of"),
+        ({"out": [0.0, 0.0]}, "AttributeError"),
+        (ZeroDivisionError("no mass"), "ZeroDivisionError: no mass"),
+        (StateError("no state"), "no state"),
+    ],
+)
+def test_what_is_wrong_with_an_output_is_told_with_participant_and_step(bad, message):
+    port = out(size=2)
+    with pytest.raises(ParticipantError, match=message) as raised:
+        host_of(Scripted("a", [bad], port)).configure(Path())
+    assert (raised.value.participant, raised.value.step) == ("a", -1)
+    host = host_of(Scripted("a", [GOOD, GOOD, GOOD, bad], port))
+    host.configure(Path())
+    with pytest.raises(ParticipantError, match=message) as raised:
+        run(host, 5)
+    assert (raised.value.participant, raised.value.step) == ("a", 2)
+
+
+def test_integers_are_no_vector():
+    with pytest.raises(ParticipantError, match="int64 of shape"):
+        host_of(Scripted("a", [{"out": np.zeros(2, np.int64)}], out(size=2))).configure(Path())
+
+
+def test_an_output_is_asked_for_when_it_is_due_only():
+    host = host_of(Scripted("a", [GOOD, {}, {}, GOOD, {}, {}, GOOD], out(size=2, period_ns=3 * MS)))
+    host.configure(Path())
+    assert len(run(host, 6)[0][1].state_hash) == 6
+
+
+def test_every_participant_is_closed_whatever_the_others_do(caplog):
+    parts = [Scripted(name, []) for name in "ab"]
+    host_of(*parts).close()
+    assert [part.closed for part in parts] == [1, 1]
+    assert caplog.text.count("raised while it was closed") == 2
+
+
+def test_reports_hold_the_steps_that_each_took():
+    parts = [Part("one"), Part("three")]
+    host = host_of(*parts, specs={"three": {"period": "3 ms"}})
+    host.configure(Path())
+    assert [(name, len(report.state_hash)) for name, report in run(host, 4)] == [("one", 4), ("three", 2)]
+    assert [(name, len(report.state_hash)) for name, report in run(host, 2, start=4)] == [("one", 2)]
+    assert [(name, len(report.compute_ns)) for name, report in run(host, 1, start=6)] == [("one", 1), ("three", 1)]
+    assert host.due(7, 2) == ["one"]
+    assert host.due(7, 3) == ["one", "three"]
+
+
+def test_somebody_who_keeps_the_others_waiting_is_known_by_name():
+    seen = []
+
+    class Curious(Part):
+        def step(self, t, h, inputs):
+            seen.append(host.awaited)
+            return {}
+
+    host = host_of(Curious("a"), Curious("b"))
+    host.configure(Path())
+    run(host, 2)
+    assert seen == ["a", "b", "a", "b"]
+    assert host.awaited is None
+
+
+class Ramp(Part):
+    """Gives the time (s) at the end of each step."""
+
+    params_model = Params
+
+    def __init__(self, name):
+        super().__init__(name, out(unit="s"))
+
+    def configure(self, setup):
+        self.t = np.zeros(1)
+        return {"out": self.t}
+
+    def step(self, t, h, inputs):
+        self.t[0] = (t + h) * 1e-9  # in place, as engines may
+        return {"out": self.t}
+
+
+class Probe(Part):
+    """Notes what it sees of one input."""
+
+    def __init__(self, name):
+        super().__init__(name, into(unit="s"))
+        self.seen = []
+
+    def step(self, t, h, inputs):
+        self.seen.append((inputs["in"][0], inputs.at("in", 0.5 * h * 1e-9)[0]))
+        return {}
+
+
+class Inbox(Part):
+    """Notes the messages that each of its steps finds on an event port."""
+
+    def __init__(self, name, **rest):
+        super().__init__(name, into(variability="event", **rest))
+        self.seen = []
+
+    def step(self, t, h, inputs):
+        self.seen.append(inputs.events("in"))
+        return {}
+
+
+@pytest.mark.parametrize(("algorithm", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
+@pytest.mark.parametrize(("source_ms", "target_ms"), [(1, 1), (2, 1), (1, 3), (4, 2), (2, 4)])
+def test_each_new_value_of_a_signal_is_one_message_of_an_event_port(algorithm, late, source_ms, target_ms):
+    inbox = Inbox("inbox", unit="s")
+    periods = {"ramp": {"period": f"{source_ms} ms"}, "inbox": {"period": f"{target_ms} ms"}}
+    run_in_process(
+        {"name": "ramp", "step": "1 ms", "duration": "12 ms", "algorithm": algorithm, "participants": periods, "connections": ["ramp.out -> inbox.in"]},
+        {"ramp": Ramp("ramp"), "inbox": inbox},
+    )
+    expected, told = [], 0
+    for step in range(0, 12, target_ms):
+        ready = (step if late else step + source_ms) // source_ms
+        expected.append([pytest.approx(1e-3 * source_ms * n) for n in range(told + 1, ready + 1)])
+        told = ready
+    assert [[message.data[0] for message in messages] for messages in inbox.seen] == expected
+
+
+def test_a_message_made_of_a_signal_has_stamp_frame_and_names():
+    class Arm(Part):
+        def configure(self, setup):
+            return {"out": np.array([0.0, 0.0])}
+
+        def step(self, t, h, inputs):
+            return {"out": np.array([1.0, t * 1e-9])}
+
+    joints = {"type": "sensor_msgs/msg/JointState", "names": ("x", "y")}
+    inbox = Inbox("inbox", type=joints["type"], frame="PSM1_base")
+    run_in_process(
+        {"name": "arm", "step": "1 ms", "duration": "2 ms", "connections": ["arm.out -> inbox.in"]}, {"arm": Arm("arm", out(**joints)), "inbox": inbox}
+    )
+    ((first,), (second,)) = inbox.seen
+    assert (first.name, first.header.frame_id, first.header.stamp.nanosec) == (["x", "y"], "PSM1_base", 1 * MS)
+    assert (second.position.tolist(), second.header.stamp.nanosec) == ([1.0, 1e-3], 2 * MS)
+
+
+def test_an_event_port_hears_all_of_its_sources_in_the_order_of_the_connections():
+    inbox = Inbox("inbox", unit="s")
+    scenario = {"name": "two", "step": "1 ms", "duration": "2 ms", "connections": ["slow.out -> inbox.in", "quick.out -> inbox.in"]}
+    scenario["participants"] = {"slow": {"period": "2 ms"}}
+    run_in_process(scenario, {"slow": Ramp("slow"), "quick": Ramp("quick"), "inbox": inbox})
+    assert [[message.data[0] for message in messages] for messages in inbox.seen] == [[pytest.approx(2e-3), pytest.approx(1e-3)], [pytest.approx(2e-3)]]
+
+
+@pytest.mark.parametrize(("algorithm", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
+def test_a_neighbour_in_this_process_sees_values_of_the_right_step(algorithm, late):
+    probe = Probe("probe")
+    run_in_process(
+        {"name": "ramp", "step": "1 ms", "duration": "6 ms", "algorithm": algorithm, "connections": ["ramp.out -> probe.in"]},
+        {"ramp": Ramp("ramp"), "probe": probe},
+    )
+    assert [now for now, _ in probe.seen] == pytest.approx([1e-3 * (step + 1 - late) for step in range(6)])
+
+
+def test_a_linear_connection_follows_the_source_inside_the_step():
+    probe = Probe("probe")
+    run_in_process(
+        {
+            "name": "ramp",
+            "step": "1 ms",
+            "duration": "8 ms",
+            "algorithm": "jacobi",
+            "participants": {"ramp": {"period": "2 ms"}},
+            "connections": [{"source": "ramp.out", "target": "probe.in", "extrapolation": "linear"}],
+        },
+        {"ramp": Ramp("ramp"), "probe": probe},
+    )
+    exact = [(1e-3 * step, 1e-3 * step + 0.5e-3) for step in range(8)]
+    np.testing.assert_allclose(probe.seen[2:], exact[2:], atol=1e-12)  # before its second value it can only hold

@@ -1,0 +1,25 @@
+from hub.hosting import host_processes as fleet_module
+from hub.hosting.host_processes import Fleet
+
+
+def test_hosts_may_be_started_while_the_watchdog_looks_for_dead_ones(monkeypatch):
+    fleet = Fleet()
+
+    class Process:
+        """Lives, and lets another host start at the very moment it is looked at."""
+
+        returncode = None
+
+        def __init__(self, *_, **__):
+            pass
+
+        def poll(self):
+            if "two" not in started:
+                started.append("two")
+                fleet.start("two", "tcp/127.0.0.1:1", "session")
+
+    started = ["one"]
+    monkeypatch.setattr(fleet_module.subprocess, "Popen", Process)
+    fleet.start("one", "tcp/127.0.0.1:1", "session")
+    assert fleet.dead() == {}
+    assert started == ["one", "two"]

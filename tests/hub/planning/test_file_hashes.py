@@ -1,0 +1,91 @@
+import hashlib
+from pathlib import Path
+
+import pytest
+from pydantic import Field
+
+from hub.participant import Params
+from hub.planning.file_hashes import changed_files, file_hashes
+from hub.planning.scenario_file import load
+from hub.recording.recording import Recording
+from hub.session.launch import launch
+from hub.verify import verify
+
+
+class Mesh(Params):
+    file: Path
+
+
+class Models(Params):
+    model: Path
+    meshes: dict[str, Mesh] = Field(default={})
+    more: list[Path] = Field(default=[])
+    name: str = "a.txt"
+
+
+def sha256(text):
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@pytest.fixture
+def directory(tmp_path):
+    (tmp_path / "bag").mkdir()
+    for name in ("a", "b", "unused", "bag/c"):
+        (tmp_path / f"{name}.txt").write_text(name)
+    return tmp_path.resolve()
+
+
+def test_every_path_among_the_parameters_is_hashed_once(directory):
+    params = Models(model=Path("a.txt"), meshes={"one": Mesh(file=directory / "b.txt")}, more=[Path("bag"), Path("./a.txt"), Path("missing.txt")])
+    expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c")}
+    assert file_hashes([params, params], directory) == expected
+    assert changed_files(expected) == []
+
+
+def test_what_has_changed_or_is_gone_is_named(directory):
+    hashes = file_hashes([Models(model=Path("a.txt"), more=[Path("b.txt"), Path("bag")])], directory)
+    (directory / "a.txt").write_text("other")
+    (directory / "bag/c.txt").unlink()
+    assert changed_files(hashes) == [str(directory / "a.txt"), str(directory / "bag" / "c.txt")]
+
+
+PLUGIN = """
+from pathlib import Path
+
+from hub.participant import Params, Stepped
+
+
+class ReaderParams(Params):
+    file: Path
+
+
+class Reader(Stepped):
+    params_model = ReaderParams
+    ports = ()
+
+    def configure(self, setup):
+        self.state = len((setup.directory / self.params.file).read_text())
+        return {}
+
+    def step(self, t, h, inputs):
+        return {}
+
+    def state_hash(self):
+        return self.state
+
+    def close(self):
+        pass
+"""
+
+
+def test_a_verification_tells_which_file_is_another_one_by_now(install_plugin, directory, caplog):
+    install_plugin("library", {"trocar.engines": {"reader": "library:Reader"}}, text=PLUGIN)
+    (directory / "session.yaml").write_text("{name: reading, step: 1 ms, duration: 3 ms, participants: {reader: {kind: reader, file: a.txt}}}")
+    launch(load(str(directory / "session.yaml")), record=directory / "recording").run()
+    recording = Recording(directory / "recording")
+    assert recording.files() == {str(directory / "a.txt"): sha256("a")}
+    assert verify(recording).same
+    assert "expect differences" not in caplog.text
+    (directory / "a.txt").write_text("longer")
+    assert not verify(recording).same
+    assert f"'{directory / 'a.txt'}' is not the file that was read when this was recorded" in caplog.text

@@ -1,0 +1,146 @@
+import builtins
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hub.recording.recorder import Recorder
+from hub.recording.recording import Recording
+from hub.recording.report import report
+from hub.recording.report_figures import BondTrace
+from schemas.errors import MissingExtraError, RecordingError
+from tests.hub.sample_session import ATTACHMENTS, write_session
+
+
+class Page(HTMLParser):
+    """Checks that tags are balanced, and keeps what the tests look at."""
+
+    VOID = ("meta", "link", "br", "img", "input", "hr")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words = ""
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.words += data
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory: pytest.TempPathFactory) -> str:
+    directory = tmp_path_factory.mktemp("session")
+    write_session(directory / "run", 0.5)
+    report(Recording(directory / "run"), directory / "report.html")
+    return (directory / "report.html").read_text()
+
+
+def test_one_page_that_loads_nothing(text: str) -> None:
+    page = Page(text)
+    assert not [tag for tag, _ in page.tags if tag in ("script", "link", "img", "iframe", "object")]
+    fetched = [value for _, attrs in page.tags for name, value in attrs.items() if name in ("src", "href", "xlink:href", "srcset") and value]
+    assert all(value.startswith("#") for value in fetched)
+    assert "@import" not in text
+    assert re.findall(r"url\((?!#)", text) == []
+
+
+def test_numbers_and_plots(text: str) -> None:
+    page = Page(text)
+    for word in ("palpation", "0.500 s", "peak force, robot/PSM1/probe", "energy residual", "mujoco", "4.0.0", "/engine/robot/ack"):
+        assert word in page.words
+    images = [attrs for tag, attrs in page.tags if tag == "svg"]
+    assert len(images) == 8
+    assert all(attrs["role"] == "img" and attrs["aria-label"] and attrs["viewbox"] and "width" not in attrs for attrs in images)
+    assert "3 contacts" in page.words
+
+
+def test_it_follows_the_readers_theme(text: str) -> None:
+    assert "prefers-color-scheme: dark" in text
+    assert "var(--series-0)" in text
+    assert not re.findall(r"#c0000\d|#101112|#d0d1d2", text)
+
+
+def test_words_of_a_scenario_are_no_markup(text: str) -> None:
+    assert "PSM1 &lt;and&gt; retreats" in text
+    assert "<and>" not in text
+
+
+def test_the_same_recording_gives_the_same_page(tmp_path: Path) -> None:
+    write_session(tmp_path / "run", 0.1)
+    for name in ("a.html", "b.html"):
+        report(Recording(tmp_path / "run"), tmp_path / name)
+    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
+
+
+def test_a_session_that_ended_at_once(tmp_path: Path) -> None:
+    Recorder(tmp_path / "run", attachments=ATTACHMENTS).close()
+    report(Recording(tmp_path / "run"), tmp_path / "x.html")
+    assert "communication step" in Page((tmp_path / "x.html").read_text()).words
+
+
+def test_what_cannot_be_reported(tmp_path: Path) -> None:
+    Recorder(tmp_path / "other", attachments={}).close()
+    with pytest.raises(RecordingError, match="holds no scenario"):
+        report(Recording(tmp_path / "other"), tmp_path / "x.html")
+    Recorder(tmp_path / "run", attachments=ATTACHMENTS).close()
+    with pytest.raises(RecordingError, match="cannot write the report"):
+        report(Recording(tmp_path / "run"), tmp_path / "missing" / "x.html")
+
+
+def test_without_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_session(tmp_path / "run", 0.05)
+    original = builtins.__import__
+
+    def without(name: str, *args: Any) -> Any:
+        if name.startswith("matplotlib"):
+            raise ImportError(name)
+        return original(name, *args)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(MissingExtraError, match=r"pip install 'trocar\[report\]'"):
+        report(Recording(tmp_path / "run"), tmp_path / "x.html")
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_depth_is_measured_from_first_contact_against_the_force(seed: int) -> None:
+    numbers = np.random.default_rng(seed)
+    normal = numbers.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    start = numbers.normal(size=3)
+    height = np.concatenate([np.linspace(3, -5, 81), np.linspace(-5, 3, 81)]) * 1e-3
+    trace = BondTrace("x", np.arange(162) * 1e-3, start + height[:, None] * normal, np.maximum(0, -height)[:, None] * 100 * normal)
+    first = height[np.argmax(trace.contact)]
+    assert np.allclose(trace.depth, first - height, atol=1e-12)
+    assert [s.start for s in trace.episodes()] == [int(np.argmax(trace.contact))]
+
+
+def test_contacts_are_told_apart() -> None:
+    times = np.arange(1000) * 1e-3
+    push = np.where((times > 0.1) & (times < 0.3) | (times > 0.5) & (times < 0.7), 1.0, 0.0)
+    push[200:210] = 0.0
+    trace = BondTrace("x", times, np.zeros((1000, 1)), push[:, None])
+    assert [(s.start, s.stop) for s in trace.episodes()] == [(101, 300), (501, 700)]
+
+
+def test_no_contact_at_all() -> None:
+    trace = BondTrace("x", np.arange(10.0), np.ones((10, 3)), np.zeros((10, 3)))
+    assert trace.episodes() == []
+    assert trace.depth.tolist() == [0.0] * 10

@@ -1,0 +1,178 @@
+"""What a device host that stays does when the hub or the network goes, and what a session does without its device: real processes."""
+
+import subprocess
+import sys
+import threading
+from contextlib import ExitStack, contextmanager
+from signal import SIGKILL, SIGTERM
+from time import monotonic, sleep
+
+from hub.remote.live_sessions import live_sessions
+from hub.transport.endpoints import free_endpoint
+from tests.hub.proxy import Proxy
+
+SCENARIO = """\
+name: hand
+step: 2 ms
+pace: realtime
+participants:
+  player: {kind: "toys:Player", clock: wall, max_age_ms: 100, host: remote}
+  deaf: {kind: "toys:Deaf"}
+  loud: {kind: "toys:Loud"}
+connections:
+  - loud.out -> player.noise
+  - player.hand -> deaf.hand
+  - player.buttons -> deaf.buttons
+measure:
+  fresh_steps: {kind: final, of: deaf.fresh_steps, live: true}
+"""
+
+
+class Running:
+    """A session in this process, in a thread."""
+
+    def __init__(self, session):
+        self.session = session
+        self.fresh = 0.0
+        self.summary = self.failure = None
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self):
+        try:
+            self.summary = self.session.run(lambda progress: setattr(self, "fresh", progress.live["fresh_steps"][0]))
+        except Exception as error:  # noqa: BLE001
+            self.failure = error
+
+    @property
+    def status(self):
+        """The status, as soon as the hub answers."""
+        return until(lambda: next(iter(live_sessions([self.session.endpoint])), None))
+
+    def is_followed(self):
+        """Say whether the device's samples are fresh now."""
+        before = self.fresh
+        sleep(0.4)
+        return self.fresh > before
+
+    def end(self):
+        self.session.state.shutdown()
+        self._thread.join()
+        assert self.failure is None
+
+
+def until(look, limit_s=15.0):
+    deadline = monotonic() + limit_s
+    while not (found := look()):
+        if monotonic() > deadline:
+            raise TimeoutError
+        sleep(0.05)
+    return found
+
+
+@contextmanager
+def player(endpoint, file, *more):
+    """Start `trocar device player`; its messages go to a file."""
+    command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", endpoint, "--session", "hand", *more]
+    with file.open("w") as log, subprocess.Popen(command, stderr=log) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+            assert process.wait(10) == 0
+
+
+def port(endpoint):
+    return int(endpoint.rpartition(":")[2])
+
+
+def test_a_host_outlives_the_hub_and_joins_the_next_session_of_its_name(prepare, tmp_path):
+    first = Running(prepare(SCENARIO))
+    until(lambda: first.status)
+    with player(first.session.endpoint, tmp_path / "player.log") as process:
+        until(lambda: first.is_followed())
+        first.end()
+        sleep(1.0)
+        assert process.poll() is None
+        again = prepare(SCENARIO)
+        again.endpoint = first.session.endpoint
+        second = Running(again)
+        until(lambda: second.is_followed())
+        second.end()
+    said = " ".join((tmp_path / "player.log").read_text().split())
+    assert "device 'player': the hub is gone; nothing is written to it any more, and it joins again when the hub is back" in said
+    assert said.count("takes part in session 'hand'") == 2
+
+
+def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
+    running = Running(prepare(SCENARIO))
+    until(lambda: running.status)
+    with player(running.session.endpoint, tmp_path / "player.log") as process:
+        until(lambda: running.is_followed())
+        command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", running.session.endpoint, "--session", "hand"]
+        second = subprocess.run(command, capture_output=True, text=True, timeout=30)
+        assert second.returncode == 1
+        assert f"host 'remote/player' is here already, as process {process.pid}: end that one" in " ".join(second.stderr.split())
+        assert running.is_followed()
+        running.end()
+    assert running.summary.dropped_messages == 1  # the request to join
+
+
+def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
+    running = Running(prepare(SCENARIO))
+    until(lambda: running.status)
+    with Proxy(port(running.session.endpoint)) as proxy, player(f"tcp/127.0.0.1:{proxy.port}", tmp_path / "player.log") as process:
+        until(lambda: running.is_followed())
+        proxy.hold()
+        sleep(0.3)
+        before, step = running.fresh, running.status.step
+        sleep(2.7)
+        assert running.fresh - before < 50
+        assert running.status.step > step + 500  # what is for the device waits for nobody
+        proxy.go_on()
+        until(lambda: running.is_followed())
+        assert running.status.participants[0].pid == process.pid
+        process.terminate()
+        process.wait(10)
+        until(lambda: running.status.participants[0].pid == 0)
+        running.end()
+    assert running.summary.latency["state to force"]["loud.out -> player.noise"]["count"] > 100  # though the device is gone
+    assert (tmp_path / "player.log").read_text().count("takes part") == 1
+
+
+def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
+    running = Running(prepare(SCENARIO))
+    until(lambda: running.status)
+    with Proxy(port(running.session.endpoint)) as proxy, player(f"tcp/127.0.0.1:{proxy.port}", tmp_path / "player.log"):
+        until(lambda: running.is_followed())
+        proxy.cut()
+        until(lambda: running.status.participants[0].pid == 0)
+        until(lambda: not running.is_followed())
+        sleep(1.0)
+        proxy.go_on()
+        until(lambda: running.is_followed())
+        assert [device.device for device in until(lambda: running.status.devices)] == ["player"]
+        running.end()
+    assert "device 'player' is gone, what it leads holds: start 'trocar device player' again, or mend the network" in caplog.text
+    assert (tmp_path / "player.log").read_text().count("takes part") == 2
+
+
+def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
+    (tmp_path / "session.yaml").write_text(SCENARIO)
+    endpoint = free_endpoint(range(1))
+    command = [sys.executable, "-P", "-m", "hub.command_line", "run", str(tmp_path / "session.yaml"), "--listen", endpoint]
+
+    def is_followed():
+        return any(one.stream == "player.hand" and one.count > 50 for status in live_sessions([endpoint]) for one in status.latencies)
+
+    with ExitStack() as stack:
+        for signal in (SIGKILL, SIGTERM):
+            with subprocess.Popen(command, stderr=subprocess.DEVNULL) as hub:
+                try:
+                    until(lambda: live_sessions([endpoint]))
+                    if signal == SIGKILL:
+                        stack.enter_context(player(endpoint, tmp_path / "player.log"))
+                    until(is_followed)
+                finally:
+                    hub.send_signal(signal)
+    assert (tmp_path / "player.log").read_text().count("takes part") == 2

@@ -1,0 +1,70 @@
+import socket
+
+import pytest
+
+from hub.transport import endpoints as endpoint
+from hub.transport.endpoints import is_loopback, require_loopback
+from schemas.errors import ConnectError, ScenarioError
+
+
+@pytest.fixture
+def taken():
+    """A port on which somebody listens."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        yield listener.getsockname()[1]
+
+
+def test_a_taken_port_is_passed_over(taken):
+    assert endpoint.free_endpoint([taken, 0]) != f"tcp/127.0.0.1:{taken}"
+
+
+def test_no_free_port_is_an_error_that_says_what_to_do(taken):
+    with pytest.raises(ConnectError, match="give --listen"):
+        endpoint.free_endpoint([taken])
+
+
+def test_listeners_are_found(taken, monkeypatch):
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        monkeypatch.setattr(endpoint, "PORTS", [taken, silent.getsockname()[1]])
+        assert endpoint.listening_endpoints() == [f"tcp/127.0.0.1:{taken}"]
+
+
+def test_a_gate_is_not_taken_for_a_hub(monkeypatch):
+    with socket.create_server(("0.0.0.0", 0)) as gate:
+        monkeypatch.setattr(endpoint, "PORTS", [gate.getsockname()[1]])
+        assert endpoint.listening_endpoints() == []
+
+
+def test_the_hub_stays_on_loopback_beside_its_gate(taken):
+    inside, outside = endpoint.parted(["tls/0.0.0.0:7447"])
+    assert outside == ["tls/0.0.0.0:7447"]
+    assert is_loopback(inside)
+    assert endpoint.address(inside)[1] != 7447
+    assert endpoint.parted(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == ("tcp/127.0.0.1:5", ["tls/0.0.0.0:6", "tls/[::]:6"])
+    with pytest.raises(ScenarioError, match="once on loopback"):
+        endpoint.parted(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
+
+
+@pytest.mark.parametrize(("where", "parts"), [("tls/hub.example:7447", ("hub.example", 7447)), ("tcp/[::1]:80", ("::1", 80))])
+def test_an_endpoint_has_a_host_and_a_port(where: str, parts: tuple[str, int]) -> None:
+    assert endpoint.address(where) == parts
+
+
+@pytest.mark.parametrize("where", ["hub.example:7447", "tls/hub.example", "tls/:7447", "tls/hub.example:port"])
+def test_what_is_no_endpoint_is_refused_with_an_example(where: str) -> None:
+    with pytest.raises(ScenarioError, match="write tls/HOST:PORT"):
+        endpoint.address(where)
+
+
+@pytest.mark.parametrize("where", ["tcp/127.0.0.1:7447", "tcp/localhost:0", "tcp/[::1]:7447"])
+def test_a_hub_may_listen_on_loopback(where: str) -> None:
+    assert require_loopback(where) == where
+
+
+@pytest.mark.parametrize("where", ["tcp/0.0.0.0:7447", "tcp/192.168.1.2:7447", "tcp/[::]:7447", "udp/127.0.0.1:7447", "tcp/hub:7447", "nonsense"])
+def test_a_hub_does_not_listen_elsewhere(where: str) -> None:
+    with pytest.raises(ScenarioError, match="a hub listens on loopback"):
+        require_loopback(where)
