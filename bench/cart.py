@@ -1,10 +1,12 @@
-"""What the whole patient cart with six objects costs at 1 kHz: bare `mj_step`, the MuJoCo engine, and a session in pace `fast`.
+"""What the whole patient cart with six objects costs at 1 kHz: bare `mj_step`, the MuJoCo engine, and a
+session in pace `fast`.
 
     python bench/cart.py --json
 
-All run in the same process in turns, on models of the same scene; the lowest of the rounds. `core_beyond` is the share of one core at
-1 kHz that the engine (state hash included) takes beyond bare `mj_step`, `session_core_beyond` that of a session in one host that is not
-recorded. Processor time of the thread that steps, as others may use the machine; the real-time factors are those of a core of one's own.
+All run in the same process in turns, on models of the same scene; the lowest of the rounds. `core_beyond` is
+the share of one core at 1 kHz that the engine (state hash included) takes beyond bare `mj_step`,
+`session_core_beyond` that of a session in one host that is not recorded. Processor time of the thread that
+steps, as others may use the machine; the real-time factors are those of a core of one's own.
 """
 
 from __future__ import annotations
@@ -36,7 +38,12 @@ SCENE: dict[str, Any] = {
     "mounting": "cart",
     "timestep": "1 ms",
     "looks": False,
-    "arms": {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400006"}, "PSM3": {"instrument": "400049"}, "ECM": {}},
+    "arms": {
+        "PSM1": {"instrument": "400006"},
+        "PSM2": {"instrument": "400006"},
+        "PSM3": {"instrument": "400049"},
+        "ECM": {},
+    },
     "table": {"position": [0.054, 1.11, 0.75]},
     "objects": {
         **{f"block{i}": {"kind": "block", "position": [0.02 * i, 1.11, 0.7603]} for i in range(4)},
@@ -57,7 +64,14 @@ def timed(work: Callable[[], object]) -> float:
 def session_us() -> float:
     """Return the microseconds a step of a session, in its second half: in the first the objects come to rest."""
     duration_s = 2 * STEPS_A_ROUND * STEP_NS / 1e9
-    scenario = Scenario.model_validate({"name": "cart", "step": "1 ms", "duration": duration_s, "participants": {"robot": {"kind": "mujoco"}}})
+    scenario = Scenario.model_validate(
+        {
+            "name": "cart",
+            "step": "1 ms",
+            "duration": duration_s,
+            "participants": {"robot": {"kind": "mujoco"}},
+        }
+    )
     plan, participants = plan_of(scenario, {"robot": MujocoParams.model_validate(SCENE)})
     reported: list[tuple[int, float]] = []
 

@@ -1,7 +1,9 @@
-"""How far an instrument jumps and drifts over 10 000 clutch cycles of a hand on random paths, and what a step of teleoperation costs.
+"""How far an instrument jumps and drifts over 10 000 clutch cycles of a hand on random paths, and what a step
+of teleoperation costs.
 
-In each cycle the hand strays for some steps while it leads and leaps anywhere while it is free; in between the scale changes. Jump: the largest motion
-of the tip in the step in which the hand takes over. Drift: how far the tip is from where the led ways add up to, at worst, in position and in turn.
+In each cycle the hand strays for some steps while it leads and leaps anywhere while it is free; in between
+the scale changes. Jump: the largest motion of the tip in the step in which the hand takes over. Drift: how
+far the tip is from where the led ways add up to, at worst, in position and in turn.
 """
 
 from __future__ import annotations
@@ -28,9 +30,13 @@ CASES = {"hold": {"orientation": "hold"}, "follow": {"orientation": "follow"}}
 def cycles(count: int, seed: int, **params: str) -> dict[str, float]:
     """Return jump (m), drift (m, rad) and time per step (us) of `count` cycles."""
     random = np.random.default_rng(seed)
-    teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate({"instrument": "400006", **params}))
+    teleoperation = Teleoperation(
+        "teleop", TeleoperationParams.model_validate({"instrument": "400006", **params})
+    )
     outputs = teleoperation.configure(Setup(STEP_NS, Path()))
-    values = {port.name: np.array(port.start or ()) for port in teleoperation.ports if port.causality == "input"}
+    values = {
+        port.name: np.array(port.start or ()) for port in teleoperation.ports if port.causality == "input"
+    }
     values |= {"master": np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])}
     hand, scale, chain = values["master"], values["scale"], teleoperation.params.chain
     steps, spent = 0, 0.0
@@ -49,11 +55,15 @@ def cycles(count: int, seed: int, **params: str) -> dict[str, float]:
     for _ in range(count):
         for _ in range(int(random.integers(1, 4))):
             way = random.normal(0.0, STRAY, 3) + 0.1 * (home[:3, 3] - there)
-            turn = random.normal(0.0, TURN, 3) + 0.02 * rotation.log(rotation.from_matrix(home[:3, :3] @ turned.T))
+            turn = random.normal(0.0, TURN, 3) + 0.02 * rotation.log(
+                rotation.from_matrix(home[:3, :3] @ turned.T)
+            )
             hand[:3] += way
             hand[3:] = rotation.product(rotation.exp(turn), hand[3:])
             there += scale[0] * way
-            turned = rotation.matrix(rotation.exp(turn)) @ turned if params["orientation"] == "follow" else turned
+            turned = (
+                rotation.matrix(rotation.exp(turn)) @ turned if params["orientation"] == "follow" else turned
+            )
             tip = step()
         step(1)
         hand[:3], hand[3:] = random.uniform(-0.3, 0.3, 3), rotation.exp(random.normal(0.0, 1.0, 3))
@@ -61,8 +71,15 @@ def cycles(count: int, seed: int, **params: str) -> dict[str, float]:
         after = step(0)
         jump = max(jump, float(np.linalg.norm(after[:3, 3] - tip[:3, 3])))
         drift = max(drift, float(np.linalg.norm(after[:3, 3] - there)))
-        turn_drift = max(turn_drift, float(np.linalg.norm(rotation.log(rotation.from_matrix(after[:3, :3] @ turned.T)))))
-    return {"jump_m": jump, "drift_m": drift, "drift_rad": turn_drift, "us_per_step": round(1e6 * spent / steps, 1)}
+        turn_drift = max(
+            turn_drift, float(np.linalg.norm(rotation.log(rotation.from_matrix(after[:3, :3] @ turned.T))))
+        )
+    return {
+        "jump_m": jump,
+        "drift_m": drift,
+        "drift_rad": turn_drift,
+        "us_per_step": round(1e6 * spent / steps, 1),
+    }
 
 
 def main() -> None:

@@ -1,10 +1,11 @@
-"""Coupling algorithms on contact: the largest stable communication step, the force error and the energy made, tool by tool.
+"""Coupling algorithms on contact: the largest stable communication step, the force error and the energy made,
+tool by tool.
 
-A MuJoCo tool with position servos presses, taps or strokes a block in Bullet (sub-steps of 0.5 ms) through a bond, both
-engines in one process. A step counts as stable if the run ends, the force error stays below 30 % and, where the tool holds still, the
-force ripples by less than 0.05 N; the largest stable step is that up to which all tried ones are. The error is the RMS difference of
-the force, averaged over the step, to a run by `impulse` at 0.25 ms, as a share of the RMS force. Written up in
-docs/decisions/0020-coupling-on-contact.md.
+A MuJoCo tool with position servos presses, taps or strokes a block in Bullet (sub-steps of 0.5 ms) through a
+bond, both engines in one process. A step counts as stable if the run ends, the force error stays below 30 %
+and, where the tool holds still, the force ripples by less than 0.05 N; the largest stable step is that up to
+which all tried ones are. The error is the RMS difference of the force, averaged over the step, to a run by
+`impulse` at 0.25 ms, as a share of the RMS force. Written up in docs/decisions/0020-coupling-on-contact.md.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ ROD = """
 
 def press(t: float) -> float:
     """Return the height (m) that a press wants at `t` (s): 8 mm down in 0.3 s, held, and up again."""
-    return START_M - 8e-3 * (min(max(t - 0.05, 0.0) / 0.3, 1.0) if t < 0.75 else max(1.0 - (t - 0.75) / 0.3, 0.0))
+    return START_M - 8e-3 * (
+        min(max(t - 0.05, 0.0) / 0.3, 1.0) if t < 0.75 else max(1.0 - (t - 0.75) / 0.3, 0.0)
+    )
 
 
 def tap(t: float) -> float:
@@ -115,12 +118,15 @@ class Tool(Stepped):
         super().__init__("tool", Params())
         self.case, self.log = case, log
         names = [name for name in "xyzab" if f'name="{name}"' in case.body]
-        servos = "".join(f'<position joint="{name}" kp="{case.servo}" kv="{case.servo_damping}"/>' for name in names)
+        servos = "".join(
+            f'<position joint="{name}" kp="{case.servo}" kv="{case.servo_damping}"/>' for name in names
+        )
         body = case.body.format(mass=case.mass, damping=case.damping)
         self.model = mujoco.MjModel.from_xml_string(
-            f'<mujoco><compiler angle="radian"/><option timestep="{min(5e-4, step_s)}" gravity="0 0 0" integrator="implicitfast"/>'
-            f'<default><geom contype="0" conaffinity="0"/></default><worldbody><body pos="0.001 0.0007 {START_M}">{body}</body></worldbody>'
-            f"<actuator>{servos}</actuator></mujoco>"
+            f'<mujoco><compiler angle="radian"/><option timestep="{min(5e-4, step_s)}" gravity="0 0 0"'
+            ' integrator="implicitfast"/><default><geom contype="0"'
+            ' conaffinity="0"/></default><worldbody><body pos="0.001 0.0007'
+            f' {START_M}">{body}</body></worldbody><actuator>{servos}</actuator></mujoco>'
         )
         self.data = mujoco.MjData(self.model)
         self.site = self.model.site("tip").id
@@ -136,7 +142,14 @@ class Tool(Stepped):
         jacobian, inertia = self.jacobian(), np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, inertia)
         mobility = jacobian[:3] @ np.linalg.solve(inertia, jacobian[:3].T)
-        return (BondSide(name="probe", side="motion", frame="world", effective_mass=float(1.0 / np.linalg.eigvalsh(mobility)[-1])),)
+        return (
+            BondSide(
+                name="probe",
+                side="motion",
+                frame="world",
+                effective_mass=float(1.0 / np.linalg.eigvalsh(mobility)[-1]),
+            ),
+        )
 
     def jacobian(self) -> np.ndarray:
         """Return the Jacobian of the tip (linear, angular), shape (6, nv)."""
@@ -148,7 +161,10 @@ class Tool(Stepped):
         """Return pose (x, y, z, qx, qy, qz, qw) and twist (linear, angular) of the tip."""
         quaternion = np.empty(4)
         mujoco.mju_mat2Quat(quaternion, self.data.site_xmat[self.site])
-        return np.concatenate([self.data.site_xpos[self.site], quaternion[[1, 2, 3, 0]]]), self.jacobian() @ self.data.qvel
+        return (
+            np.concatenate([self.data.site_xpos[self.site], quaternion[[1, 2, 3, 0]]]),
+            self.jacobian() @ self.data.qvel,
+        )
 
     def configure(self, setup: Setup) -> Outputs:
         """Take the bond's plan."""
@@ -162,8 +178,11 @@ class Tool(Stepped):
             return np.array([case.height(t) - START_M])
         if case.body is ROD:
             turn = 2.0 * math.pi * max(t - 0.3, 0.0)
-            return np.array([case.stroke * math.sin(turn), case.stroke * (1.0 - math.cos(turn)), case.height(t) - START_M])
-        reach = np.array([2 * 0.12 * math.cos(0.9), case.height(t) - START_M])  # of the tip from the first joint, in the plane of the arm
+            return np.array(
+                [case.stroke * math.sin(turn), case.stroke * (1.0 - math.cos(turn)), case.height(t) - START_M]
+            )
+        # of the tip from the first joint, in the plane of the arm
+        reach = np.array([2 * 0.12 * math.cos(0.9), case.height(t) - START_M])
         elbow = -math.acos(np.clip(reach @ reach / (2.0 * 0.12**2) - 1.0, -1.0, 1.0))
         return np.array([math.atan2(reach[1], reach[0]) - elbow / 2.0, elbow])
 
@@ -181,7 +200,8 @@ class Tool(Stepped):
             mujoco.mj_step(self.model, self.data)
             mujoco.mj_forward(self.model, self.data)
             pose, twist = self.motion()
-            self.side.add(force, np.concatenate([pose[:3] - before[:3], np.zeros(3)]))  # the tissue turns nothing
+            # the tissue turns nothing
+            self.side.add(force, np.concatenate([pose[:3] - before[:3], np.zeros(3)]))
             summed += force[2]
         self.log.force.append(summed / count)
         return self.side.result(pose, twist)
@@ -200,7 +220,9 @@ def simulate(case: Case, coupling: Mapping[str, Any], step_ms: float) -> Log:
     step_s = step_ms * 1e-3
     tissue = BulletParams.model_validate(
         {
-            "organs": {"block": {"size": [0.08, 0.06, 0.02], "young_modulus": case.young_modulus, "nodes": 75}},
+            "organs": {
+                "block": {"size": [0.08, 0.06, 0.02], "young_modulus": case.young_modulus, "nodes": 75}
+            },
             "probes": {"probe": {"radius": RADIUS_M, "mass": 0.02, "stiffness": case.probe_stiffness}},
             "timestep": min(5e-4, step_s),
             "node_period": 16 * step_s,
@@ -213,7 +235,9 @@ def simulate(case: Case, coupling: Mapping[str, Any], step_ms: float) -> Log:
         "bonds": [{"motion": "tool.probe", "force": "tissue.probe", "check": "warn", **coupling}],
     }
     try:
-        summary = run_in_process(scenario, {"tool": Tool(case, step_s, log), "tissue": BulletEngine("tissue", tissue)})
+        summary = run_in_process(
+            scenario, {"tool": Tool(case, step_s, log), "tissue": BulletEngine("tissue", tissue)}
+        )
     except TrocarError:
         return log
     log.energy_made_j, log.whole = summary.energy_residual_j, True
@@ -225,7 +249,11 @@ def error(case: Case, log: Log, step_ms: float, reference: Log) -> float | None:
     if not log.whole or not np.isfinite(log.force).all():
         return None
     force = np.array(log.force)
-    fine = np.array(reference.force)[: len(force) * round(step_ms / REFERENCE_MS)].reshape(len(force), -1).mean(axis=1)
+    fine = (
+        np.array(reference.force)[: len(force) * round(step_ms / REFERENCE_MS)]
+        .reshape(len(force), -1)
+        .mean(axis=1)
+    )
     share = float(np.sqrt(np.mean((force - fine) ** 2) / np.mean(fine**2)))
     if case.holds:
         first, last = (round(t / (step_ms * 1e-3)) for t in case.holds)
@@ -267,7 +295,11 @@ def main() -> None:
         table[name] = study(CASES[name])
         print(name)
         for algorithm, row in table[name].items():
-            print(f"  {algorithm:28}", "  ".join(f"{key} {'-' if value is None else f'{value:.3g}'}" for key, value in row.items()), flush=True)
+            print(
+                f"  {algorithm:28}",
+                "  ".join(f"{key} {'-' if value is None else f'{value:.3g}'}" for key, value in row.items()),
+                flush=True,
+            )
     if args.output:
         args.output.write_text(json.dumps(table, indent=2) + "\n")
 

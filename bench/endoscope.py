@@ -1,11 +1,12 @@
-"""What a stereo pair of the whole cart costs, and how that compares with drawing two pictures by MuJoCo's own renderer.
+"""What a stereo pair of the whole cart costs, and how that compares with drawing two pictures by MuJoCo's own
+renderer.
 
     python bench/endoscope.py --json
 
-The scene: patient cart, three instruments, endoscope and six objects; 320 x 288 pixels each, shadows off. Once from the tip of the
-endoscope, once from where everything is in the picture, the dearest view. Both renderers draw the same state in the same
-process in turns; `ratio` is the median of the rounds' ratios of CPU time, all threads counted. `pairs_per_cpu_second` depends
-on the machine.
+The scene: patient cart, three instruments, endoscope and six objects; 320 x 288 pixels each, shadows off.
+Once from the tip of the endoscope, once from where everything is in the picture, the dearest view. Both
+renderers draw the same state in the same process in turns; `ratio` is the median of the rounds' ratios of CPU
+time, all threads counted. `pairs_per_cpu_second` depends on the machine.
 """
 
 from __future__ import annotations
@@ -26,16 +27,23 @@ from engines.mujoco.endoscope_params import EndoscopeParams
 from engines.mujoco.endoscope_scene import EndoscopeScene
 
 ROUNDS, PAIRS_A_ROUND = 15, 20
-ARMS: dict[str, Any] = {arm: {"instrument": "LARGE_NEEDLE_DRIVER_400006"} for arm in ("PSM1", "PSM2", "PSM3")} | {"ECM": {"start": [0, 0, "0.12 m", 0]}}
+ARMS: dict[str, Any] = {
+    arm: {"instrument": "LARGE_NEEDLE_DRIVER_400006"} for arm in ("PSM1", "PSM2", "PSM3")
+} | {"ECM": {"start": [0, 0, "0.12 m", 0]}}
 BLOCKS = {f"block{i}": {"kind": "block", "position": [0.05 * i, 0.9, 0.75]} for i in range(6)}
 SCENE = {"arms": ARMS, "mounting": "cart", "objects": BLOCKS}
-VIEWS: dict[str, dict[str, Any]] = {"endoscope": {}, "overview": {"view": {"position": [2.2, 2.6, 1.9], "target": [0.0, 0.6, 0.9]}}}
+VIEWS: dict[str, dict[str, Any]] = {
+    "endoscope": {},
+    "overview": {"view": {"position": [2.2, 2.6, 1.9], "target": [0.0, 0.6, 0.9]}},
+}
 
 
 class Twice:
     """The same two pictures by `mujoco.Renderer`, one after the other."""
 
-    def __init__(self, model: mujoco.MjModel, params: EndoscopeParams, eyes: Sequence[mujoco.MjvGLCamera]) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, params: EndoscopeParams, eyes: Sequence[mujoco.MjvGLCamera]
+    ) -> None:
         self.eyes, self.model = eyes, model
         self.data = mujoco.MjData(model)
         self.renderer = mujoco.Renderer(model, params.height, params.width)
@@ -44,7 +52,16 @@ class Twice:
         mujoco.mj_forward(self.model, self.data)
         for eye in self.eyes:
             self.renderer.update_scene(self.data)
-            for name in ("pos", "forward", "up", "frustum_center", "frustum_bottom", "frustum_top", "frustum_near", "frustum_far"):
+            for name in (
+                "pos",
+                "forward",
+                "up",
+                "frustum_center",
+                "frustum_bottom",
+                "frustum_top",
+                "frustum_near",
+                "frustum_far",
+            ):
                 setattr(self.renderer.scene.camera[0], name, getattr(eye, name))
                 setattr(self.renderer.scene.camera[1], name, getattr(eye, name))
             for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
@@ -85,9 +102,12 @@ def main() -> None:
     found = opengl.find()
     if not found.name:
         sys.exit(f"no OpenGL works here ({found.detail}); to mend it: {opengl.REMEDY}")
-    if os.environ.get("MUJOCO_GL") != found.name:  # mujoco.Renderer has asked for it already, when mujoco was imported
+    # mujoco.Renderer has asked for it already, when mujoco was imported
+    if os.environ.get("MUJOCO_GL") != found.name:
         os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | {"MUJOCO_GL": found.name})
-    result = {"opengl": f"{found.name}, {found.detail}"} | {name: measure(view, found.name) for name, view in VIEWS.items()}
+    result = {"opengl": f"{found.name}, {found.detail}"} | {
+        name: measure(view, found.name) for name, view in VIEWS.items()
+    }
     if wants_json:
         print(json.dumps(result, indent=2))
         return
@@ -95,7 +115,10 @@ def main() -> None:
     for name in VIEWS:
         row = result[name]
         scene = f"{name}: {row['triangles']} triangles"
-        print(f"{scene}, {row['pairs_per_cpu_second']:.0f} pairs per CPU second, {row['ratio']:.2f} of the time of two pictures by mujoco.Renderer")
+        print(
+            f"{scene}, {row['pairs_per_cpu_second']:.0f} pairs per CPU second, {row['ratio']:.2f} of the time"
+            " of two pictures by mujoco.Renderer"
+        )
 
 
 if __name__ == "__main__":

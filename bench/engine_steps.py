@@ -2,8 +2,9 @@
 
     python bench/engine_steps.py --json
 
-Both run in the same process in turns; the median of the rounds' ratios is reported, as single times move with the
-machine's load. `ratio` is at one sub-step of 1 ms a step, the dearest case; `ratio_10_ms` at ten sub-steps a step.
+Both run in the same process in turns; the median of the rounds' ratios is reported, as single times move with
+the machine's load. `ratio` is at one sub-step of 1 ms a step, the dearest case; `ratio_10_ms` at ten
+sub-steps a step.
 """
 
 from __future__ import annotations
@@ -38,10 +39,19 @@ class Loop:
 
     def __init__(self, sub_steps: int) -> None:
         self.sub_steps, self.period = sub_steps, sub_steps * SUB_STEP_NS
-        params = MujocoParams.model_validate({"arms": {"PSM1": {}}, "timestep": "1 ms", "publish_period": "10 ms"})
+        params = MujocoParams.model_validate(
+            {"arms": {"PSM1": {}}, "timestep": "1 ms", "publish_period": "10 ms"}
+        )
         self.engine = MujocoEngine("robot", params)
-        self.engine.configure(Setup(period_ns=self.period, directory=Path(), bonds={"PSM1/probe": BondPlan("velocity", mean=True)}))
-        self.command, self.wrench = np.array(params.arms["PSM1"].start), np.array([0.1, 0.0, 0.5, 0.0, 0.0, 0.0])
+        self.engine.configure(
+            Setup(
+                period_ns=self.period, directory=Path(), bonds={"PSM1/probe": BondPlan("velocity", mean=True)}
+            )
+        )
+        self.command, self.wrench = (
+            np.array(params.arms["PSM1"].start),
+            np.array([0.1, 0.0, 0.5, 0.0, 0.0, 0.0]),
+        )
         self.inputs = Inputs({"PSM1/servo_jp": self.command, "PSM1/probe/wrench": self.wrench})
         self.model = self.engine._model
         self.data = mujoco.MjData(self.model)
@@ -74,10 +84,14 @@ class Loop:
             mujoco.mj_step1(model, data)
 
         return {
-            "clip the command, lay out position and velocity setpoints": each(lambda: arm.begin(self.inputs))
-            - each(lambda: motion.begin(self.inputs, arm._pose, arm._twist)),
+            "clip the command, lay out position and velocity setpoints": (
+                each(lambda: arm.begin(self.inputs))
+                - each(lambda: motion.begin(self.inputs, arm._pose, arm._twist))
+            ),
             "poses in ROS order, work of the wrench": each(arm.end),
-            "mj_step2 + mj_step1 over mj_step (a second call from Python)": each(split) - each(lambda: mujoco.mj_step(model, data)),
+            "mj_step2 + mj_step1 over mj_step (a second call from Python)": (
+                each(split) - each(lambda: mujoco.mj_step(model, data))
+            ),
             "check of MuJoCo's warnings": each(lambda: any(self.engine._trouble)),
             "not in the ratio: state hash (mj_getState, blake2b)": each(self.engine.state_hash),
         }
@@ -119,8 +133,17 @@ def measure() -> dict[str, object]:
     ratio, bare_us, engine_us = one.compare()
     ratio_10_ms, _, engine_10_ms_us = ten.compare()
     left = {name: round(value, 3) for name, value in one.parts().items()}
-    numbers = {"ratio": ratio, "bare_us": bare_us, "engine_us": engine_us, "ratio_10_ms": ratio_10_ms, "engine_10_ms_us": engine_10_ms_us}
-    return {name: round(value, 3) for name, value in numbers.items()} | {"what_is_left": left, "codecs": {k: round(v, 3) for k, v in codecs().items()}}
+    numbers = {
+        "ratio": ratio,
+        "bare_us": bare_us,
+        "engine_us": engine_us,
+        "ratio_10_ms": ratio_10_ms,
+        "engine_10_ms_us": engine_10_ms_us,
+    }
+    return {name: round(value, 3) for name, value in numbers.items()} | {
+        "what_is_left": left,
+        "codecs": {k: round(v, 3) for k, v in codecs().items()},
+    }
 
 
 def main() -> None:
@@ -132,7 +155,11 @@ def main() -> None:
     result = measure()
     if arguments.output:
         arguments.output.write_text(json.dumps(result, indent=2) + "\n")
-    print(json.dumps(result, indent=2) if arguments.json else "\n".join(f"{name}: {value}" for name, value in result.items()))
+    print(
+        json.dumps(result, indent=2)
+        if arguments.json
+        else "\n".join(f"{name}: {value}" for name, value in result.items())
+    )
 
 
 if __name__ == "__main__":

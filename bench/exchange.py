@@ -1,4 +1,7 @@
-"""A participant without any computation: takes 64 doubles, gives 64 doubles. For measuring what a step costs by itself."""
+"""A participant without any computation: takes 64 doubles, gives 64 doubles.
+
+For measuring what a step costs by itself.
+"""
 
 import numpy as np
 
@@ -11,7 +14,10 @@ SIZE = 64
 class Exchange(Stepped):
     """Hands its input on."""
 
-    ports = (Port(name="taken", causality="input", size=SIZE), Port(name="given", causality="output", size=SIZE))
+    ports = (
+        Port(name="taken", causality="input", size=SIZE),
+        Port(name="given", causality="output", size=SIZE),
+    )
 
     def configure(self, setup: Setup) -> Outputs:
         """Start from zeros."""

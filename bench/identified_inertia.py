@@ -1,9 +1,11 @@
-"""Fit bodies to the identified dynamics of the PSM: makes robots/dvrk/data/psm_inertia.json and prints how well they agree.
+"""Fit bodies to the identified dynamics of the PSM: makes robots/dvrk/data/psm_inertia.json and prints how
+well they agree.
 
-The pseudo-inertia of each body is that of a guess L L^T, changed to (L M) (L M)^T with M lower triangular, its diagonal
-exp(x): whatever x is, a body can have this inertia (Rucker and Wensing, "Smooth parameterization of rigid-body inertia", RA-L
-2022). Least squares over x: gravity exactly, the inertia matrix with a residual that grows with the third power so that no position of
-the arm is left behind, and x itself, so that what no measurement tells stays near the guess.
+The pseudo-inertia of each body is that of a guess L L^T, changed to (L M) (L M)^T with M lower triangular,
+its diagonal exp(x): whatever x is, a body can have this inertia (Rucker and Wensing, "Smooth parameterization
+of rigid-body inertia", RA-L 2022). Least squares over x: gravity exactly, the inertia matrix with a residual
+that grows with the third power so that no position of the arm is left behind, and x itself, so that what no
+measurement tells stays near the guess.
 
     python bench/identified_inertia.py
 """
@@ -27,8 +29,10 @@ TOOL = tool_of("LARGE_NEEDLE_DRIVER_400006")
 MOVING = instrument(TOOL)
 HOUSING = identified.INSERTION_MASS - sum(body.mass for body in MOVING.values())
 
-# Mass, centre, size of a box: CAD (WPI-AIM/dvrk_env psm.urdf.xacro, of the column psm.sdf: 0.355 kg; sizes from its meshes); insertion and
-# counterweight by their identified masses, carriage and housing of the instrument 0.08 m below the carriage's frame, counterweight in the column.
+# Mass, centre, size of a box: CAD (WPI-AIM/dvrk_env psm.urdf.xacro, of the column psm.sdf: 0.355 kg; sizes
+# from its meshes); insertion and
+# counterweight by their identified masses, carriage and housing of the instrument 0.08 m below the carriage's
+# frame, counterweight in the column.
 GUESS = {
     "yaw": (1.4705, (0.0, -0.528, -0.0388), (0.1625, 0.296, 0.145)),
     "pitch": (0.355, (0.0, -0.0449, 0.2798), (0.0775, 0.0795, 0.575)),
@@ -55,9 +59,14 @@ def pseudo_inertias(x, roots):
 
 
 def terms():
-    """Return what makes inertia and gravity of the pseudo-inertias, and what they should be less the share of the instrument."""
+    """Return what makes inertia and gravity of the pseudo-inertias, and what they should be less the share of
+    the instrument.
+    """
     chain = psm.chain(TOOL)
-    boxes = {name: Inertia.of_box(mass, np.array(centre), np.array(size)) for name, (mass, centre, size) in GUESS.items()}
+    boxes = {
+        name: Inertia.of_box(mass, np.array(centre), np.array(size))
+        for name, (mass, centre, size) in GUESS.items()
+    }
     arm = Dynamics(chain, linkage.PSM, boxes, np.zeros(6))
     tool = Dynamics(chain, linkage.PSM, MOVING, np.zeros(6))
     inertia_maps, inertias, gravity_maps, gravities = [], [], [], []
@@ -78,13 +87,23 @@ def fit():
 
     def errors(x):
         bodies = pseudo_inertias(x.reshape(len(roots), 10), roots)
-        return np.einsum("qkbcd,bcd->qk", inertia_maps, bodies) - inertias, np.einsum("qbic,bc->qi", gravity_maps, bodies[..., 3]) - gravities
+        return (
+            np.einsum("qkbcd,bcd->qk", inertia_maps, bodies) - inertias,
+            np.einsum("qbic,bc->qi", gravity_maps, bodies[..., 3]) - gravities,
+        )
 
     def residual(x):
         inertia, gravity = errors(x)
         inertia, gravity = inertia.ravel() / np.sqrt(inertia.size), gravity.ravel() / np.sqrt(gravity.size)
         large = inertia * np.sqrt(inertia.size) / (2.5 * INERTIA_SCALE)
-        return np.concatenate([inertia / INERTIA_SCALE, 10.0 * large**3 / np.sqrt(large.size), gravity / GRAVITY_SCALE, GUESS_WEIGHT * x])
+        return np.concatenate(
+            [
+                inertia / INERTIA_SCALE,
+                10.0 * large**3 / np.sqrt(large.size),
+                gravity / GRAVITY_SCALE,
+                GUESS_WEIGHT * x,
+            ]
+        )
 
     found = least_squares(residual, np.zeros(10 * len(roots)), max_nfev=400)
     return pseudo_inertias(found.x.reshape(len(roots), 10), roots), errors(found.x)
@@ -97,10 +116,23 @@ def main():
         mass, centre = pseudo[3, 3], pseudo[:3, 3] / pseudo[3, 3]
         second = pseudo[:3, :3] - mass * np.outer(centre, centre)
         tensor = np.trace(second) * np.eye(3) - second
-        rows[name] = {"mass": round(mass, 6), "centre": centre.round(6).tolist(), "tensor": tensor.round(8).tolist()}
-        print(f"{name:14} {mass:8.4f} kg  centre {centre.round(4)}  moments {np.linalg.eigvalsh(tensor).round(6)}")
-    print(f"largest error: inertia matrix {np.abs(inertia).max():.2g} kg m^2 (of 0.4167), gravity {np.abs(gravity).max():.2g} N m")
-    OUTPUT.write_text(json.dumps({"made_by": "bench/identified_inertia.py", "bodies": rows}, indent=1) + "\n", encoding="utf-8")
+        rows[name] = {
+            "mass": round(mass, 6),
+            "centre": centre.round(6).tolist(),
+            "tensor": tensor.round(8).tolist(),
+        }
+        print(
+            f"{name:14} {mass:8.4f} kg  centre {centre.round(4)}  moments"
+            f" {np.linalg.eigvalsh(tensor).round(6)}"
+        )
+    print(
+        f"largest error: inertia matrix {np.abs(inertia).max():.2g} kg m^2 (of 0.4167), gravity"
+        f" {np.abs(gravity).max():.2g} N m"
+    )
+    OUTPUT.write_text(
+        json.dumps({"made_by": "bench/identified_inertia.py", "bodies": rows}, indent=1) + "\n",
+        encoding="utf-8",
+    )
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
-"""The force on a sphere pressed into tissue, beside the finite-element truth: over depth, radius, mesh and place, at rest and at 5 Hz.
+"""The force on a sphere pressed into tissue, beside the finite-element truth: over depth, radius, mesh and
+place, at rest and at 5 Hz.
 
     python bench/indentation.py --json indentation.json --picture docs/pictures/indentation.png
 
-A block of 80 x 60 x 20 mm, 10 kPa, is pressed over a node, and in the middle of a face, where Bullet's contacts lose most. The truth is
-Newton's method on the same mesh with the same friction (tests/engines/bullet/finite_elements.py); `continuum` is that on a mesh of 2000 nodes,
-so it shows what the mesh costs. Written up in docs/decisions/0015-contact-force.md.
+A block of 80 x 60 x 20 mm, 10 kPa, is pressed over a node, and in the middle of a face, where Bullet's
+contacts lose most. The truth is Newton's method on the same mesh with the same friction
+(tests/engines/bullet/finite_elements.py); `continuum` is that on a mesh of 2000 nodes, so it shows what the
+mesh costs. Written up in docs/decisions/0015-contact-force.md.
 """
 
 from __future__ import annotations
@@ -50,11 +52,19 @@ class Row:
 def params(nodes: int, radius: float) -> BulletParams:
     """Return the block of about so many nodes and its probe of `radius` (m)."""
     organ = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": nodes}
-    return BulletParams.model_validate({"organs": {"block": organ}, "probes": {"probe": {"radius": radius}}, "timestep": TIMESTEP_S.get(nodes, 0.5e-3)})
+    return BulletParams.model_validate(
+        {
+            "organs": {"block": organ},
+            "probes": {"probe": {"radius": radius}},
+            "timestep": TIMESTEP_S.get(nodes, 0.5e-3),
+        }
+    )
 
 
 def places(model: BulletParams) -> dict[str, Vector]:
-    """Return where to press, (x, y) in m: the node in the middle of the top, and the middle of a face beside it."""
+    """Return where to press, (x, y) in m: the node in the middle of the top, and the middle of a face beside
+    it.
+    """
     mesh = model.organs["block"].rest
     top = mesh.nodes[mesh.triangles]
     middles = top[(top[:, :, 2] == mesh.nodes[:, 2].max()).all(axis=1)].mean(axis=1)
@@ -77,16 +87,21 @@ def pressed(model: BulletParams, at: Vector, radius: float) -> Iterator[float]:
 
 
 def correlation(model: BulletParams, at: Vector, radius: float, curve: tuple[Vector, Vector]) -> float:
-    """Return the correlation of the force at 5 Hz with `curve`, depths (m) and forces (N) of the truth, over two periods."""
+    """Return the correlation of the force at 5 Hz with `curve`, depths (m) and forces (N) of the truth, over
+    two periods.
+    """
     w = 2.0 * np.pi * FREQUENCY_HZ
 
     def motion(t: float) -> tuple[Vector, Vector]:
-        return np.array([*at, radius - MIDDLE_M - AMPLITUDE_M * np.sin(w * t)]), np.array([0.0, 0.0, -AMPLITUDE_M * w * np.cos(w * t)])
+        return np.array([*at, radius - MIDDLE_M - AMPLITUDE_M * np.sin(w * t)]), np.array(
+            [0.0, 0.0, -AMPLITUDE_M * w * np.cos(w * t)]
+        )
 
     with Rig(model, start=(*at, radius + 1e-3)) as rig:
         rig.move((*at, radius - MIDDLE_M), 0.1)
         force = rig.follow(motion, 0.6)[200:, 2]
-    depths = MIDDLE_M + AMPLITUDE_M * np.sin(w * (np.arange(200, 600) + 0.5) * 1e-3)  # the force is the mean of a step of 1 ms
+    # the force is the mean of a step of 1 ms
+    depths = MIDDLE_M + AMPLITUDE_M * np.sin(w * (np.arange(200, 600) + 0.5) * 1e-3)
     coefficients = np.polynomial.Polynomial.fit(*curve, deg=4)
     return float(np.corrcoef(force, coefficients(depths))[0, 1])
 
@@ -99,7 +114,9 @@ def study() -> Iterator[Row]:
                 model = params(nodes, radius)
                 at = places(model)[place]
                 expected = truth(nodes, radius, at, DEPTHS_M)
-                found = correlation(model, at, radius, (np.array([0.0, *DEPTHS_M]), np.array([0.0, *expected])))
+                found = correlation(
+                    model, at, radius, (np.array([0.0, *DEPTHS_M]), np.array([0.0, *expected]))
+                )
                 yield Row(mesh, place, radius, list(pressed(model, at, radius)), expected.tolist(), found)
 
 
@@ -113,10 +130,27 @@ def picture(rows: list[Row], continuum: dict[float, list[float]], path: Path) ->
     for axis, (mesh, place) in zip(axes, panels, strict=True):
         axis.set_title(f"{mesh} mesh, over a {place}", fontsize=9)
         axis.set_xlabel("depth, mm")
-        for row in (row for row in rows if (row.mesh, row.place) == (mesh, place) and row.radius_m in continuum):
-            (line,) = axis.plot(DEPTHS_M * 1e3, row.truth_n, label=f"truth, same mesh, {row.radius_m * 1e3:.0f} mm")
-            axis.plot(DEPTHS_M * 1e3, row.force_n, "o", markersize=4, color=line.get_color(), label=f"Bullet, {row.radius_m * 1e3:.0f} mm")
-            axis.plot(DEPTHS_M * 1e3, continuum[row.radius_m], ":", color=line.get_color(), label=f"truth, {CONTINUUM_NODES} nodes")
+        for row in (
+            row for row in rows if (row.mesh, row.place) == (mesh, place) and row.radius_m in continuum
+        ):
+            (line,) = axis.plot(
+                DEPTHS_M * 1e3, row.truth_n, label=f"truth, same mesh, {row.radius_m * 1e3:.0f} mm"
+            )
+            axis.plot(
+                DEPTHS_M * 1e3,
+                row.force_n,
+                "o",
+                markersize=4,
+                color=line.get_color(),
+                label=f"Bullet, {row.radius_m * 1e3:.0f} mm",
+            )
+            axis.plot(
+                DEPTHS_M * 1e3,
+                continuum[row.radius_m],
+                ":",
+                color=line.get_color(),
+                label=f"truth, {CONTINUUM_NODES} nodes",
+            )
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("force, N")
     axes[0].legend(fontsize=7)
@@ -133,13 +167,24 @@ def main() -> None:
     rows: list[Row] = []
     for row in study():
         rows.append(row)
-        ratios = " ".join(f"{100 * (force / true - 1):+6.1f}" for force, true in zip(row.force_n, row.truth_n, strict=True))
-        print(f"{row.mesh:6} {row.place:4} {row.radius_m * 1e3:.0f} mm  error, %: {ratios}  correlation at 5 Hz {row.correlation:.5f}", flush=True)
-    continuum = {radius: truth(CONTINUUM_NODES, radius, np.zeros(2), DEPTHS_M).tolist() for radius in (RADII_M[0], RADII_M[-1])}
+        ratios = " ".join(
+            f"{100 * (force / true - 1):+6.1f}" for force, true in zip(row.force_n, row.truth_n, strict=True)
+        )
+        print(
+            f"{row.mesh:6} {row.place:4} {row.radius_m * 1e3:.0f} mm  error, %: {ratios}  correlation at 5 Hz"
+            f" {row.correlation:.5f}",
+            flush=True,
+        )
+    continuum = {
+        radius: truth(CONTINUUM_NODES, radius, np.zeros(2), DEPTHS_M).tolist()
+        for radius in (RADII_M[0], RADII_M[-1])
+    }
     for radius, forces in continuum.items():
         print(f"{CONTINUUM_NODES} nodes, {radius * 1e3:.0f} mm: {np.round(forces, 3).tolist()} N", flush=True)
     if args.json:
-        args.json.write_text(json.dumps({"rows": [asdict(row) for row in rows], "continuum_n": continuum}, indent=2) + "\n")
+        args.json.write_text(
+            json.dumps({"rows": [asdict(row) for row in rows], "continuum_n": continuum}, indent=2) + "\n"
+        )
     if args.picture:
         picture(rows, continuum, args.picture)
 

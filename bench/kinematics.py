@@ -1,4 +1,6 @@
-"""How many configurations a second the kinematics take, one by one and ten thousand at once: `python bench/kinematics.py`."""
+"""How many configurations a second the kinematics take, one by one and ten thousand at once: `python
+bench/kinematics.py`.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,10 @@ def measure(arm: str) -> None:
         "inverse": (lambda: inverse(chain, poses[0], one), lambda: inverse(chain, poses, many)),
     }
     for name, (single, batch) in rows.items():
-        print(f"{arm:5} {name:9} {rate(single, 1, 1000):10.0f} /s one by one  {rate(batch, COUNT, 5):10.0f} /s {COUNT} at once")
+        print(
+            f"{arm:5} {name:9} {rate(single, 1, 1000):10.0f} /s one by one  {rate(batch, COUNT, 5):10.0f} /s"
+            f" {COUNT} at once"
+        )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
-"""How long it takes from a stylus to the robot and back: a hand in a process of its own, read at 1 kHz, leads PSM1 in MuJoCo in real time.
+"""How long it takes from a stylus to the robot and back: a hand in a process of its own, read at 1 kHz, leads
+PSM1 in MuJoCo in real time.
 
     python bench/latency.py --json
 
-Measured end to end by the hand: from the sample in which it has jumped to the arrival of the first pose of the tip that moves. Beside it
-stand the parts that the session itself tells of. On a machine that others use too, `chrt -f 10` in front (Linux, as root) tells what it would be alone.
+Measured end to end by the hand: from the sample in which it has jumped to the arrival of the first pose of
+the tip that moves. Beside it stand the parts that the session itself tells of. On a machine that others use
+too, `chrt -f 10` in front (Linux, as root) tells what it would be alone.
 """
 
 from __future__ import annotations
@@ -44,12 +46,26 @@ def measure(step_ms: float, seconds: float, host: str) -> dict[str, Any]:
     os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
     with tempfile.TemporaryDirectory() as directory:
         file, output = Path(directory, "latency.yaml"), Path(directory, "times.json")
-        file.write_text(SCENARIO.format(pid=os.getpid(), step=step_ms, seconds=seconds, output=output, host=host))
+        file.write_text(
+            SCENARIO.format(pid=os.getpid(), step=step_ms, seconds=seconds, output=output, host=host)
+        )
         summary = launch(load(str(file)), endpoint=free_endpoint(range(1))).run()
         times_ms = np.array(json.loads(output.read_text())) / 1e6
     p50, p90, p99 = np.percentile(times_ms, [50, 90, 99])
-    told = {f"{way}: {stream}": [1e3 * row["p50_s"], 1e3 * row["p99_s"]] for way, rows in summary.latency.items() for stream, row in rows.items()}
-    return {"jumps": times_ms.size, "p50_ms": p50, "p90_ms": p90, "p99_ms": p99, "late_steps": summary.late_steps, "steps": summary.steps, "parts_ms": told}
+    told = {
+        f"{way}: {stream}": [1e3 * row["p50_s"], 1e3 * row["p99_s"]]
+        for way, rows in summary.latency.items()
+        for stream, row in rows.items()
+    }
+    return {
+        "jumps": times_ms.size,
+        "p50_ms": p50,
+        "p90_ms": p90,
+        "p99_ms": p99,
+        "late_steps": summary.late_steps,
+        "steps": summary.steps,
+        "parts_ms": told,
+    }
 
 
 def main() -> None:
@@ -57,7 +73,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--step", type=float, default=2.0, help="communication step, ms")
     parser.add_argument("--seconds", type=float, default=30.0)
-    parser.add_argument("--host", default="hub", help="where the robot runs; any other name is a process of its own")
+    parser.add_argument(
+        "--host", default="hub", help="where the robot runs; any other name is a process of its own"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--output", type=Path, help="also write the JSON to this file")
     arguments = parser.parse_args()

@@ -1,9 +1,11 @@
-"""What a step of Trocar costs without any computation, beside a bare Zenoh exchange of the same payload in the same run.
+"""What a step of Trocar costs without any computation, beside a bare Zenoh exchange of the same payload in
+the same run.
 
-Window 1: N participants in processes of their own, 64 doubles from neighbour to neighbour, the hub in the loop at every
-step; beside it a bare star, in which the hub sends 64 doubles to all and waits for 64 doubles from each.
-Window K > 1: one grant every K steps; beside it a bare ring, in which each process waits for its neighbour alone.
-With --one-host all participants live in the hub's process; beside it the same calls in a plain loop.
+Window 1: N participants in processes of their own, 64 doubles from neighbour to neighbour, the hub in the
+loop at every step; beside it a bare star, in which the hub sends 64 doubles to all and waits for 64 doubles
+from each. Window K > 1: one grant every K steps; beside it a bare ring, in which each process waits for its
+neighbour alone. With --one-host all participants live in the hub's process; beside it the same calls in a
+plain loop.
 """
 
 from __future__ import annotations
@@ -30,7 +32,11 @@ from schemas.scenario import Scenario
 
 PAYLOAD = bytes(64 * 8)
 HEAD = struct.Struct("<QI")
-QOS = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME, "express": True}
+QOS = {
+    "congestion_control": zenoh.CongestionControl.BLOCK,
+    "priority": zenoh.Priority.REAL_TIME,
+    "express": True,
+}
 
 
 def trocar(participants: int, window: int, steps: int, *, one_host: bool) -> float:
@@ -43,13 +49,19 @@ def trocar(participants: int, window: int, steps: int, *, one_host: bool) -> flo
             "duration": steps * 1e-3,
             "window": window,
             "algorithm": "jacobi",
-            "participants": {name: {"kind": "exchange:Exchange", "host": "hub" if one_host else name} for name in names},
-            "connections": [f"{a}.given -> {b}.taken" for a, b in zip(names, [*names[1:], names[0]], strict=True)],
+            "participants": {
+                name: {"kind": "exchange:Exchange", "host": "hub" if one_host else name} for name in names
+            },
+            "connections": [
+                f"{a}.given -> {b}.taken" for a, b in zip(names, [*names[1:], names[0]], strict=True)
+            ],
         }
     )
     plan, made = plan_of(scenario, dict.fromkeys(names, Params()))
     here = made if one_host else {}
-    return steps / Session(scenario, plan, here, Path.cwd(), endpoint=free_endpoint(range(1))).run().wall_time_s
+    return (
+        steps / Session(scenario, plan, here, Path.cwd(), endpoint=free_endpoint(range(1))).run().wall_time_s
+    )
 
 
 def bare(participants: int, window: int, steps: int) -> float:
@@ -57,9 +69,25 @@ def bare(participants: int, window: int, steps: int) -> float:
     endpoint = free_endpoint(range(1))
     with open_session("router", listen=[endpoint]) as hub:
         ready = hub.declare_subscriber("bare/ready/*", FifoChannel(64))
-        results = hub.declare_subscriber("bare/*/out", FifoChannel(4096)) if window == 1 else hub.declare_subscriber("bare/done", FifoChannel(8))
+        results = (
+            hub.declare_subscriber("bare/*/out", FifoChannel(4096))
+            if window == 1
+            else hub.declare_subscriber("bare/done", FifoChannel(8))
+        )
         grant = hub.declare_publisher("bare/grant", **QOS)
-        command = [sys.executable, "-P", __file__, "--worker", endpoint, "--participants", str(participants), "--window", str(window), "--steps", str(steps)]
+        command = [
+            sys.executable,
+            "-P",
+            __file__,
+            "--worker",
+            endpoint,
+            "--participants",
+            str(participants),
+            "--window",
+            str(window),
+            "--steps",
+            str(steps),
+        ]
         workers = [subprocess.Popen([*command, "--index", str(i)]) for i in range(participants)]
         try:
             seen: set[bytes] = set()
@@ -85,7 +113,11 @@ def worker(endpoint: str, index: int, participants: int, window: int, steps: int
     with open_session("peer", listen=["tcp/127.0.0.1:0"], connect=[endpoint]) as session:
         out = session.declare_publisher(f"bare/{index}/out", **QOS)
         grants = session.declare_subscriber("bare/grant", FifoChannel(64))
-        neighbour = session.declare_subscriber(f"bare/{(index - 1) % participants}/out", FifoChannel(4096)) if window > 1 else None
+        neighbour = (
+            session.declare_subscriber(f"bare/{(index - 1) % participants}/out", FifoChannel(4096))
+            if window > 1
+            else None
+        )
         _wait_for_start(session, out, grants, neighbour, index)
         if neighbour is None:
             for step in range(steps):
@@ -98,11 +130,21 @@ def worker(endpoint: str, index: int, participants: int, window: int, steps: int
             while HEAD.unpack_from(neighbour.recv().payload.to_bytes())[0] != step:
                 pass  # what was sent before the start
         if index == 0:
-            session.put("bare/done", struct.pack("<d", steps / (perf_counter() - begun)), congestion_control=zenoh.CongestionControl.BLOCK)
+            session.put(
+                "bare/done",
+                struct.pack("<d", steps / (perf_counter() - begun)),
+                congestion_control=zenoh.CongestionControl.BLOCK,
+            )
         grants.recv()
 
 
-def _wait_for_start(session: zenoh.Session, out: zenoh.Publisher, grants: zenoh.Subscriber, neighbour: zenoh.Subscriber | None, index: int) -> None:
+def _wait_for_start(
+    session: zenoh.Session,
+    out: zenoh.Publisher,
+    grants: zenoh.Subscriber,
+    neighbour: zenoh.Subscriber | None,
+    index: int,
+) -> None:
     """Report ready once the neighbour can be heard, until the first grant says that all are."""
     heard = neighbour is None
     while grants.try_recv() is None:
@@ -153,7 +195,11 @@ def main() -> None:
     rows: list[tuple[float, float]] = []
     for _ in range(args.rounds):
         ours = trocar(args.participants, args.window, args.steps, one_host=args.one_host)
-        other = plain_loop(args.participants, args.steps) if args.one_host else bare(args.participants, args.window, args.steps)
+        other = (
+            plain_loop(args.participants, args.steps)
+            if args.one_host
+            else bare(args.participants, args.window, args.steps)
+        )
         rows.append((ours, other))
     ours, other = (statistics.median(column) for column in zip(*rows, strict=True))
     result = {

@@ -1,9 +1,11 @@
-"""What an organ costs by its number of nodes: the tissue engine's step of 1 ms, idle and with a probe pressed into it.
+"""What an organ costs by its number of nodes: the tissue engine's step of 1 ms, idle and with a probe pressed
+into it.
 
     python bench/organs.py --json
 
-A block of 80 x 60 x 20 mm of liver under a probe of 5 mm, 3 mm deep. Times are those of the processor in this process (Bullet has one
-thread), so that others on the machine count little; compare the ratios to 250 nodes, as single times move with the machine.
+A block of 80 x 60 x 20 mm of liver under a probe of 5 mm, 3 mm deep. Times are those of the processor in this
+process (Bullet has one thread), so that others on the machine count little; compare the ratios to 250 nodes,
+as single times move with the machine.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ APPROACH_MS, PRESS_MS = 20, 100
 def run(nodes: int, steps: int) -> dict[str, float]:
     """Return the mesh's size, and microseconds of a step of 1 ms idle and pressed."""
     organ = {"size": ["80 mm", "60 mm", "20 mm"], "material": "liver", "nodes": nodes}
-    params = BulletParams.model_validate({"organs": {"block": organ}, "probes": {"probe": {"radius": RADIUS_M}}})
+    params = BulletParams.model_validate(
+        {"organs": {"block": organ}, "probes": {"probe": {"radius": RADIUS_M}}}
+    )
     mesh = params.organs["block"].rest
     with BulletEngine("tissue", params) as engine:
         engine.configure(Setup(MS, Path(), {"probe": BondPlan("velocity", mean=True)}))
@@ -51,7 +55,12 @@ def run(nodes: int, steps: int) -> dict[str, float]:
         step(PRESS_MS)
         twist[2] = 0.0
         pressed = step(steps)
-    return {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tetrahedra), "idle_us": idle, "pressed_us": pressed}
+    return {
+        "nodes": len(mesh.nodes),
+        "tetrahedra": len(mesh.tetrahedra),
+        "idle_us": idle,
+        "pressed_us": pressed,
+    }
 
 
 def measure(steps: int) -> list[dict[str, float]]:

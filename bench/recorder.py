@@ -1,8 +1,9 @@
 """What recording costs a step: a toy step loop with the recorder on against off, interleaved in one run.
 
-The loop is the worst case, one that never lets go of the interpreter: each step is pure Python of about the given
-length and writes what a palpation session records, 10 messages of 100 bytes, and every 16 ms one of 3 kB. Beside Trocar's recorder
-two others take the same messages: the `mcap` package's own writer in a thread, and in a process behind a pipe.
+The loop is the worst case, one that never lets go of the interpreter: each step is pure Python of about the
+given length and writes what a palpation session records, 10 messages of 100 bytes, and every 16 ms one of 3
+kB. Beside Trocar's recorder two others take the same messages: the `mcap` package's own writer in a thread,
+and in a process behind a pipe.
 """
 
 from __future__ import annotations
@@ -81,7 +82,11 @@ class LibraryProcess:
     """The `mcap` package's writer in a process of its own, behind a pipe that takes 32 KiB at a time."""
 
     def __init__(self, directory: Path) -> None:
-        self._process = subprocess.Popen([sys.executable, __file__, "--sink", directory / "process.mcap"], stdin=subprocess.PIPE, bufsize=2**15)
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, "--sink", directory / "process.mcap"],
+            stdin=subprocess.PIPE,
+            bufsize=2**15,
+        )
         assert self._process.stdin is not None
         self._pipe = self._process.stdin
         self._pipe.write(_FRAME.pack(1, 0, 0))
@@ -114,7 +119,9 @@ def _messages(steps: int) -> list[list[tuple[int, int, bytes]]]:
     rows: list[list[tuple[int, int, bytes]]] = []
     for step in range(steps):
         time_ns = step * 1_000_000
-        row = [(channel + 1, time_ns, bytes(4) + walk[step, channel].tobytes()) for channel in range(CHANNELS)]
+        row = [
+            (channel + 1, time_ns, bytes(4) + walk[step, channel].tobytes()) for channel in range(CHANNELS)
+        ]
         if step % LARGE_EVERY == 0:
             row.append((CHANNELS + 1, time_ns, bytes(4) + (nodes + 1e-6 * step).tobytes()))
         rows.append(row)
@@ -134,7 +141,9 @@ def _turns(step_s: float) -> int:
     return int(1_000_000 * step_s / (time.perf_counter() - begin))
 
 
-def _block(rows: list[list[tuple[int, int, bytes]]], turns: int, write: Callable[[int, int, bytes], object]) -> float:
+def _block(
+    rows: list[list[tuple[int, int, bytes]]], turns: int, write: Callable[[int, int, bytes], object]
+) -> float:
     begin = time.perf_counter()
     for row in rows:
         _work(turns)
@@ -148,7 +157,9 @@ def _ignore(_channel: int, _time_ns: int, _payload: bytes) -> None:
 
 
 def _ratio(name: str, step_ms: float, steps: int, rounds: int) -> float:
-    """Return loop time with a recorder over loop time without: the median over pairs of short blocks, so that other load falls on both of a pair."""
+    """Return loop time with a recorder over loop time without: the median over pairs of short blocks, so that
+    other load falls on both of a pair.
+    """
     rows, turns = _messages(steps), _turns(step_ms * 1e-3)
     with tempfile.TemporaryDirectory() as directory:
         sink = _sink(name, Path(directory))
@@ -158,7 +169,9 @@ def _ratio(name: str, step_ms: float, steps: int, rounds: int) -> float:
 
 
 def _cpu_us_per_step(name: str, rounds: int) -> float:
-    """Return the CPU time that recording a step takes in this process, writer thread and compression included: the fastest round."""
+    """Return the CPU time that recording a step takes in this process, writer thread and compression
+    included: the fastest round.
+    """
     rows, times = _messages(4000), list[float]()  # many, so that opening and closing the file do not count
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as directory:
@@ -194,7 +207,9 @@ def _sink(name: str, directory: Path) -> Sink:
 
 def main() -> None:
     """Print the ratios."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--step-ms", type=float, default=1.0, help="length of a step of the loop")
     parser.add_argument("--steps", type=int, default=50, help="steps per block")
     parser.add_argument("--rounds", type=int, default=200, help="blocks with, and without")

@@ -1,11 +1,15 @@
-"""What ROS programs get through a gateway: rates, losses and ages, the way of a command to the joint, moves and homing without end.
+"""What ROS programs get through a gateway: rates, losses and ages, the way of a command to the joint, moves
+and homing without end.
 
-    python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face servo moves cycles] [--output figures.json]
+    python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face servo moves cycles] [--output
+    figures.json]
 
-`bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x 288 at 60 Hz; `session`: the same in a session of
-motion controller and MuJoCo, H = 2 ms, in real time. The pictures are noise that nobody draws: what is measured is the gateway. `servo`: from a `servo_jp` to
-the joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable, enable, home. The console is always a process of its own, and its ages are from stamp
-to receipt (one machine, one clock). Times depend on the machine and on who else uses it: its load stands beside.
+`bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x
+288 at 60 Hz; `session`: the same in a session of motion controller and MuJoCo, H = 2 ms, in real time. The
+pictures are noise that nobody draws: what is measured is the gateway. `servo`: from a `servo_jp` to the
+joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable, enable, home. The console is always a
+process of its own, and its ages are from stamp to receipt (one machine, one clock). Times depend on the
+machine and on who else uses it: its load stands beside.
 """
 
 from __future__ import annotations
@@ -33,10 +37,22 @@ from hub.transport.endpoints import free_endpoint
 from hub.transport.zenoh_session import open_session
 
 HERE = Path(__file__).parent
-ARMS = {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400006"}, "ECM": {"start": ["0 deg", "0 deg", "50 mm", "0 deg"]}}
-STATES = ("PSM1/measured_js", "PSM1/jaw/measured_js", "PSM2/measured_js", "PSM2/jaw/measured_js", "ECM/measured_js")
+ARMS = {
+    "PSM1": {"instrument": "400006"},
+    "PSM2": {"instrument": "400006"},
+    "ECM": {"start": ["0 deg", "0 deg", "50 mm", "0 deg"]},
+}
+STATES = (
+    "PSM1/measured_js",
+    "PSM1/jaw/measured_js",
+    "PSM2/measured_js",
+    "PSM2/jaw/measured_js",
+    "ECM/measured_js",
+)
 PICTURES = ("endoscope/left/image_raw", "endoscope/right/image_raw")
-LISTENED = [[f"/{name}", "sensor_msgs/msg/JointState"] for name in STATES] + [[f"/{name}", "sensor_msgs/msg/Image"] for name in PICTURES]
+LISTENED = [[f"/{name}", "sensor_msgs/msg/JointState"] for name in STATES] + [
+    [f"/{name}", "sensor_msgs/msg/Image"] for name in PICTURES
+]
 GATEWAY = {"arms": ARMS, "mounting": "cart"}
 FAST = {"publish_period": "4545 us"}
 """220 Hz, of states that the motion controller tells at 250 Hz."""
@@ -47,7 +63,13 @@ SCENARIO: dict[str, Any] = {
     "pace": "realtime",
     "participants": {
         "motion": {"kind": "motion", "mounting": "cart", "arms": ARMS, "publish_period": "10 ms"},
-        "robot": {"kind": "mujoco", "mounting": "cart", "arms": ARMS, "looks": False, "publish_period": "10 ms"},
+        "robot": {
+            "kind": "mujoco",
+            "mounting": "cart",
+            "arms": ARMS,
+            "looks": False,
+            "publish_period": "10 ms",
+        },
         "ros": {"kind": "ros2-zenoh", "host": "ros", **GATEWAY},
     },
     "order": ["motion", "robot"],
@@ -62,7 +84,9 @@ class Console:
         paths = [str(HERE.parent), *filter(None, [place.environment.get("PYTHONPATH")])]
         environment = place.environment | {"PYTHONPATH": os.pathsep.join(paths)}
         command = [place.python, HERE / "ros_client.py", kind, endpoint, task, json.dumps(arguments)]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
         _expect(self.process, "ready")
 
     def go(self) -> None:
@@ -93,8 +117,21 @@ def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
     """Measure a gateway alone."""
     endpoint = free_endpoint(range(1))
     with open_session("router", listen=[endpoint]):
-        command = [sys.executable, str(HERE / "ros_bare.py"), kind, endpoint, json.dumps(GATEWAY | FAST | place.params), str(seconds + 4.0)]
-        gateway = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(HERE.parent)})
+        command = [
+            sys.executable,
+            str(HERE / "ros_bare.py"),
+            kind,
+            endpoint,
+            json.dumps(GATEWAY | FAST | place.params),
+            str(seconds + 4.0),
+        ]
+        gateway = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(HERE.parent)},
+        )
         _expect(gateway, "ready")
         console = Console(kind, place, endpoint, "listen", {"topics": LISTENED, "seconds": seconds})
         _tell(gateway)
@@ -110,9 +147,18 @@ def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
 
 
 def in_session(
-    kind: str, place: Place, task: str, arguments: dict[str, Any], connections: list[str], parts: dict[str, Any], *, fast: bool = False
+    kind: str,
+    place: Place,
+    task: str,
+    arguments: dict[str, Any],
+    connections: list[str],
+    parts: dict[str, Any],
+    *,
+    fast: bool = False,
 ) -> dict[str, Any]:
-    """Run a session, and in it a console with its task; states are published at 100 Hz, or 220 Hz if it is to be `fast`."""
+    """Run a session, and in it a console with its task; states are published at 100 Hz, or 220 Hz if it is to
+    be `fast`.
+    """
     scenario = json.loads(json.dumps(SCENARIO))
     scenario["participants"]["ros"] |= {"kind": kind, **place.params}
     if fast:
@@ -126,14 +172,23 @@ def in_session(
         file.write_text(json.dumps(scenario))
         session = launch(load(str(file)), endpoint=free_endpoint(range(1)))
         result: dict[str, Any] = {}
-        thread = Thread(target=_beside, args=(session, result, lambda: Console(kind, place, session.endpoint, task, arguments)))
+        thread = Thread(
+            target=_beside,
+            args=(session, result, lambda: Console(kind, place, session.endpoint, task, arguments)),
+        )
         thread.start()
         summary = session.run()
         thread.join()
-    result |= {"real_time_factor": round(summary.real_time_factor, 4), "steps": summary.steps, "late_steps": summary.late_steps}
+    result |= {
+        "real_time_factor": round(summary.real_time_factor, 4),
+        "steps": summary.steps,
+        "late_steps": summary.late_steps,
+    }
     way = summary.latency["state to force"]
     result["hub_to_gateway_ms"] = {
-        name.partition(" -> ")[2]: [round(1e3 * row[p], 2) for p in ("p50_s", "p99_s")] for name, row in way.items() if "js" in name or "image" in name
+        name.partition(" -> ")[2]: [round(1e3 * row[p], 2) for p in ("p50_s", "p99_s")]
+        for name, row in way.items()
+        if "js" in name or "image" in name
     }
     return result | _machine()
 
@@ -150,7 +205,8 @@ def _beside(session: Session, result: dict[str, Any], console: Callable[[], Cons
         result |= program.result()
         seconds = monotonic() - begun
         result["hub_cpu_percent"], result["gateway_cpu_percent"] = (
-            round(100 * (after - one) / seconds, 1) for one, after in zip(before, (cpu_s(), cpu_s(gateway)), strict=True)
+            round(100 * (after - one) / seconds, 1)
+            for one, after in zip(before, (cpu_s(), cpu_s(gateway)), strict=True)
         )
     finally:
         session.state.shutdown()
@@ -161,11 +217,18 @@ def _machine() -> dict[str, Any]:
 
 
 def session(kind: str, place: Place, seconds: float, *, everything: bool = False) -> dict[str, Any]:
-    """Measure rates, losses and ages in a session; `everything`: all states of the arms are published beside, not their joints alone."""
+    """Measure rates, losses and ages in a session; `everything`: all states of the arms are published beside,
+    not their joints alone.
+    """
     parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
-    connections = [*states, *(f"camera.{eye}/image_raw -> ros.endoscope/{eye}/image_raw" for eye in ("left", "right"))]
-    result = in_session(kind, place, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts, fast=True)
+    connections = [
+        *states,
+        *(f"camera.{eye}/image_raw -> ros.endoscope/{eye}/image_raw" for eye in ("left", "right")),
+    ]
+    result = in_session(
+        kind, place, "listen", {"topics": LISTENED, "seconds": seconds}, connections, parts, fast=True
+    )
     del result["received"]
     return result
 
@@ -175,9 +238,17 @@ def servo(kind: str, place: Place, count: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory, "times.json")
         parts = {"watch": {"kind": "ros_parts:Stopwatch", "output": str(output)}}
-        watched = ["ros.PSM1/servo_jp -> watch.servo_jp", "motion.drive/PSM1/servo_jp -> watch.setpoint", "robot.PSM1/measured_js -> watch.measured"]
-        result = in_session(kind, place, "servo", {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*", *watched], parts)
-        return {f"in_session_{name}": percentiles(times) for name, times in json.loads(output.read_text()).items()} | result
+        watched = [
+            "ros.PSM1/servo_jp -> watch.servo_jp",
+            "motion.drive/PSM1/servo_jp -> watch.setpoint",
+            "robot.PSM1/measured_js -> watch.measured",
+        ]
+        result = in_session(
+            kind, place, "servo", {"arm_name": "PSM1", "count": count}, ["motion.* -> ros.*", *watched], parts
+        )
+        return {
+            f"in_session_{name}": percentiles(times) for name, times in json.loads(output.read_text()).items()
+        } | result
 
 
 def endless(kind: str, place: Place, task: str, count: int) -> dict[str, Any]:
@@ -187,7 +258,9 @@ def endless(kind: str, place: Place, task: str, count: int) -> dict[str, Any]:
 
 def main() -> None:
     """Measure what is asked for, and print or write the result."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     measures: dict[str, Callable[[str, Place, argparse.Namespace], dict[str, Any]]] = {
         "bare": lambda kind, place, a: bare(kind, place, a.seconds),
         "session": lambda kind, place, a: session(kind, place, a.seconds),
@@ -197,7 +270,12 @@ def main() -> None:
         "cycles": lambda kind, place, a: endless(kind, place, "cycles", a.cycles),
     }
     parser.add_argument("kind", choices=PLACES)
-    parser.add_argument("what", nargs="*", choices=[[], *measures], help="all by default; `face`: as `session`, with all states published")
+    parser.add_argument(
+        "what",
+        nargs="*",
+        choices=[[], *measures],
+        help="all by default; `face`: as `session`, with all states published",
+    )
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--pulses", type=int, default=100)
     parser.add_argument("--moves", type=int, default=1000)
@@ -206,7 +284,9 @@ def main() -> None:
     arguments = parser.parse_args()
     os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
     with PLACES[arguments.kind]() as place:
-        figures = {name: measures[name](arguments.kind, place, arguments) for name in arguments.what or measures}
+        figures = {
+            name: measures[name](arguments.kind, place, arguments) for name in arguments.what or measures
+        }
     text = json.dumps({arguments.kind: figures}, indent=2)
     if arguments.output:
         arguments.output.write_text(text + "\n")

@@ -1,8 +1,10 @@
-"""What a node of ROS 1 costs that publishes many topics, ours and rospy's, with a program at the other side that reads and does nothing else.
+"""What a node of ROS 1 costs that publishes many topics, ours and rospy's, with a program at the other side
+that reads and does nothing else.
 
     python bench/ros1_node.py --topics 60
 
-Joint states of six joints at 100 Hz on each topic. Ours converts every message from CDR; rospy sends bytes that are ready. Needs rospy and rosmaster.
+Joint states of six joints at 100 Hz on each topic. Ours converts every message from CDR; rospy sends bytes
+that are ready. Needs rospy and rosmaster.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ from tests.devices.ros.rospy_peer import Ros1, master, until
 
 PERIOD_S = 0.01
 NUMBERS = np.full(6, 0.1)
-MESSAGE = JointState(name=[f"joint_{index}" for index in range(6)], position=NUMBERS, velocity=NUMBERS, effort=NUMBERS)
+MESSAGE = JointState(
+    name=[f"joint_{index}" for index in range(6)], position=NUMBERS, velocity=NUMBERS, effort=NUMBERS
+)
 
 ROSPY = """
 import io, rospy, sys, time
@@ -79,7 +83,10 @@ def read(ros: Ros1, topics: int) -> None:
 def ours(uri: str, topics: int, seconds: float) -> float:
     """Return the share of a core that our node takes."""
     node = Ros1Transport(uri, "/publisher", "127.0.0.1")
-    publish = [node.advertise(Row(f"/topic_{index}", JointState.ros_type, "publish", periodic=True)) for index in range(topics)]
+    publish = [
+        node.advertise(Row(f"/topic_{index}", JointState.ros_type, "publish", periodic=True))
+        for index in range(topics)
+    ]
     message = encode(MESSAGE)
     while len(node._connections) < topics:
         time.sleep(0.1)
@@ -95,7 +102,9 @@ def ours(uri: str, topics: int, seconds: float) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--topics", type=int, default=60)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--as", dest="role", choices=["all", "ours"], default="all", help=argparse.SUPPRESS)
@@ -107,13 +116,30 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as directory, master(Path(directory)) as ros:
         size = [str(arguments.topics), str(arguments.seconds)]
         commands = {
-            "ours": ([sys.executable, __file__, "--as", "ours", "--master", ros.uri, "--topics", size[0], "--seconds", size[1]], None),
+            "ours": (
+                [
+                    sys.executable,
+                    __file__,
+                    "--as",
+                    "ours",
+                    "--master",
+                    ros.uri,
+                    "--topics",
+                    size[0],
+                    "--seconds",
+                    size[1],
+                ],
+                None,
+            ),
             "rospy": ([ros.python, "-c", ROSPY, *size, str(PERIOD_S)], ros.environment),
         }
         for name, (command, environment) in commands.items():
             with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
                 read(ros, arguments.topics)
-                print(f"{name}: {arguments.topics} topics at {1 / PERIOD_S:.0f} Hz take {100 * float(process.communicate()[0]):.0f} % of a core")
+                print(
+                    f"{name}: {arguments.topics} topics at {1 / PERIOD_S:.0f} Hz take"
+                    f" {100 * float(process.communicate()[0]):.0f} % of a core"
+                )
             ros.stop()
             ros.start()
 

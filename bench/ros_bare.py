@@ -1,8 +1,10 @@
-"""A gateway alone in a process, told as many states and pictures as it is to publish: the one that `bench/ros.py` looks at beside a whole session.
+"""A gateway alone in a process, told as many states and pictures as it is to publish: the one that
+`bench/ros.py` looks at beside a whole session.
 
     python bench/ros_bare.py KIND ENDPOINT '{"...": ...}' SECONDS
 
-Says `ready` once the gateway is open, waits for a line, tells for so many seconds, and then prints what it has cost and how many messages it has sent.
+Says `ready` once the gateway is open, waits for a line, tells for so many seconds, and then prints what it
+has cost and how many messages it has sent.
 """
 
 from __future__ import annotations
@@ -43,7 +45,11 @@ def main() -> None:
     assert isinstance(gateway, Gateway)
     gateway.learn_hub(partial(open_session, "client", connect=[endpoint]))
     gateway.open(Path.cwd())
-    states = [(row.port.name, VectorCodec(row.port).neutral) for row in gateway.rows if row.port and row.periodic and row.name.endswith("measured_js")]
+    states = [
+        (row.port.name, VectorCodec(row.port).neutral)
+        for row in gateway.rows
+        if row.port and row.periodic and row.name.endswith("measured_js")
+    ]
     pictures = [picture(number) for number in range(8)]
     numbers = np.zeros(1)
 
@@ -59,7 +65,10 @@ def main() -> None:
     print("ready", flush=True)
     sys.stdin.readline()
     until = monotonic() + float(seconds)
-    telling, showing = Thread(target=every, args=(TELL_S, until, tell)), Thread(target=every, args=(PICTURE_S, until, show))
+    telling, showing = (
+        Thread(target=every, args=(TELL_S, until, tell)),
+        Thread(target=every, args=(PICTURE_S, until, show)),
+    )
     begun, spent = monotonic(), cpu_s()
     telling.start()
     showing.start()
@@ -71,7 +80,15 @@ def main() -> None:
     showing.join()
     sleep(1.5)  # a state is published for a second after it was told last
     (status,) = [said.message for said in gateway.read(10**18) if isinstance(said.message, GatewayStatus)]
-    print(json.dumps({"cpu_percent": round(100 * cpu, 1), "told": {topic.topic: topic.messages for topic in status.topics}}), flush=True)
+    print(
+        json.dumps(
+            {
+                "cpu_percent": round(100 * cpu, 1),
+                "told": {topic.topic: topic.messages for topic in status.topics},
+            }
+        ),
+        flush=True,
+    )
     sys.stdin.readline()
     gateway.close()
 

@@ -1,9 +1,11 @@
-"""The console of `bench/ros.py`: a ROS program in a process of its own, which prints what it has seen as JSON.
+"""The console of `bench/ros.py`: a ROS program in a process of its own, which prints what it has seen as
+JSON.
 
     python bench/ros_client.py KIND WHERE TASK '{"...": ...}'
 
-Says `ready` once all is declared, and reads a line on stdin before it begins; to end what it listens to, another one. Its client logic is that of a CRTK
-client: a move is over when a state that is busy and newer than the command has come, and then one that is not.
+Says `ready` once all is declared, and reads a line on stdin before it begins; to end what it listens to,
+another one. Its client logic is that of a CRTK client: a move is over when a state that is busy and newer
+than the command has come, and then one that is not.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from typing import Any
 from ros_middleware import JOINT_STATE, MIDDLEWARE, OPERATING_STATE, STRING_STAMPED
 
 MOVED_RAD = 1e-7
-"""An arm that holds still does not move by 1e-13 rad; the drives move the yaw by some 1e-7 rad in the first step of 2 ms."""
+"""An arm that holds still does not move by 1e-13 rad; the drives move the yaw by some 1e-7 rad in the first
+step of 2 ms.
+"""
 PATIENCE_S = 10.0
 """How long the busy edge of a move or of homing may take, and the end of it; more is a miss, and a hang."""
 
@@ -29,7 +33,11 @@ def percentiles(times_ns: list[int]) -> dict[str, float]:
     ordered = sorted(times_ns)
     if not ordered:
         return {"count": 0}
-    picked = {"p50_ms": ordered[len(ordered) // 2], "p99_ms": ordered[min(len(ordered) - 1, len(ordered) * 99 // 100)], "max_ms": ordered[-1]}
+    picked = {
+        "p50_ms": ordered[len(ordered) // 2],
+        "p99_ms": ordered[min(len(ordered) - 1, len(ordered) * 99 // 100)],
+        "max_ms": ordered[-1],
+    }
     return {"count": len(ordered)} | {name: round(value / 1e6, 3) for name, value in picked.items()}
 
 
@@ -60,7 +68,12 @@ class Heard:
         gaps = [after - before for before, after in pairwise(stamps)]
         rate = (len(seen) - 1) / (stamps[-1] - stamps[0]) * 1e9
         lost = None if None in numbers else numbers[-1] - numbers[0] + 1 - len(numbers)
-        return {"rate_hz": round(rate, 2), "lost": lost, "longest_gap_ms": round(max(gaps) / 1e6, 2), "age": percentiles([row[1] for row in seen])}
+        return {
+            "rate_hz": round(rate, 2),
+            "lost": lost,
+            "longest_gap_ms": round(max(gaps) / 1e6, 2),
+            "age": percentiles([row[1] for row in seen]),
+        }
 
 
 def listen(client: Any, topics: list[tuple[str, str]], seconds: float) -> dict[str, Any]:
@@ -75,7 +88,9 @@ def listen(client: Any, topics: list[tuple[str, str]], seconds: float) -> dict[s
     ended_ns = time_ns()
     sys.stdin.readline()  # all has been told
     sleep(0.5)
-    return {topic: one.figures(begun_ns, ended_ns) for topic, one in heard.items()} | {"received": {topic: len(one.seen) for topic, one in heard.items()}}
+    return {topic: one.figures(begun_ns, ended_ns) for topic, one in heard.items()} | {
+        "received": {topic: len(one.seen) for topic, one in heard.items()}
+    }
 
 
 class Arm:
@@ -90,8 +105,14 @@ class Arm:
         """The newest state by its topic's name, with the time (ns) of its arrival."""
         client.listen(f"/{name}/operating_state", OPERATING_STATE, self._state, latched=True)
         for topic in ("measured_js", "setpoint_js"):
-            client.listen(f"/{name}/{topic}", JOINT_STATE, lambda message, _, topic=topic: self._joints(topic, message))
-        for topic, type_ in (("servo_jp", JOINT_STATE), ("move_jp", JOINT_STATE), ("state_command", STRING_STAMPED)):
+            client.listen(
+                f"/{name}/{topic}", JOINT_STATE, lambda message, _, topic=topic: self._joints(topic, message)
+            )
+        for topic, type_ in (
+            ("servo_jp", JOINT_STATE),
+            ("move_jp", JOINT_STATE),
+            ("state_command", STRING_STAMPED),
+        ):
             client.advertise(f"/{name}/{topic}", type_)
 
     def _state(self, message: Any, _: int | None) -> None:
@@ -108,7 +129,9 @@ class Arm:
             self.news.notify_all()
 
     def await_state(self, after_ns: int, wanted: Any, limit_s: float) -> int | None:
-        """Return the stamp of the first state newer than `after_ns` that is as wanted; None if none has come in time."""
+        """Return the stamp of the first state newer than `after_ns` that is as wanted; None if none has come
+        in time.
+        """
         at = 0
 
         def found() -> int | None:
@@ -136,11 +159,15 @@ class Arm:
 
 def home(arm: Arm) -> None:
     since_ns = arm.command("home")
-    assert arm.await_state(since_ns, lambda state: state.is_homed and not state.is_busy, 20.0), "the arm did not get home"
+    assert arm.await_state(since_ns, lambda state: state.is_homed and not state.is_busy, 20.0), (
+        "the arm did not get home"
+    )
 
 
 def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
-    """Tell an arm now and then to go 2 mrad to or fro, and note when its setpoint and its joint are seen to follow."""
+    """Tell an arm now and then to go 2 mrad to or fro, and note when its setpoint and its joint are seen to
+    follow.
+    """
     arm, times, pause = Arm(client, arm_name), {"setpoint_js": [], "measured_js": []}, random.Random(0)
     stamped: dict[str, list[int]] = {"setpoint_js": [], "measured_js": []}
     begin(client)
@@ -155,12 +182,20 @@ def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
         sent_ns = arm.send("servo_jp", goal)
         for topic in times:
             with arm.news:
-                if arm.news.wait_for(lambda topic=topic, before=before: abs(arm.joints[topic][0][0] - before[topic]) > MOVED_RAD, 1.0):
+                if arm.news.wait_for(
+                    lambda topic=topic, before=before: (
+                        abs(arm.joints[topic][0][0] - before[topic]) > MOVED_RAD
+                    ),
+                    1.0,
+                ):
                     times[topic].append(arm.joints[topic][1] - sent_ns)
                     stamped[topic].append(arm.joints[topic][2] - sent_ns)
                 else:
                     never += 1
-    return {"never_seen": never} | {f"to_{topic}": {"at_console": percentiles(times[topic]), "as_stamped": percentiles(stamped[topic])} for topic in times}
+    return {"never_seen": never} | {
+        f"to_{topic}": {"at_console": percentiles(times[topic]), "as_stamped": percentiles(stamped[topic])}
+        for topic in times
+    }
 
 
 def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:

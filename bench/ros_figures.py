@@ -15,7 +15,9 @@ def cpu_s(process: int | str = "self") -> float:
 
 
 def host_process(host: str) -> int:
-    """Return the process of a session's host among the children of this one. Raises LookupError if there is none."""
+    """Return the process of a session's host among the children of this one. Raises LookupError if there is
+    none.
+    """
     for task in Path("/proc/self/task").iterdir():
         for child in (task / "children").read_text().split():
             if f"--host\0{host}\0" in Path(f"/proc/{child}/cmdline").read_text():

@@ -1,7 +1,9 @@
-"""How the console of `bench/ros.py` speaks each middleware: by a client library of others, which shares nothing with the gateways.
+"""How the console of `bench/ros.py` speaks each middleware: by a client library of others, which shares
+nothing with the gateways.
 
-Each runs in the Python that has its library, so nothing but the standard library is imported up here. A message is as the library has it; `Take` gets it
-with its number on its topic, None where the middleware tells none.
+Each runs in the Python that has its library, so nothing but the standard library is imported up here. A
+message is as the library has it; `Take` gets it with its number on its topic, None where the middleware tells
+none.
 """
 
 from __future__ import annotations
@@ -15,12 +17,18 @@ from typing import Any
 __all__ = ["JOINT_STATE", "MIDDLEWARE", "OPERATING_STATE", "STRING_STAMPED"]
 
 Take = Callable[[Any, "int | None"], None]
-JOINT_STATE, OPERATING_STATE, STRING_STAMPED = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState", "crtk_msgs/msg/StringStamped"
+JOINT_STATE, OPERATING_STATE, STRING_STAMPED = (
+    "sensor_msgs/msg/JointState",
+    "crtk_msgs/msg/OperatingState",
+    "crtk_msgs/msg/StringStamped",
+)
 PATIENCE_S, POLL_S = 20.0, 5e-4
 
 
 class Zenoh:
-    """The program that the tests have, written from rmw_zenoh's design on eclipse-zenoh and rosbags; `where` is the router's endpoint."""
+    """The program that the tests have, written from rmw_zenoh's design on eclipse-zenoh and rosbags; `where`
+    is the router's endpoint.
+    """
 
     def __init__(self, where: str) -> None:
         from tests.devices.ros.zenoh import zenoh_peer
@@ -44,7 +52,11 @@ class Zenoh:
 
         stamp_ns, nothing = time.time_ns(), np.zeros(0)
         header = self._header(stamp_ns)
-        self._publish[topic](self._types[JOINT_STATE](header=header, name=[], position=np.array(positions), velocity=nothing, effort=nothing))
+        self._publish[topic](
+            self._types[JOINT_STATE](
+                header=header, name=[], position=np.array(positions), velocity=nothing, effort=nothing
+            )
+        )
         return stamp_ns
 
     def words(self, topic: str, text: str) -> int:
@@ -55,7 +67,9 @@ class Zenoh:
 
     def _header(self, stamp_ns: int) -> Any:
         sec, nanosec = divmod(stamp_ns, 10**9)
-        return self._types["std_msgs/msg/Header"](stamp=self._types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec), frame_id="")
+        return self._types["std_msgs/msg/Header"](
+            stamp=self._types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec), frame_id=""
+        )
 
     @staticmethod
     def stamp_ns(message: Any) -> int:
@@ -66,7 +80,10 @@ class Zenoh:
 
 
 class Rclpy:
-    """A node on rclpy, whose domain is in the environment. Its messages are taken one after the other: the executor in Python is too slow for so many."""
+    """A node on rclpy, whose domain is in the environment.
+
+    Its messages are taken one after the other: the executor in Python is too slow for so many.
+    """
 
     def __init__(self, where: str) -> None:
         import rclpy
@@ -80,7 +97,9 @@ class Rclpy:
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-        subscription = self._node.create_subscription(self._found(type_), topic, lambda _: None, QoSProfile(depth=10, durability=durability))
+        subscription = self._node.create_subscription(
+            self._found(type_), topic, lambda _: None, QoSProfile(depth=10, durability=durability)
+        )
         self._takers.append((subscription, take))
         _wait(lambda: self._node.count_publishers(topic))
 
@@ -143,14 +162,21 @@ class Rospy:
     def listen(self, topic: str, type_: str, take: Take, *, latched: bool = False) -> None:
         picture = 2**20  # bytes at once: with less a picture is put together from many reads
         heard = self._rospy.Subscriber(
-            topic, self._class(type_), lambda message: take(message, message.header.seq), queue_size=10, buff_size=picture, tcp_nodelay=True
+            topic,
+            self._class(type_),
+            lambda message: take(message, message.header.seq),
+            queue_size=10,
+            buff_size=picture,
+            tcp_nodelay=True,
         )
         _wait(heard.get_num_connections)
 
     start = Zenoh.start
 
     def advertise(self, topic: str, type_: str) -> None:
-        publisher = self._publishers[topic] = self._rospy.Publisher(topic, self._class(type_), queue_size=10, tcp_nodelay=True)
+        publisher = self._publishers[topic] = self._rospy.Publisher(
+            topic, self._class(type_), queue_size=10, tcp_nodelay=True
+        )
         _wait(publisher.get_num_connections)
 
     def joints(self, topic: str, positions: list[float]) -> int:

@@ -20,13 +20,23 @@ EYES = ("left", "right")
 def picture(number: int) -> Image:
     """Return a picture of noise, 276 kB."""
     pixels = np.random.default_rng(number).integers(0, 256, HEIGHT * WIDTH * 3, np.uint8)
-    return Image(header=Header(frame_id="left_optical"), height=HEIGHT, width=WIDTH, encoding="rgb8", step=3 * WIDTH, data=pixels)
+    return Image(
+        header=Header(frame_id="left_optical"),
+        height=HEIGHT,
+        width=WIDTH,
+        encoding="rgb8",
+        step=3 * WIDTH,
+        data=pixels,
+    )
 
 
 class Pictures(Stepped):
     """A stereo camera that shows the same eight pictures over and over."""
 
-    ports = tuple(Port(name=f"{eye}/image_raw", causality="output", type=Image.ros_type, variability="event") for eye in EYES)
+    ports = tuple(
+        Port(name=f"{eye}/image_raw", causality="output", type=Image.ros_type, variability="event")
+        for eye in EYES
+    )
 
     def configure(self, setup: Setup) -> Outputs:
         self._pictures, self._count = [picture(number) for number in range(8)], np.zeros(1)
@@ -50,14 +60,22 @@ class StopwatchParams(Params):
 
 
 class Stopwatch(Stepped):
-    """Notes, by the wall clock, when a `servo_jp` is heeded, and when the joint that it is for moves: both from the command's stamp, at the end of the step."""
+    """Notes, by the wall clock, when a `servo_jp` is heeded, and when the joint that it is for moves: both
+    from the command's stamp, at the end of the step.
+    """
 
     params_model = StopwatchParams
     params: StopwatchParams
     ports = (
         Port(name="servo_jp", causality="input", type=JointState.ros_type, variability="event"),
         Port(name="setpoint", causality="input", type=JointState.ros_type, size=6),
-        Port(name="measured", causality="input", type=JointState.ros_type, size=6, fields=("position", "velocity", "effort")),
+        Port(
+            name="measured",
+            causality="input",
+            type=JointState.ros_type,
+            size=6,
+            fields=("position", "velocity", "effort"),
+        ),
     )
 
     def configure(self, setup: Setup) -> Outputs:

@@ -1,4 +1,6 @@
-"""Where the console of `bench/ros.py` meets a gateway of each kind, and the Python that has its client library."""
+"""Where the console of `bench/ros.py` meets a gateway of each kind, and the Python that has its client
+library.
+"""
 
 from __future__ import annotations
 
@@ -47,5 +49,9 @@ def ros1() -> Iterator[Place]:
         yield Place(Path(ros.python), {"master": ros.uri}, ros.environment)
 
 
-PLACES: dict[str, Callable[[], AbstractContextManager[Place]]] = {"ros2-zenoh": zenoh, "ros2-dds": dds, "ros1": ros1}
+PLACES: dict[str, Callable[[], AbstractContextManager[Place]]] = {
+    "ros2-zenoh": zenoh,
+    "ros2-dds": dds,
+    "ros1": ros1,
+}
 """By the gateway's kind."""

@@ -1,9 +1,10 @@
-"""The servo process of the haptic styluses: how well it keeps its time, and what the hand feels when its host is killed.
+"""The servo process of the haptic styluses: how well it keeps its time, and what the hand feels when its host
+is killed.
 
     python bench/servo.py [--seconds 20] [--styluses 2] [--planes 4] [--idle]
 
-Styluses of the stand-in for HDAPI, all in contact, beside a device host that reads them at 1 kHz and sends contact models at 250 Hz, and, unless
-`--idle`, one busy process on every core. Needs a C compiler.
+Styluses of the stand-in for HDAPI, all in contact, beside a device host that reads them at 1 kHz and sends
+contact models at 250 Hz, and, unless `--idle`, one busy process on every core. Needs a C compiler.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ def measured(seconds: float, styluses: int, planes: int, folder: Path) -> None:
     for device in world.devices:
         device.target[1] = 0.03  # HDAPI's y is up: above the floor
         device.buttons = 1
-    host = subprocess.Popen([sys.executable, str(HOST), str(library), str(planes), str(styluses)], env=environment)
+    host = subprocess.Popen(
+        [sys.executable, str(HOST), str(library), str(planes), str(styluses)], env=environment
+    )
     try:
         sleep(3.0)
         for device in world.devices:
@@ -72,13 +75,19 @@ def force(run: np.ndarray, after: np.ndarray, killed: float) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--styluses", type=int, choices=(1, 2), default=2)
     parser.add_argument("--planes", type=int, default=4)
     parser.add_argument("--idle", action="store_true")
     arguments = parser.parse_args()
-    burning = [] if arguments.idle else [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(os.cpu_count() or 1)]
+    burning = (
+        []
+        if arguments.idle
+        else [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(os.cpu_count() or 1)]
+    )
     try:
         with tempfile.TemporaryDirectory() as folder:
             measured(arguments.seconds, arguments.styluses, arguments.planes, Path(folder))

@@ -1,11 +1,14 @@
-"""What a soft body in the picture costs: its surface, MuJoCo's scene, and the drawing, for three ways that MuJoCo has to show one.
+"""What a soft body in the picture costs: its surface, MuJoCo's scene, and the drawing, for three ways that
+MuJoCo has to show one.
 
     python bench/skins.py --json
 
-A dented block of 80 x 60 x 20 mm of about 250, 1000 and 5000 nodes fills a picture of 320 x 288 pixels, shadows off. `surface_ms`: the
-displayed vertices from the nodes. `update_ms`: new vertices into MuJoCo's scene, by a skin whose vertices in the model are replaced (what Trocar
-does), a flex whose vertices in the data are replaced, and a mesh that is uploaded again, all of the body's own triangles. `pair_ms`: a stereo
-pair of the endoscope with the displayed surface in it, `empty_pair_ms`: without. CPU time of all threads, medians; compare rows of one run.
+A dented block of 80 x 60 x 20 mm of about 250, 1000 and 5000 nodes fills a picture of 320 x 288 pixels,
+shadows off. `surface_ms`: the displayed vertices from the nodes. `update_ms`: new vertices into MuJoCo's
+scene, by a skin whose vertices in the model are replaced (what Trocar does), a flex whose vertices in the
+data are replaced, and a mesh that is uploaded again, all of the body's own triangles. `pair_ms`: a stereo
+pair of the endoscope with the displayed surface in it, `empty_pair_ms`: without. CPU time of all threads,
+medians; compare rows of one run.
 """
 
 from __future__ import annotations
@@ -61,7 +64,13 @@ def dented(mesh: TetMesh) -> Vector:
 def updates(mesh: TetMesh, nodes: Vector) -> dict[str, float]:
     """Milliseconds to bring `nodes` into a scene, by each of MuJoCo's means."""
     vertices, faces = mesh.nodes.ravel(), mesh.triangles.ravel()
-    bones = {"bodyname": ["world"], "bindpos": [0, 0, 0], "bindquat": [1, 0, 0, 0], "vertid": [[*range(len(nodes))]], "vertweight": [[1.0] * len(nodes)]}
+    bones = {
+        "bodyname": ["world"],
+        "bindpos": [0, 0, 0],
+        "bindquat": [1, 0, 0, 0],
+        "vertid": [[*range(len(nodes))]],
+        "vertweight": [[1.0] * len(nodes)],
+    }
     found: dict[str, float] = {}
     for means in ("skin", "flex", "mesh"):
         spec = mujoco.MjSpec()
@@ -77,7 +86,9 @@ def updates(mesh: TetMesh, nodes: Vector) -> dict[str, float]:
         mujoco.mj_forward(model, data)
         renderer = mujoco.Renderer(model, 16, 16)
 
-        def update(model: Any = model, data: Any = data, renderer: Any = renderer, means: str = means) -> None:
+        def update(
+            model: Any = model, data: Any = data, renderer: Any = renderer, means: str = means
+        ) -> None:
             if means == "skin":
                 model.skin_vert[:] = nodes
             elif means == "flex":
@@ -98,9 +109,17 @@ def pair(mesh: TetMesh | None, gl: str) -> float:
     if mesh is not None:
         bodies["body"] = body = SoftBody("body/nodes")
         faces = mesh.triangles.astype(np.uint32).ravel()
-        body.take(SoftBodyState(header=Header(), body="body", nodes_m=mesh.nodes.astype(np.float32).ravel(), triangles=faces))
+        body.take(
+            SoftBodyState(
+                header=Header(), body="body", nodes_m=mesh.nodes.astype(np.float32).ravel(), triangles=faces
+            )
+        )
         body.nodes = dented(mesh).astype(np.float32)
-    scene = {"arms": {"PSM1": {"position": [0.0, 0.0, 0.12]}}, "view": VIEW, "skins": {name: {} for name in bodies}}
+    scene = {
+        "arms": {"PSM1": {"position": [0.0, 0.0, 0.12]}},
+        "view": VIEW,
+        "skins": {name: {} for name in bodies},
+    }
     drawn = EndoscopeScene(EndoscopeParams.model_validate(scene), gl, bodies)
     positions = drawn._model.qpos0
     try:
@@ -116,16 +135,25 @@ def main() -> None:
     found = opengl.find()
     if not found.name:
         sys.exit(f"no OpenGL works here ({found.detail}); to mend it: {opengl.REMEDY}")
-    if os.environ.get("MUJOCO_GL") != found.name:  # mujoco.Renderer has asked for it already, when mujoco was imported
+    # mujoco.Renderer has asked for it already, when mujoco was imported
+    if os.environ.get("MUJOCO_GL") != found.name:
         os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | {"MUJOCO_GL": found.name})
     rows: list[dict[str, Any]] = []
     for count in NODES:
         mesh = block(SIZE, count)
         skin, nodes = SkinMesh(mesh.nodes, mesh.triangles), dented(mesh)
         row = {"nodes": len(mesh.nodes), "triangles": len(mesh.triangles), "drawn_triangles": len(skin.faces)}
-        row |= {"surface_ms": cost(lambda skin=skin, nodes=nodes: skin.vertices(nodes)), "update_ms": updates(mesh, nodes), "pair_ms": pair(mesh, found.name)}
+        row |= {
+            "surface_ms": cost(lambda skin=skin, nodes=nodes: skin.vertices(nodes)),
+            "update_ms": updates(mesh, nodes),
+            "pair_ms": pair(mesh, found.name),
+        }
         rows.append(row)
-    result = {"opengl": f"{found.name}, {found.detail}", "empty_pair_ms": pair(None, found.name), "bodies": rows}
+    result = {
+        "opengl": f"{found.name}, {found.detail}",
+        "empty_pair_ms": pair(None, found.name),
+        "bodies": rows,
+    }
     if wants_json:
         print(json.dumps(result, indent=2))
         return

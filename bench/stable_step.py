@@ -1,8 +1,10 @@
-"""How well the stable-step rules of `hub.planning.coupling` predict the largest stable step: 108 linear cases for each algorithm.
+"""How well the stable-step rules of `hub.planning.coupling` predict the largest stable step: 108 linear cases
+for each algorithm.
 
-A tool of mass m on a servo, its virtual coupling (k, b = 2 sqrt(k m_p)) and a proxy of mass m_p that presses on a spring make a linear
-system of four states. One communication step of it, taken through the code of `hub.participant.bond`, is a matrix; the step is stable if its
-spectral radius is at most 1. A rule holds in a case if the step it allows is no longer than the largest stable one.
+A tool of mass m on a servo, its virtual coupling (k, b = 2 sqrt(k m_p)) and a proxy of mass m_p that presses
+on a spring make a linear system of four states. One communication step of it, taken through the code of
+`hub.participant.bond`, is a matrix; the step is stable if its spectral radius is at most 1. A rule holds in a
+case if the step it allows is no longer than the largest stable one.
 """
 
 from __future__ import annotations
@@ -47,7 +49,12 @@ class Case:
         return 2.0 * sqrt(self.stiffness * self.proxy)
 
 
-CASES = [Case(*numbers) for numbers in product((0.01, 0.02, 0.05, 0.15), (500.0, 2000.0, 5000.0), (0.005, 0.01, 0.02), (100.0, 330.0, 900.0))]
+CASES = [
+    Case(*numbers)
+    for numbers in product(
+        (0.01, 0.02, 0.05, 0.15), (500.0, 2000.0, 5000.0), (0.005, 0.01, 0.02), (100.0, 330.0, 900.0)
+    )
+]
 
 
 def sides(case: Case) -> tuple[BondSide, BondSide]:
@@ -80,7 +87,9 @@ def advance(case: Case, bond: Bond, step_s: float, state: np.ndarray) -> np.ndar
         force.add(spring, damper, tau, h)
         u = (case.proxy * u + h * (spring + damper - case.contact * p)) / (case.proxy + h * CONTACT_DAMPING)
         p = p + h * u
-    reaction = force.result(case.stiffness * (force.position(step_s) - p), case.damping * (force.velocity(step_s) - u))
+    reaction = force.result(
+        case.stiffness * (force.position(step_s) - p), case.damping * (force.velocity(step_s) - u)
+    )
     motion.begin(Inputs({"tip/force": reaction["tip/force"]}), x, v)
     for i in range(count):
         push = motion.force((i + 0.5) * h, x + 0.5 * h * v, v)
@@ -98,7 +107,9 @@ def is_stable(case: Case, bond: Bond, step_s: float) -> bool:
 def allowed(case: Case, bond: Bond) -> float:
     """Return the longest of the tried steps (s) that the rule lets pass, 0 if none."""
     motion, force = sides(case)
-    return max((step for step in STEPS_S if stable_step_problem(bond, motion, force, step) is None), default=0.0)
+    return max(
+        (step for step in STEPS_S if stable_step_problem(bond, motion, force, step) is None), default=0.0
+    )
 
 
 def largest_stable(case: Case, bond: Bond) -> float:
@@ -123,7 +134,9 @@ def main() -> None:
         figures[name] = {
             "cases": len(pairs),
             "share_in_which_the_rule_holds": float((pairs[:, 0] <= pairs[:, 1]).mean()),
-            "median_of_allowed_by_largest": float(np.median(asked[:, 0] / np.maximum(asked[:, 1], SUB_STEP_S))),
+            "median_of_allowed_by_largest": float(
+                np.median(asked[:, 0] / np.maximum(asked[:, 1], SUB_STEP_S))
+            ),
         }
     if parser.parse_args().json:
         print(json.dumps(figures, indent=2))

@@ -1,4 +1,6 @@
-"""A hand that jumps to and fro, and looks when the robot's tip starts to follow: the device of `bench/latency.py`."""
+"""A hand that jumps to and fro, and looks when the robot's tip starts to follow: the device of
+`bench/latency.py`.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,10 @@ from schemas.ports import Port
 POSE = "geometry_msgs/msg/PoseStamped"
 WAY_M = 0.01
 SMOOTH_M, JERK_M = 2e-7, 1e-6
-"""Second difference of the tip's positions, step by step: below the one it goes on as it did, above the other something new drives it. The first
-step after a jump makes 4e-6 m, the rest of the drives' settling less than 1e-7 m."""
+"""Second difference of the tip's positions, step by step: below the one it goes on as it did, above the other
+something new drives it. The first step after a jump makes 4e-6 m, the rest of the drives' settling less than
+1e-7 m.
+"""
 SMOOTH_STEPS = 10
 
 
@@ -29,12 +33,21 @@ class TappingParams(Params):
 
 
 class Tapping(Device):
-    """Jumps by 10 mm once the tip moves smoothly, after a pause of any length between 20 and 30 ms, and notes when the tip shows it."""
+    """Jumps by 10 mm once the tip moves smoothly, after a pause of any length between 20 and 30 ms, and notes
+    when the tip shows it.
+    """
 
     params_model = TappingParams
     params: TappingParams
     ports = (
-        Port(name="pose", causality="output", type=POSE, frame="hand_base", clock="wall", max_age_ns=100_000_000),
+        Port(
+            name="pose",
+            causality="output",
+            type=POSE,
+            frame="hand_base",
+            clock="wall",
+            max_age_ns=100_000_000,
+        ),
         Port(name="state", causality="input", type=POSE),
     )
 

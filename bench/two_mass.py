@@ -1,8 +1,8 @@
 """Error and stability of the coupling algorithms on two masses and a spring-damper (examples/two_mass).
 
-Both engines run in one host; the RMS error of x1 over the communication points of 2 s is taken against the exact
-solution (matrix exponential of the coupled system). With --stiff the coupling spring is 1e4 N/m, and the largest step
-is sought at which the motion stays bounded (below 3 m, from a start at 1 m) over 300 steps.
+Both engines run in one host; the RMS error of x1 over the communication points of 2 s is taken against the
+exact solution (matrix exponential of the coupled system). With --stiff the coupling spring is 1e4 N/m, and
+the largest step is sought at which the motion stays bounded (below 3 m, from a start at 1 m) over 300 steps.
 """
 
 from __future__ import annotations
@@ -97,16 +97,29 @@ def survives(coupling: dict, step_ms: float, two: MassParams) -> bool:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--stiff", action="store_true", help="seek the largest stable step at a coupling stiffness of 1e4 N/m")
+    parser.add_argument(
+        "--stiff", action="store_true", help="seek the largest stable step at a coupling stiffness of 1e4 N/m"
+    )
     parser.add_argument("--steps-ms", type=float, nargs="+", default=[10, 2, 1])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--output", type=Path)
     args = parser.parse_args()
-    two = MassParams(mass=2, stiffness=50, damping=0.2, coupling_stiffness=1e4 if args.stiff else 100, coupling_damping=1, coupled_x=1)
+    two = MassParams(
+        mass=2,
+        stiffness=50,
+        damping=0.2,
+        coupling_stiffness=1e4 if args.stiff else 100,
+        coupling_damping=1,
+        coupled_x=1,
+    )
     rows: dict[str, dict[str, float]] = {}
     for name, coupling in ALGORITHMS.items():
         if args.stiff:
-            steps = [s for s in (0.05, 0.1, 0.2, 0.5, 1, 2, 3, 5, 8, 10, 12, 14, 15, 20) if survives(coupling, s, two)]
+            steps = [
+                s
+                for s in (0.05, 0.1, 0.2, 0.5, 1, 2, 3, 5, 8, 10, 12, 14, 15, 20)
+                if survives(coupling, s, two)
+            ]
             rows[name] = {"largest_stable_step_ms": max(steps, default=0.0)}
         else:
             rows[name] = {f"rms_error_m_at_{h:g}_ms": rms_error(coupling, h, two) for h in args.steps_ms}

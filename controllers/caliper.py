@@ -1,4 +1,5 @@
-"""Measuring with a hand: two opposed fingers close on an organ until both feel it, and their kinematics say how wide it is.
+"""Measuring with a hand: two opposed fingers close on an organ until both feel it, and their kinematics say
+how wide it is.
 
 For comparison the width of the organ's mesh at rest is taken along the same line.
 """
@@ -34,11 +35,18 @@ class CaliperParams(Params):
 
     arm: ArmName
     touch: Force = Field(default=0.05, gt=0, description="force on a fingertip at which its finger stops")
-    rate: float = Field(default=0.05, gt=0, description="at which the fingers close, in 1/s: share of the way from open to closed")
+    rate: float = Field(
+        default=0.05,
+        gt=0,
+        description="at which the fingers close, in 1/s: share of the way from open to closed",
+    )
 
 
 class Caliper(Stepped):
-    """Closes the two fingers from where they are once `start` is 1. Each stops when its tip feels the organ; when both have, the width is told."""
+    """Closes the two fingers from where they are once `start` is 1.
+
+    Each stops when its tip feels the organ; when both have, the width is told.
+    """
 
     params_model: ClassVar[type[Params]] = CaliperParams
     params: CaliperParams
@@ -47,11 +55,18 @@ class Caliper(Stepped):
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._memory = np.zeros(2 * _FINGERS + 3)
-        self._closing, self._touched = self._memory[:_FINGERS], self._memory[_FINGERS : 2 * _FINGERS]  # of each finger: 0 open to 1 closed; 0 or 1
-        self._started, self._width, self._true_width = (self._memory[i : i + 1] for i in range(2 * _FINGERS, 2 * _FINGERS + 3))
+        # of each finger: 0 open to 1 closed; 0 or 1
+        self._closing, self._touched = self._memory[:_FINGERS], self._memory[_FINGERS : 2 * _FINGERS]
+        self._started, self._width, self._true_width = (
+            self._memory[i : i + 1] for i in range(2 * _FINGERS, 2 * _FINGERS + 3)
+        )
         self._mesh = np.zeros((0, 3, 3))  # triangles of the organ at rest
         self._command = f"{params.arm}/hand/servo_jp"
-        self._outputs: dict[str, Any] = {self._command: (), "width": self._width, "true_width": self._true_width}
+        self._outputs: dict[str, Any] = {
+            self._command: (),
+            "width": self._width,
+            "true_width": self._true_width,
+        }
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -60,14 +75,60 @@ class Caliper(Stepped):
         motors, bones = tuple(joint.name for joint in HAND.joints), tuple(link.name for link in HAND.links)
         return (
             Port(name="start", causality="input", type=number, start=(0.0,), description="1: measure"),
-            Port(name="hand", causality="input", type=state, names=motors, fields=("position", "velocity", "effort"), description="its measured_js"),
-            Port(name="phalanges", causality="input", type=state, names=bones, fields=("position", "velocity", "effort"), description="their measured_js"),
-            Port(name="position", causality="input", size=3 * _SPHERES, unit="m", frame="world", description="of the hand's contact spheres"),
-            Port(name="force", causality="input", size=3 * _SPHERES, unit="N", frame="world", description="on the hand's contact spheres"),
-            Port(name="nodes", causality="input", type=SoftBodyState.ros_type, frame="world", description="of the organ"),
+            Port(
+                name="hand",
+                causality="input",
+                type=state,
+                names=motors,
+                fields=("position", "velocity", "effort"),
+                description="its measured_js",
+            ),
+            Port(
+                name="phalanges",
+                causality="input",
+                type=state,
+                names=bones,
+                fields=("position", "velocity", "effort"),
+                description="their measured_js",
+            ),
+            Port(
+                name="position",
+                causality="input",
+                size=3 * _SPHERES,
+                unit="m",
+                frame="world",
+                description="of the hand's contact spheres",
+            ),
+            Port(
+                name="force",
+                causality="input",
+                size=3 * _SPHERES,
+                unit="N",
+                frame="world",
+                description="on the hand's contact spheres",
+            ),
+            Port(
+                name="nodes",
+                causality="input",
+                type=SoftBodyState.ros_type,
+                frame="world",
+                description="of the organ",
+            ),
             Port(name=self._command, causality="output", type=state, variability="event"),
-            Port(name="width", causality="output", type=number, unit="m", description="between the fingertips' surfaces when both have touched; 0 before"),
-            Port(name="true_width", causality="output", type=number, unit="m", description="of the mesh at rest along the line through both fingertips"),
+            Port(
+                name="width",
+                causality="output",
+                type=number,
+                unit="m",
+                description="between the fingertips' surfaces when both have touched; 0 before",
+            ),
+            Port(
+                name="true_width",
+                causality="output",
+                type=number,
+                unit="m",
+                description="of the mesh at rest along the line through both fingertips",
+            ),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -81,7 +142,9 @@ class Caliper(Stepped):
         if not inputs["start"][0] or self._width[0]:
             return self._outputs
         if not self._started[0]:
-            closings = (inputs["hand"][:_FINGERS] - _OPEN[:_FINGERS])[list(_JAWS)] / (_CLOSED - _OPEN)[list(_JAWS)]
+            closings = (inputs["hand"][:_FINGERS] - _OPEN[:_FINGERS])[list(_JAWS)] / (_CLOSED - _OPEN)[
+                list(_JAWS)
+            ]
             self._started[0], self._closing[list(_JAWS)] = 1.0, np.clip(closings, 0.0, 1.0)
         self._feel(inputs["force"].reshape(_FINGERS, _PHALANGES, 3))
         if self._touched[list(_JAWS)].all():
@@ -108,7 +171,10 @@ class Caliper(Stepped):
                 self._closing[finger] += self.params.rate * seconds
         if self._closing.max() > 1.0:
             missing = " and ".join(HAND.fingers[i] for i in _JAWS if not self._touched[i])
-            raise SessionError(f"caliper '{self.name}': {missing} closed without feeling {self.params.touch:g} N; is the organ between the fingers?")
+            raise SessionError(
+                f"caliper '{self.name}': {missing} closed without feeling {self.params.touch:g} N; is the"
+                " organ between the fingers?"
+            )
         command = _OPEN + np.tile(self._closing, 2) * (_CLOSED - _OPEN)
         self._outputs[self._command] = (JointState(position=command),)
 
@@ -129,19 +195,29 @@ class Caliper(Stepped):
 
     def restore(self, state: bytes) -> None:
         """Go on from where a state was saved. Raises StateError if it is none of a caliper's."""
-        if len(state) < self._memory.nbytes or (len(state) - self._memory.nbytes) % (9 * self._memory.itemsize):
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, which is none of a caliper's; was it saved elsewhere?")
+        if len(state) < self._memory.nbytes or (len(state) - self._memory.nbytes) % (
+            9 * self._memory.itemsize
+        ):
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes, which is none of a"
+                " caliper's; was it saved elsewhere?"
+            )
         values = np.frombuffer(state)
-        self._memory[:], self._mesh = values[: self._memory.size], values[self._memory.size :].reshape(-1, 3, 3)
+        self._memory[:], self._mesh = (
+            values[: self._memory.size],
+            values[self._memory.size :].reshape(-1, 3, 3),
+        )
 
     def close(self) -> None:
         """Nothing to give back."""
 
 
 def width_of_mesh(triangles: Vector, one: Vector, other: Vector) -> float:
-    """Return how wide a closed surface is along the line through two points: between the outermost points where the line meets it; 0 if it misses.
+    """Return how wide a closed surface is along the line through two points: between the outermost points
+    where the line meets it; 0 if it misses.
 
-    Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", Journal of Graphics Tools 2 (1997).
+    Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", Journal of Graphics Tools 2
+    (1997).
 
     Args:
         triangles: corners, m, shape (n, 3, 3).
@@ -149,7 +225,11 @@ def width_of_mesh(triangles: Vector, one: Vector, other: Vector) -> float:
         other: another one.
     """
     direction = (other - one) / np.linalg.norm(other - one)
-    corner, u_edge, v_edge = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    corner, u_edge, v_edge = (
+        triangles[:, 0],
+        triangles[:, 1] - triangles[:, 0],
+        triangles[:, 2] - triangles[:, 0],
+    )
     p = np.cross(direction, v_edge)
     determinant = np.einsum("ni,ni->n", u_edge, p)
     met = np.abs(determinant) > 1e-15  # m^2: else the line lies in the triangle's plane

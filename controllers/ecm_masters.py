@@ -1,13 +1,16 @@
 """Both masters drag the picture: the endoscope as the camera pedal of a dVRK lets surgeons lead it.
 
-The law of jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationECM.cpp (RunEnabled). With c the middle between the masters in the display's frame and u the
-normal of the plane through both and the display's origin, each against what it was when the pedal went down:
+The law of jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationECM.cpp (RunEnabled). With c the middle between
+the masters in the display's frame and u the normal of the plane through both and the display's origin, each
+against what it was when the pedal went down:
 
-    a = -angle about y of c,  b = angle about x of c,  i = s (|c0| - |c|),  r = -angle about z of u,    g = q0_roll + r
+    a = -angle about y of c,  b = angle about x of c,  i = s (|c0| - |c|),  r = -angle about z of u,    g =
+    q0_roll + r
     q = q0 + (a cos g - b sin g,  b cos g + a sin g,  i,  r)
 
-The masters are held at their distance by springs, rubbed, and turned against the picture, so that hands feel one thing that they hold. The reference is
-taken from the endoscope's setpoint, so the first step moves nothing.
+The masters are held at their distance by springs, rubbed, and turned against the picture, so that hands feel
+one thing that they hold. The reference is taken from the endoscope's setpoint, so the first step moves
+nothing.
 """
 
 from __future__ import annotations
@@ -52,12 +55,18 @@ _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 class EcmMastersParams(Params):
     """How two masters lead the endoscope."""
 
-    scale: float = Field(default=1.0, gt=0.0, description="metres of insertion per metre that the masters are pulled")
-    max_age: Duration = Field(default=100_000_000, gt=0, description="the camera holds when a master has been silent for longer")
+    scale: float = Field(
+        default=1.0, gt=0.0, description="metres of insertion per metre that the masters are pulled"
+    )
+    max_age: Duration = Field(
+        default=100_000_000, gt=0, description="the camera holds when a master has been silent for longer"
+    )
 
 
 class EcmMasters(Stepped):
-    """Two masters, one endoscope: it follows while button 0 is held, the arm is ready and both masters are heard."""
+    """Two masters, one endoscope: it follows while button 0 is held, the arm is ready and both masters are
+    heard.
+    """
 
     params_model: ClassVar[type[Params]] = EcmMastersParams
     params: EcmMastersParams
@@ -68,28 +77,95 @@ class EcmMasters(Stepped):
         self._chain = ecm.chain()
         self._state = np.zeros(25)
         parts = np.split(self._state, [1, 2, 3, 6, 9, 11, 15, 19, 23])
-        self._pressed, self._ready, self._follows, self._middle, self._up, self._span, self._start, *turns, _ = parts
+        (
+            self._pressed,
+            self._ready,
+            self._follows,
+            self._middle,
+            self._up,
+            self._span,
+            self._start,
+            *turns,
+            _,
+        ) = parts
         self._turns = dict(zip(_MASTERS, turns, strict=True))
         self._ready[0] = 1.0
         self._commands = [f"{master}/{name}" for master in _MASTERS for name in _COMMANDS]
-        self._silent: dict[str, Value] = {"ECM/servo_jp": (), "warning": (), **dict.fromkeys(self._commands, ())}
+        self._silent: dict[str, Value] = {
+            "ECM/servo_jp": (),
+            "warning": (),
+            **dict.fromkeys(self._commands, ()),
+        }
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The masters, the pedal and the endoscope's setpoint in; its commands, and those to the masters, out."""
-        age, pose, twist = self.params.max_age, "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TwistStamped"
+        """The masters, the pedal and the endoscope's setpoint in; its commands, and those to the masters,
+        out.
+        """
+        age, pose, twist = (
+            self.params.max_age,
+            "geometry_msgs/msg/PoseStamped",
+            "geometry_msgs/msg/TwistStamped",
+        )
         still = ecm.HOME + (0.0,) * 8
         joints, told = "sensor_msgs/msg/JointState", "of a motion controller, whose setpoint_js it is"
         return (
-            *(Port(name=f"{master}/measured_cp", causality="input", type=pose, max_age_ns=age) for master in _MASTERS),
-            *(Port(name=f"{master}/measured_cv", causality="input", type=twist, start=(0.0,) * 6) for master in _MASTERS),
-            Port(name="buttons", causality="input", type=Joy.ros_type, variability="event", description="button 0: follows while it is held"),
-            Port(name="measured_js", causality="input", type=joints, names=ecm.JOINT_NAMES, fields=_MEASURED, start=still, description=told),
-            Port(name="operating_state", causality="input", type=OperatingState.ros_type, variability="event", description="of the ECM"),
-            Port(name="ECM/servo_jp", causality="output", type=joints, variability="event", description="while it follows"),
-            *(Port(name=f"{master}/{name}", causality="output", type=type_, variability="event") for master in _MASTERS for name, type_ in _COMMANDS.items()),
-            Port(name="following", causality="output", type=BoolMessage.ros_type, description="whether the endoscope follows"),
-            Port(name="warning", causality="output", type=StringMessage.ros_type, variability="event", description="why it does not"),
+            *(
+                Port(name=f"{master}/measured_cp", causality="input", type=pose, max_age_ns=age)
+                for master in _MASTERS
+            ),
+            *(
+                Port(name=f"{master}/measured_cv", causality="input", type=twist, start=(0.0,) * 6)
+                for master in _MASTERS
+            ),
+            Port(
+                name="buttons",
+                causality="input",
+                type=Joy.ros_type,
+                variability="event",
+                description="button 0: follows while it is held",
+            ),
+            Port(
+                name="measured_js",
+                causality="input",
+                type=joints,
+                names=ecm.JOINT_NAMES,
+                fields=_MEASURED,
+                start=still,
+                description=told,
+            ),
+            Port(
+                name="operating_state",
+                causality="input",
+                type=OperatingState.ros_type,
+                variability="event",
+                description="of the ECM",
+            ),
+            Port(
+                name="ECM/servo_jp",
+                causality="output",
+                type=joints,
+                variability="event",
+                description="while it follows",
+            ),
+            *(
+                Port(name=f"{master}/{name}", causality="output", type=type_, variability="event")
+                for master in _MASTERS
+                for name, type_ in _COMMANDS.items()
+            ),
+            Port(
+                name="following",
+                causality="output",
+                type=BoolMessage.ros_type,
+                description="whether the endoscope follows",
+            ),
+            Port(
+                name="warning",
+                causality="output",
+                type=StringMessage.ros_type,
+                variability="event",
+                description="why it does not",
+            ),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -116,7 +192,10 @@ class EcmMasters(Stepped):
             if not before:
                 self._engage(left, right, inputs["measured_js"])
                 for master in _MASTERS:
-                    outputs |= {f"{master}/{name}": (_FOLLOWS,) for name in ("use_gravity_compensation", "body/set_cf_orientation_absolute")}
+                    outputs |= {
+                        f"{master}/{name}": (_FOLLOWS,)
+                        for name in ("use_gravity_compensation", "body/set_cf_orientation_absolute")
+                    }
             outputs |= self._lead(left[:3], right[:3], Time.from_ns(t + h))
             outputs |= self._hold_together(left[:3], right[:3], inputs)
         return outputs
@@ -133,12 +212,23 @@ class EcmMasters(Stepped):
     def _lead(self, left: Vector, right: Vector, stamp: Time) -> dict[str, Value]:
         """Return the command to the endoscope, and how the masters are turned against it."""
         middle, up, _ = _picture(left, right)
-        a, b, r = -_angle(_Y, self._middle, middle), _angle(_X, self._middle, middle), -_angle(_Z, self._up, up)
+        a, b, r = (
+            -_angle(_Y, self._middle, middle),
+            _angle(_X, self._middle, middle),
+            -_angle(_Z, self._up, up),
+        )
         i = self.params.scale * float(np.linalg.norm(self._middle) - np.linalg.norm(middle))
         cos, sin = np.cos(self._start[3] + r), np.sin(self._start[3] + r)
-        goal = np.clip(self._start + np.array([a * cos - b * sin, b * cos + a * sin, i, r]), self._chain.lower, self._chain.upper)
+        goal = np.clip(
+            self._start + np.array([a * cos - b * sin, b * cos + a * sin, i, r]),
+            self._chain.lower,
+            self._chain.upper,
+        )
         back = rotation.conjugate(rotation.product(_turned(goal), rotation.conjugate(_turned(self._start))))
-        locks: dict[str, Value] = {f"{m}/lock_orientation": (_quaternion(rotation.product(back, turn)),) for m, turn in self._turns.items()}
+        locks: dict[str, Value] = {
+            f"{m}/lock_orientation": (_quaternion(rotation.product(back, turn)),)
+            for m, turn in self._turns.items()
+        }
         return locks | {"ECM/servo_jp": (JointState(header=Header(stamp=stamp), position=goal),)}
 
     def _hold_together(self, left: Vector, right: Vector, inputs: Inputs) -> dict[str, Value]:
@@ -178,7 +268,9 @@ _COMMANDS = {
 
 
 def _picture(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the middle between the masters, the way up in the picture that they hold, and the way to its right."""
+    """Return the middle between the masters, the way up in the picture that they hold, and the way to its
+    right.
+    """
     middle = 0.5 * (left + right)
     up = np.cross(right - left, middle)
     up /= np.linalg.norm(up)
@@ -193,8 +285,12 @@ def _angle(axis: Vector, one: Vector, other: Vector) -> float:
 
 
 def _turned(q: Vector) -> Vector:
-    """Return how the picture is turned at joint positions `q`: roll about z, yaw about y, pitch about x, as a quaternion."""
-    return rotation.product(rotation.product(rotation.exp(q[3] * _Z), rotation.exp(q[0] * _Y)), rotation.exp(q[1] * _X))
+    """Return how the picture is turned at joint positions `q`: roll about z, yaw about y, pitch about x, as a
+    quaternion.
+    """
+    return rotation.product(
+        rotation.product(rotation.exp(q[3] * _Z), rotation.exp(q[0] * _Y)), rotation.exp(q[1] * _X)
+    )
 
 
 def _quaternion(value: Vector) -> Quaternion:

@@ -1,17 +1,19 @@
 """Teleoperation of the endoscope by the surgeon's head.
 
-The law of Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", IEEE International Conference on Robotic Computing, 2019: of the
-twist of the head-mounted display in its own frame (v_R, w_R) the camera is to have, in its own frame, v_C,z = v_R,z and w_C = w_R. As the
-four joints cannot do both, there are two modes, between which the user switches:
+The law of Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", IEEE International Conference on
+Robotic Computing, 2019: of the twist of the head-mounted display in its own frame (v_R, w_R) the camera is to
+have, in its own frame, v_C,z = v_R,z and w_C = w_R. As the four joints cannot do both, there are two modes,
+between which the user switches:
 
     orientation    dq_{1,2,4}/dt = pinv(J_w) w_R,    dq_3/dt = 0
     position       dq_3/dt = v_R,z,                  dq_{1,2,4}/dt = 0
 
-J_w are the three angular rows of the camera's Jacobian in its own frame. Inside the joint ranges they have full rank (their determinant is the
-cosine of the pitch). The paper's z axis looks ahead; a head's own frame here has x ahead, y to the left and z up.
+J_w are the three angular rows of the camera's Jacobian in its own frame. Inside the joint ranges they have
+full rank (their determinant is the cosine of the pitch). The paper's z axis looks ahead; a head's own frame
+here has x ahead, y to the left and z up.
 
-Joints that would be too fast slow down together, so that the camera turns about the right axis; one at the end of its range stands, and the others do what
-they can without it. What is cut is not made up for later.
+Joints that would be too fast slow down together, so that the camera turns about the right axis; one at the
+end of its range stands, and the others do what they can without it. What is cut is not made up for later.
 """
 
 from __future__ import annotations
@@ -43,25 +45,44 @@ _FIELDS: tuple[Literal["position", "velocity", "effort"], ...] = ("position", "v
 _JOINT_STATE, _STRING = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
 
 _CAMERA_IN_HEAD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-"""From a head's axes (x ahead, y left, z up) to those in which the camera sees (x left, y up, z ahead; robots.dvrk.ecm, tip frame `view`)."""
+"""From a head's axes (x ahead, y left, z up) to those in which the camera sees (x left, y up, z ahead;
+robots.dvrk.ecm, tip frame `view`).
+"""
 
 
 class EcmButtons(Params):
     """Which button does what, counted from 0."""
 
     mode: int | None = Field(default=0, ge=0, description="each press changes between turning and moving")
-    dead_man: int | None = Field(default=None, ge=0, description="the camera follows only while it is held; default: whenever the head is heard")
+    dead_man: int | None = Field(
+        default=None,
+        ge=0,
+        description="the camera follows only while it is held; default: whenever the head is heard",
+    )
 
 
 class EcmTeleoperationParams(Params):
     """How a head leads the endoscope."""
 
-    endoscope: ecm.Endoscope = Field(default="straight", description="as the ECM has it: where it looks, along its shaft or 30 degrees up or down")
-    start: EcmPositions = Field(default=ecm.HOME, description=f"the command until measured_js is there: {', '.join(ecm.JOINT_NAMES)}")
-    mode: Literal["orientation", "position"] = Field(default="orientation", description="turn as the head turns, or go in and out as it does")
-    scale: float = Field(default=1.0, gt=0.0, description="motion of the camera over that of the head; also an input, to be changed while it runs")
+    endoscope: ecm.Endoscope = Field(
+        default="straight",
+        description="as the ECM has it: where it looks, along its shaft or 30 degrees up or down",
+    )
+    start: EcmPositions = Field(
+        default=ecm.HOME, description=f"the command until measured_js is there: {', '.join(ecm.JOINT_NAMES)}"
+    )
+    mode: Literal["orientation", "position"] = Field(
+        default="orientation", description="turn as the head turns, or go in and out as it does"
+    )
+    scale: float = Field(
+        default=1.0,
+        gt=0.0,
+        description="motion of the camera over that of the head; also an input, to be changed while it runs",
+    )
     buttons: EcmButtons = EcmButtons()
-    max_age: Duration = Field(default=100_000_000, gt=0, description="the camera holds when the head has been silent for longer")
+    max_age: Duration = Field(
+        default=100_000_000, gt=0, description="the camera holds when the head has been silent for longer"
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -77,7 +98,8 @@ def joint_velocities(chain: SerialChain, q: Vector, twist: Vector, mode: str, fr
     Args:
         chain: kinematics up to the camera as it sees (tip frame `view`).
         q: joint positions, shape (4,).
-        twist: of the head (6,) in its own frame (x ahead, y left, z up): velocity of its origin, then angular velocity.
+        twist: of the head (6,) in its own frame (x ahead, y left, z up): velocity of its origin, then angular
+        velocity.
         mode: `orientation` or `position`.
         free: the joints that may move, shape (4,) of bools; the others are at rest.
     """
@@ -86,8 +108,10 @@ def joint_velocities(chain: SerialChain, q: Vector, twist: Vector, mode: str, fr
         velocities[_INSERTION] = twist[0] if free[_INSERTION] else 0.0
     elif turning := [joint for joint in _TURNING if free[joint]]:
         frames = chain.frames(q)
-        jacobian = frames[-1, :3, :3].T @ frames[turning, :3, 2].T  # (3, <= 3): the joints' axes in the camera's frame
-        velocities[turning] = np.linalg.lstsq(jacobian, _CAMERA_IN_HEAD @ twist[3:], rcond=None)[0]  # pinv(J_w) w, at a third of its cost
+        # (3, <= 3): the joints' axes in the camera's frame
+        jacobian = frames[-1, :3, :3].T @ frames[turning, :3, 2].T
+        # pinv(J_w) w, at a third of its cost
+        velocities[turning] = np.linalg.lstsq(jacobian, _CAMERA_IN_HEAD @ twist[3:], rcond=None)[0]
     return velocities
 
 
@@ -104,7 +128,9 @@ def _limited(chain: SerialChain, q: Vector, twist: Vector, mode: str) -> Vector:
 
 
 class EcmTeleoperation(Stepped):
-    """One head, one endoscope. Nothing moves while the head is not heard, the dead-man is open, or the arm is not ready."""
+    """One head, one endoscope. Nothing moves while the head is not heard, the dead-man is open, or the arm is
+    not ready.
+    """
 
     params_model: ClassVar[type[Params]] = EcmTeleoperationParams
     params: EcmTeleoperationParams
@@ -114,24 +140,72 @@ class EcmTeleoperation(Stepped):
         super().__init__(name, params)
         self._chain = ecm.chain(params.endoscope, "view")
         self._state = np.zeros(2 * _JOINTS + 7)
-        self._command, self._velocity, self._mode, self._pressed, self._held, self._ready, self._started, self._scale, self._heard = np.split(
-            self._state, np.cumsum([_JOINTS, _JOINTS, 1, 1, 1, 1, 1, 1])
-        )
+        (
+            self._command,
+            self._velocity,
+            self._mode,
+            self._pressed,
+            self._held,
+            self._ready,
+            self._started,
+            self._scale,
+            self._heard,
+        ) = np.split(self._state, np.cumsum([_JOINTS, _JOINTS, 1, 1, 1, 1, 1, 1]))
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """The head, the user's wishes and the arm's state in; the command to its servos out."""
         p, names = self.params, ecm.JOINT_NAMES
         at_rest = p.start + (0.0,) * (2 * _JOINTS)
-        pose, twist, joy = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TwistStamped", "sensor_msgs/msg/Joy"
+        pose, twist, joy = (
+            "geometry_msgs/msg/PoseStamped",
+            "geometry_msgs/msg/TwistStamped",
+            "sensor_msgs/msg/Joy",
+        )
         read = "read at the start and whenever the arm becomes ready"
         return (
-            Port(name="pose", causality="input", type=pose, max_age_ns=p.max_age, description="pose of the head: x ahead, y left, z up"),
-            Port(name="twist", causality="input", type=twist, max_age_ns=p.max_age, description="of the head, in the frame of its pose"),
-            Port(name="mode", causality="input", type=_STRING, variability="event", description=" or ".join(_MODES)),
-            Port(name="buttons", causality="input", type=joy, variability="event", description="mode and dead-man, as the parameters say"),
-            Port(name="scale", causality="input", type="std_msgs/msg/Float64", start=(p.scale,), description="motion of the camera over that of the head"),
-            Port(name="operating_state", causality="input", type=OperatingState.ros_type, variability="event", description="of the ECM; unconnected: ready"),
+            Port(
+                name="pose",
+                causality="input",
+                type=pose,
+                max_age_ns=p.max_age,
+                description="pose of the head: x ahead, y left, z up",
+            ),
+            Port(
+                name="twist",
+                causality="input",
+                type=twist,
+                max_age_ns=p.max_age,
+                description="of the head, in the frame of its pose",
+            ),
+            Port(
+                name="mode",
+                causality="input",
+                type=_STRING,
+                variability="event",
+                description=" or ".join(_MODES),
+            ),
+            Port(
+                name="buttons",
+                causality="input",
+                type=joy,
+                variability="event",
+                description="mode and dead-man, as the parameters say",
+            ),
+            Port(
+                name="scale",
+                causality="input",
+                type="std_msgs/msg/Float64",
+                start=(p.scale,),
+                description="motion of the camera over that of the head",
+            ),
+            Port(
+                name="operating_state",
+                causality="input",
+                type=OperatingState.ros_type,
+                variability="event",
+                description="of the ECM; unconnected: ready",
+            ),
             Port(
                 name="measured_js",
                 causality="input",
@@ -141,10 +215,35 @@ class EcmTeleoperation(Stepped):
                 start=at_rest,
                 description=read,
             ),
-            Port(name="servo_jp", causality="output", type=_JOINT_STATE, names=names, description="command to the ECM's joint servos"),
-            Port(name="joint_velocity", causality="output", type=_JOINT_STATE, names=names, fields=("velocity",), description="with which the command moves"),
-            Port(name="active_mode", causality="output", type=_STRING, variability="event", description="whenever it changes"),
-            Port(name="warning", causality="output", type=_STRING, variability="event", description="a wish that cannot be heeded"),
+            Port(
+                name="servo_jp",
+                causality="output",
+                type=_JOINT_STATE,
+                names=names,
+                description="command to the ECM's joint servos",
+            ),
+            Port(
+                name="joint_velocity",
+                causality="output",
+                type=_JOINT_STATE,
+                names=names,
+                fields=("velocity",),
+                description="with which the command moves",
+            ),
+            Port(
+                name="active_mode",
+                causality="output",
+                type=_STRING,
+                variability="event",
+                description="whenever it changes",
+            ),
+            Port(
+                name="warning",
+                causality="output",
+                type=_STRING,
+                variability="event",
+                description="a wish that cannot be heeded",
+            ),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -199,7 +298,9 @@ class EcmTeleoperation(Stepped):
             if wish.data in _MODES:
                 self._mode[0] = _MODES.index(wish.data)
             else:
-                warnings.append(StringMessage(data=f"there is no mode '{wish.data}'.{did_you_mean(wish.data, _MODES)}"))
+                warnings.append(
+                    StringMessage(data=f"there is no mode '{wish.data}'.{did_you_mean(wish.data, _MODES)}")
+                )
         return tuple(warnings)
 
     def _heed_scale(self, scale: float) -> tuple[StringMessage, ...]:
@@ -208,7 +309,15 @@ class EcmTeleoperation(Stepped):
         if scale > 0.0:
             self._scale[0] = scale
             return ()
-        return (StringMessage(data=f"scale {scale:g} is refused, it must be above 0; it stays {self._scale[0]:g}"),) if news else ()
+        return (
+            (
+                StringMessage(
+                    data=f"scale {scale:g} is refused, it must be above 0; it stays {self._scale[0]:g}"
+                ),
+            )
+            if news
+            else ()
+        )
 
     def _heed_buttons(self, events: tuple[Message, ...]) -> None:
         """Follow the buttons; a Joy without one of them says nothing of it."""
@@ -223,7 +332,12 @@ class EcmTeleoperation(Stepped):
                 self._pressed[0] = pressed
 
     def _outputs(self, modes: tuple[StringMessage, ...], warnings: tuple[StringMessage, ...]) -> Outputs:
-        return {"servo_jp": self._command, "joint_velocity": self._velocity, "active_mode": modes, "warning": warnings}
+        return {
+            "servo_jp": self._command,
+            "joint_velocity": self._velocity,
+            "active_mode": modes,
+            "warning": warnings,
+        }
 
     def state_hash(self) -> int:
         """Return the hash of the command, its velocity, the mode, the buttons and the scale."""

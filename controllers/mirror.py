@@ -1,11 +1,14 @@
-"""The mirror: simulated arms follow the measured states of real ones, for overlays and for comparison, and show how far behind they are.
+"""The mirror: simulated arms follow the measured states of real ones, for overlays and for comparison, and
+show how far behind they are.
 
-Each new sample of a real arm becomes one `servo_jp`, with the velocity that was measured, clipped to the simulated arm's ranges. An arm that is not heard
-any more holds. Two figures tell how well it follows:
+Each new sample of a real arm becomes one `servo_jp`, with the velocity that was measured, clipped to the
+simulated arm's ranges. An arm that is not heard any more holds. Two figures tell how well it follows:
 
     distance   from the simulated tip to the real one, both by the simulated arm's kinematics, m
-    lag        the time by which the simulated arm is behind: over the last second it was where the real one is now less `lag` times its velocity,
-               lag = sum v.(q - q_sim) / sum v.v, joints weighed by their speed limits; where nothing moves it stays.
+    lag        the time by which the simulated arm is behind: over the last second it was where the real one
+    is now less `lag` times its velocity,
+               lag = sum v.(q - q_sim) / sum v.v, joints weighed by their speed limits; where nothing moves it
+               stays.
 
 The way from the real arm to the hub is not in it: the sample's own age adds to the lag.
 """
@@ -33,18 +36,24 @@ _JOINT_STATE, _NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
 _WINDOW = 1.0
 """s; time constant with which the past is forgotten where the lag is estimated."""
 _LEAST = 1e-5
-"""Sum of squares of velocities (shares of the speed limits, s) below which nothing is known of the lag: 0.3 % of the limits for a second."""
+"""Sum of squares of velocities (shares of the speed limits, s) below which nothing is known of the lag: 0.3 %
+of the limits for a second.
+"""
 
 
 class MirrorParams(Params):
     """Which arms follow real ones."""
 
     arms: Arms
-    max_age: Duration = Field(default=100_000_000, gt=0, description="an arm holds when its real one has been silent for longer")
+    max_age: Duration = Field(
+        default=100_000_000, gt=0, description="an arm holds when its real one has been silent for longer"
+    )
 
 
 class Mirror(Stepped):
-    """Real arms in under `real/`, their simulated ones' states too; `servo_jp` to these out, with `distance` and `lag`."""
+    """Real arms in under `real/`, their simulated ones' states too; `servo_jp` to these out, with `distance`
+    and `lag`.
+    """
 
     params_model: ClassVar[type[Params]] = MirrorParams
     params: MirrorParams
@@ -93,32 +102,94 @@ class _Arm:
         n, m = len(self._chain.joints), len(self._jaw)
         self.state = np.zeros(n + m + 6)
         parts = np.split(self.state, [n, n + m, n + m + 2, n + m + 3, n + m + 4, n + m + 5])
-        self._heard, self._heard_jaw, self._sums, self._follows, self._ready, self._distance, self._lag = parts
+        self._heard, self._heard_jaw, self._sums, self._follows, self._ready, self._distance, self._lag = (
+            parts
+        )
         self._heard[:] = np.nan  # a state hash takes bits, so nothing heard is as good as any number
         self._heard_jaw[:] = np.nan
         self._ready[0] = 1.0
-        self.outputs: dict[str, Value] = {f"{name}/{out}": () for out in ("servo_jp", "hold", "warning", *(("jaw/servo_jp",) if m else ()))}
+        self.outputs: dict[str, Value] = {
+            f"{name}/{out}": () for out in ("servo_jp", "hold", "warning", *(("jaw/servo_jp",) if m else ()))
+        }
         self.outputs |= {f"{name}/distance": self._distance, f"{name}/lag": self._lag}
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        name, names, fields = self._name, tuple(joint.name for joint in self._chain.joints), ("position", "velocity", "effort")
+        name, names, fields = (
+            self._name,
+            tuple(joint.name for joint in self._chain.joints),
+            ("position", "velocity", "effort"),
+        )
         still = (0.0,) * (3 * len(names))
         real = {"causality": "input", "type": _JOINT_STATE, "fields": fields, "max_age_ns": self._max_age_ns}
         command = {"causality": "output", "type": _JOINT_STATE, "variability": "event"}
         rows = [
-            {"name": f"real/{name}/measured_js", "names": names, "start": still, "description": "of the real arm"} | real,
-            {"name": f"{name}/measured_js", "names": names, "start": still, "causality": "input", "type": _JOINT_STATE, "fields": fields},
-            {"name": f"{name}/operating_state", "causality": "input", "type": OperatingState.ros_type, "variability": "event"},
-            {"name": f"{name}/servo_jp", "description": "where the real arm is, as fast as it goes, whenever it tells"} | command,
-            {"name": f"{name}/hold", "causality": "output", "type": "std_msgs/msg/Empty", "variability": "event", "description": "when it is silent"},
-            {"name": f"{name}/warning", "causality": "output", "type": "std_msgs/msg/String", "variability": "event", "description": "why the arm holds"},
-            {"name": f"{name}/distance", "causality": "output", "type": _NUMBER, "unit": "m", "description": "between the tips"},
-            {"name": f"{name}/lag", "causality": "output", "type": _NUMBER, "unit": "s", "description": "by which the simulated arm is behind"},
+            {
+                "name": f"real/{name}/measured_js",
+                "names": names,
+                "start": still,
+                "description": "of the real arm",
+            }
+            | real,
+            {
+                "name": f"{name}/measured_js",
+                "names": names,
+                "start": still,
+                "causality": "input",
+                "type": _JOINT_STATE,
+                "fields": fields,
+            },
+            {
+                "name": f"{name}/operating_state",
+                "causality": "input",
+                "type": OperatingState.ros_type,
+                "variability": "event",
+            },
+            {
+                "name": f"{name}/servo_jp",
+                "description": "where the real arm is, as fast as it goes, whenever it tells",
+            }
+            | command,
+            {
+                "name": f"{name}/hold",
+                "causality": "output",
+                "type": "std_msgs/msg/Empty",
+                "variability": "event",
+                "description": "when it is silent",
+            },
+            {
+                "name": f"{name}/warning",
+                "causality": "output",
+                "type": "std_msgs/msg/String",
+                "variability": "event",
+                "description": "why the arm holds",
+            },
+            {
+                "name": f"{name}/distance",
+                "causality": "output",
+                "type": _NUMBER,
+                "unit": "m",
+                "description": "between the tips",
+            },
+            {
+                "name": f"{name}/lag",
+                "causality": "output",
+                "type": _NUMBER,
+                "unit": "s",
+                "description": "by which the simulated arm is behind",
+            },
         ]
         if self._jaw:
             start = (0.0, 0.0, 0.0)
-            rows.append({"name": f"real/{name}/jaw/measured_js", "names": ("jaw",), "start": start, "description": "of the real jaw"} | real)
+            rows.append(
+                {
+                    "name": f"real/{name}/jaw/measured_js",
+                    "names": ("jaw",),
+                    "start": start,
+                    "description": "of the real jaw",
+                }
+                | real
+            )
             rows.append({"name": f"{name}/jaw/servo_jp"} | command)
         return tuple(Port.model_validate(row) for row in rows)
 
@@ -141,13 +212,17 @@ class _Arm:
             stamp = Time.from_ns(t + h)
             self._tell("servo_jp", self._heard, real, self._chain.joints, stamp)
             if self._jaw and not inputs.stale(f"real/{name}/jaw/measured_js"):
-                self._tell("jaw/servo_jp", self._heard_jaw, inputs[f"real/{name}/jaw/measured_js"], self._jaw, stamp)
+                self._tell(
+                    "jaw/servo_jp", self._heard_jaw, inputs[f"real/{name}/jaw/measured_js"], self._jaw, stamp
+                )
             self._compare(real[:n], real[n : 2 * n], inputs[f"{name}/measured_js"][:n], h * 1e-9)
         else:
             self._heard[:] = self._heard_jaw[:] = np.nan  # so that it is told anew
         return self.outputs
 
-    def _tell(self, command: str, heard: Vector, real: Vector, joints: tuple[Joint, ...], stamp: Time) -> None:
+    def _tell(
+        self, command: str, heard: Vector, real: Vector, joints: tuple[Joint, ...], stamp: Time
+    ) -> None:
         """Send positions, with velocities, of a sample that is new."""
         n = len(joints)
         if np.array_equal(real[:n], heard):
@@ -155,7 +230,11 @@ class _Arm:
         heard[:] = real[:n]
         lower, upper = (np.array([getattr(joint, end) for joint in joints]) for end in ("lower", "upper"))
         within = np.clip(real[:n], lower, upper)
-        message = JointState(header=Header(stamp=stamp), position=within, velocity=np.where(within == real[:n], real[n : 2 * n], 0.0))
+        message = JointState(
+            header=Header(stamp=stamp),
+            position=within,
+            velocity=np.where(within == real[:n], real[n : 2 * n], 0.0),
+        )
         self.outputs[f"{self._name}/{command}"] = (message,)
 
     def _compare(self, real: Vector, velocity: Vector, simulated: Vector, h: float) -> None:

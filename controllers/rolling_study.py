@@ -1,4 +1,6 @@
-"""The study of stitches (`robots.dvrk.stitch_study`) as a participant, so that a scenario that rolls a needle says in its summary what that is good for."""
+"""The study of stitches (`robots.dvrk.stitch_study`) as a participant, so that a scenario that rolls a needle
+says in its summary what that is good for.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ class RollingStudy(Stepped):
     @property
     def ports(self) -> tuple[Port, ...]:
         """The shares."""
-        return tuple(Port(name=name, causality="output", type="std_msgs/msg/Float64", description=meaning) for name, meaning in _MEANINGS.items())
+        return tuple(
+            Port(name=name, causality="output", type="std_msgs/msg/Float64", description=meaning)
+            for name, meaning in _MEANINGS.items()
+        )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Make the study."""
@@ -54,7 +59,10 @@ class RollingStudy(Stepped):
     def restore(self, state: bytes) -> None:
         """Take nothing. Raises StateError if it is something."""
         if state:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, a study has none; was it saved elsewhere?")
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes, a study has none; was it"
+                " saved elsewhere?"
+            )
 
     def close(self) -> None:
         """Nothing to give back."""

@@ -1,7 +1,9 @@
-"""A scripted procedure: CRTK commands to the motion controller, one after the other or together, each waited for.
+"""A scripted procedure: CRTK commands to the motion controller, one after the other or together, each waited
+for.
 
-The routine is a client like any other: it gives a command, waits until the arm's operating state has said busy and then not busy, and
-goes on. A command that is refused (the arm's `error` or `warning` port speaks) ends the session with the controller's own words.
+The routine is a client like any other: it gives a command, waits until the arm's operating state has said
+busy and then not busy, and goes on. A command that is refused (the arm's `error` or `warning` port speaks)
+ends the session with the controller's own words.
 """
 
 from __future__ import annotations
@@ -36,13 +38,17 @@ class MoveTip(_Order):
     do: Literal["move_cp"]
     position: tuple[Length, Length, Length]
     orientation: UnitQuaternion = Field(description="quaternion x, y, z, w")
-    frame: str | None = Field(default=None, description="frame_id of the pose; default: the arm's own base, `<arm>_base`")
+    frame: str | None = Field(
+        default=None, description="frame_id of the pose; default: the arm's own base, `<arm>_base`"
+    )
 
     def message(self) -> tuple[str, Message]:
         """Return port and message."""
         (x, y, z), (i, j, k, w) = self.position, self.orientation
         pose = Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=i, y=j, z=k, w=w))
-        return f"{self.arm}/move_cp", PoseStamped(header=Header(frame_id=self.frame or f"{self.arm}_base"), pose=pose)
+        return f"{self.arm}/move_cp", PoseStamped(
+            header=Header(frame_id=self.frame or f"{self.arm}_base"), pose=pose
+        )
 
 
 class MoveJoints(_Order):
@@ -61,11 +67,15 @@ class MoveJaw(_Order):
 
     do: Literal["jaw"]
     angle: Angle
-    roll: Angle | None = Field(default=None, description="for a jaw with a roller: by how much to have rolled the needle")
+    roll: Angle | None = Field(
+        default=None, description="for a jaw with a roller: by how much to have rolled the needle"
+    )
 
     def message(self) -> tuple[str, Message]:
         """Return port and message."""
-        return f"{self.arm}/jaw/move_jp", JointState(position=np.array([self.angle] if self.roll is None else [self.angle, self.roll]))
+        return f"{self.arm}/jaw/move_jp", JointState(
+            position=np.array([self.angle] if self.roll is None else [self.angle, self.roll])
+        )
 
 
 class MoveHand(_Order):
@@ -108,14 +118,20 @@ class Together(Params):
     orders: tuple[Order, ...] = Field(min_length=1)
 
 
-Step = Annotated[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | Wait | Together, Field(discriminator="do")]
+Step = Annotated[
+    MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState | Wait | Together, Field(discriminator="do")
+]
 
 
 class RoutineParams(Params):
     """The steps, and how long any of them may take."""
 
     steps: tuple[Step, ...] = Field(min_length=1)
-    limit: Duration = Field(default=10 * 10**9, gt=0, description="simulated time after which an order that is not done ends the session")
+    limit: Duration = Field(
+        default=10 * 10**9,
+        gt=0,
+        description="simulated time after which an order that is not done ends the session",
+    )
 
 
 class Routine(Stepped):
@@ -131,19 +147,49 @@ class Routine(Stepped):
         self._commands = sorted({order.message()[0] for step in params.steps for order in _orders(step)})
         self._position, self._done = np.zeros(1), np.zeros(1)
         self._begun = np.full(1, -1.0)  # ns; -1: the step has not begun
-        self._busy = np.zeros(len(self._arms))  # 0: nothing is awaited, 1: busy is awaited, 2: not busy is awaited
-        self._outputs: dict[str, Any] = {"step": self._position, "done": self._done, **dict.fromkeys(self._commands, ())}
+        # 0: nothing is awaited, 1: busy is awaited, 2: not busy is awaited
+        self._busy = np.zeros(len(self._arms))
+        self._outputs: dict[str, Any] = {
+            "step": self._position,
+            "done": self._done,
+            **dict.fromkeys(self._commands, ()),
+        }
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Per arm its events in and the commands that the steps need out; progress."""
-        types = {order.message()[0]: order.message()[1].ros_type for step in self.params.steps for order in _orders(step)}
-        events = (("operating_state", OperatingState.ros_type), ("error", StringMessage.ros_type), ("warning", StringMessage.ros_type))
+        types = {
+            order.message()[0]: order.message()[1].ros_type
+            for step in self.params.steps
+            for order in _orders(step)
+        }
+        events = (
+            ("operating_state", OperatingState.ros_type),
+            ("error", StringMessage.ros_type),
+            ("warning", StringMessage.ros_type),
+        )
         return (
-            *(Port(name=f"{arm}/{name}", causality="input", type=type_, variability="event") for arm in self._arms for name, type_ in events),
-            *(Port(name=name, causality="output", type=types[name], variability="event") for name in self._commands),
-            Port(name="step", causality="output", type="std_msgs/msg/Float64", description="number of the step under way, from 0"),
-            Port(name="done", causality="output", type="std_msgs/msg/Float64", description="1 when all steps are done"),
+            *(
+                Port(name=f"{arm}/{name}", causality="input", type=type_, variability="event")
+                for arm in self._arms
+                for name, type_ in events
+            ),
+            *(
+                Port(name=name, causality="output", type=types[name], variability="event")
+                for name in self._commands
+            ),
+            Port(
+                name="step",
+                causality="output",
+                type="std_msgs/msg/Float64",
+                description="number of the step under way, from 0",
+            ),
+            Port(
+                name="done",
+                causality="output",
+                type="std_msgs/msg/Float64",
+                description="1 when all steps are done",
+            ),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -151,7 +197,9 @@ class Routine(Stepped):
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Listen to the arms; give the next orders if the last ones are done. Raises SessionError if one is refused or takes too long."""
+        """Listen to the arms; give the next orders if the last ones are done. Raises SessionError if one is
+        refused or takes too long.
+        """
         for name in self._commands:
             self._outputs[name] = ()
         self._listen(inputs)
@@ -178,7 +226,9 @@ class Routine(Stepped):
         for i, arm in enumerate(self._arms):
             for kind in ("error", "warning"):
                 for message in inputs.events(f"{arm}/{kind}"):
-                    raise SessionError(f"routine '{self.name}', step {where}: {cast('StringMessage', message).data}")
+                    raise SessionError(
+                        f"routine '{self.name}', step {where}: {cast('StringMessage', message).data}"
+                    )
             for message in inputs.events(f"{arm}/operating_state"):
                 busy = cast("OperatingState", message).is_busy
                 if self._busy[i]:
@@ -189,7 +239,10 @@ class Routine(Stepped):
             return t - self._begun[0] >= step.time
         if t - self._begun[0] > self.params.limit:
             late = ", ".join(arm for arm, busy in zip(self._arms, self._busy, strict=True) if busy)
-            raise SessionError(f"routine '{self.name}', step {int(self._position[0])}: {late} not done within {self.params.limit / 1e9:g} s")
+            raise SessionError(
+                f"routine '{self.name}', step {int(self._position[0])}: {late} not done within"
+                f" {self.params.limit / 1e9:g} s"
+            )
         return not self._busy.any()
 
     def _state(self) -> bytes:
@@ -207,9 +260,12 @@ class Routine(Stepped):
         """Go on from where a state was saved. Raises StateError if it is none of this routine's."""
         if len(state) != len(self._state()):
             raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, this routine's has {len(self._state())}; was it saved elsewhere?"
+                f"participant '{self.name}': a saved state of {len(state)} bytes, this routine's has"
+                f" {len(self._state())}; was it saved elsewhere?"
             )
-        self._position[:], self._done[:], self._begun[:], self._busy[:] = np.split(np.frombuffer(state), [1, 2, 3])
+        self._position[:], self._done[:], self._begun[:], self._busy[:] = np.split(
+            np.frombuffer(state), [1, 2, 3]
+        )
 
     def close(self) -> None:
         """Nothing to give back."""

@@ -1,8 +1,10 @@
-"""The topics of the authors' simulator: what programs written for it say and hear, over a robot that is simulated here.
+"""The topics of the authors' simulator: what programs written for it say and hear, over a robot that is
+simulated here.
 
-Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", 2019; names, sizes and mappings as in the scripts of their scenes
-(unina-icaros/dvrk-vrep, 88fe5975). Ports are named as the topics. As there, desired joint positions go straight to the joints, without a motion
-controller: here to their servos, cut at the joints' ranges. States are words that are echoed, and mean nothing.
+Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", 2019; names, sizes and mappings as in the
+scripts of their scenes (unina-icaros/dvrk-vrep, 88fe5975). Ports are named as the topics. As there, desired
+joint positions go straight to the joints, without a motion controller: here to their servos, cut at the
+joints' ranges. States are words that are echoed, and mean nothing.
 
 docs/decisions/0032 says what is not as there.
 """
@@ -32,10 +34,16 @@ _WRIST_YAW = {"PSM2": 0.8212}
 """By what the last joint of an arm is scaled."""
 _OPEN = 2.0 * _HALF_ANGLE
 """rad; opening of a jaw that lets a needle go: at command 1, ours."""
-_STATES = {"PSM1": ("current_state", "READY"), "PSM2": ("robot_state", "uninitialized"), "PSM3": ("robot_state", "uninitialized")}
+_STATES = {
+    "PSM1": ("current_state", "READY"),
+    "PSM2": ("robot_state", "uninitialized"),
+    "PSM3": ("robot_state", "uninitialized"),
+}
 """Name of the topic, and the word at the start; the authors' scenes have no PSM3."""
 _DESIRED = ("state_joint_desired", "set_position_joint", "set_position_goal_joint")
-"""Topics of desired joint positions: in most scenes, of the authors' Python client, in the scenes of tracking and servoing."""
+"""Topics of desired joint positions: in most scenes, of the authors' Python client, in the scenes of tracking
+and servoing.
+"""
 _SETUP: tuple[tuple[CartArm, int], ...] = (("PSM1", 5), ("PSM2", 5), ("ECM", 4))
 """Right, left, camera: how many of their setup joints are told, the lift first."""
 
@@ -44,11 +52,15 @@ class PaperParams(Params):
     """Which arms there are, as the robot is told them."""
 
     arms: Arms
-    setup_joints: SetupJoints = Field(default=SetupJoints(), description="where they are set, as the robot is told")
+    setup_joints: SetupJoints = Field(
+        default=SetupJoints(), description="where they are set, as the robot is told"
+    )
 
 
 class Paper(Stepped):
-    """Desired positions, jaws and words in under `dvrk/`; `servo_jp` to the robot, and its states under `dvrk/` out."""
+    """Desired positions, jaws and words in under `dvrk/`; `servo_jp` to the robot, and its states under
+    `dvrk/` out.
+    """
 
     params_model: ClassVar[type[Params]] = PaperParams
     params: PaperParams
@@ -66,8 +78,21 @@ class Paper(Stepped):
         still = {"causality": "output", "type": _JOINT_STATE}
         return (
             *(port for arm in self._arms for port in arm.ports),
-            Port(name="release_needle", causality="input", type="std_msgs/msg/Bool", variability="event", description="true: every jaw opens"),
-            Port.model_validate({"name": "dvrk/setup_joint/state_joint_current", "size": self._setup.size, "description": "right, left, camera"} | still),
+            Port(
+                name="release_needle",
+                causality="input",
+                type="std_msgs/msg/Bool",
+                variability="event",
+                description="true: every jaw opens",
+            ),
+            Port.model_validate(
+                {
+                    "name": "dvrk/setup_joint/state_joint_current",
+                    "size": self._setup.size,
+                    "description": "right, left, camera",
+                }
+                | still
+            ),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -77,7 +102,9 @@ class Paper(Stepped):
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Hand on what is desired and what is measured."""
-        release = any(message.data for message in cast("tuple[BoolMessage, ...]", inputs.events("release_needle")))
+        release = any(
+            message.data for message in cast("tuple[BoolMessage, ...]", inputs.events("release_needle"))
+        )
         outputs: dict[str, Value] = {"dvrk/setup_joint/state_joint_current": self._setup}
         for arm in self._arms:
             outputs |= arm.step(inputs, release=release)
@@ -111,34 +138,76 @@ class _Arm:
         self._scale[-1] = _WRIST_YAW.get(name, 1.0)
         n = len(self._joints)
         self.state = np.zeros(3 * n + 3)
-        self._desired, self._current, self._jaw_desired, self._jaw_current, self._told = np.split(self.state, [n, 3 * n, 3 * n + 1, 3 * n + 2])
+        self._desired, self._current, self._jaw_desired, self._jaw_current, self._told = np.split(
+            self.state, [n, 3 * n, 3 * n + 1, 3 * n + 2]
+        )
         self._desired[:] = params.start
         self._current[:n] = self._desired / self._scale
         topic, dvrk = _STATES.get(name, ("", ""))[0], f"dvrk/{name}"
         self._state_topic = f"{dvrk}/{topic}" if topic else ""
-        self.outputs: dict[str, Value] = {f"{name}/servo_jp": self._desired, f"{dvrk}/state_joint_current": self._current}
+        self.outputs: dict[str, Value] = {
+            f"{name}/servo_jp": self._desired,
+            f"{dvrk}/state_joint_current": self._current,
+        }
         if topic:
             self.outputs[self._state_topic] = ()
         if self._jaw is not None and isinstance(params, PsmParams):
-            self._jaw_desired[0], self._jaw_current[0] = params.jaw, 0.5 * params.jaw / (_HALF_ANGLE if name == "PSM1" else 1.0)
-            self.outputs |= {f"{name}/jaw/servo_jp": self._jaw_desired, f"{dvrk}/state_jaw_current": self._jaw_current}
+            self._jaw_desired[0], self._jaw_current[0] = (
+                params.jaw,
+                0.5 * params.jaw / (_HALF_ANGLE if name == "PSM1" else 1.0),
+            )
+            self.outputs |= {
+                f"{name}/jaw/servo_jp": self._jaw_desired,
+                f"{dvrk}/state_jaw_current": self._jaw_current,
+            }
 
     @property
     def ports(self) -> Iterator[Port]:
         name, dvrk, names = self._name, f"dvrk/{self._name}", tuple(joint.name for joint in self._joints)
         for topic in _DESIRED:
-            yield Port(name=f"{dvrk}/{topic}", causality="input", type=_JOINT_STATE, variability="event", description="set directly")
+            yield Port(
+                name=f"{dvrk}/{topic}",
+                causality="input",
+                type=_JOINT_STATE,
+                variability="event",
+                description="set directly",
+            )
         yield _measured(f"{name}/measured_js", names)
         yield Port(name=f"{name}/servo_jp", causality="output", type=_JOINT_STATE, names=names)
-        yield Port(name=f"{dvrk}/state_joint_current", causality="output", type=_JOINT_STATE, size=len(names), fields=("position", "velocity"))
+        yield Port(
+            name=f"{dvrk}/state_joint_current",
+            causality="output",
+            type=_JOINT_STATE,
+            size=len(names),
+            fields=("position", "velocity"),
+        )
         if self._state_topic:
-            yield Port(name=f"{dvrk}/set_robot_state", causality="input", type=_STRING, variability="event", description="echoed")
+            yield Port(
+                name=f"{dvrk}/set_robot_state",
+                causality="input",
+                type=_STRING,
+                variability="event",
+                description="echoed",
+            )
             yield Port(name=self._state_topic, causality="output", type=_STRING, variability="event")
         if self._jaw is not None:
-            yield Port(name=f"{dvrk}/state_jaw_desired", causality="input", type=_JOINT_STATE, variability="event", description="of half the opening")
+            yield Port(
+                name=f"{dvrk}/state_jaw_desired",
+                causality="input",
+                type=_JOINT_STATE,
+                variability="event",
+                description="of half the opening",
+            )
             yield _measured(f"{name}/jaw/measured_js", (self._jaw.name,))
-            yield Port(name=f"{name}/jaw/servo_jp", causality="output", type=_JOINT_STATE, names=(self._jaw.name,))
-            yield Port(name=f"{dvrk}/state_jaw_current", causality="output", type=_JOINT_STATE, description="half the opening")
+            yield Port(
+                name=f"{name}/jaw/servo_jp", causality="output", type=_JOINT_STATE, names=(self._jaw.name,)
+            )
+            yield Port(
+                name=f"{dvrk}/state_jaw_current",
+                causality="output",
+                type=_JOINT_STATE,
+                description="half the opening",
+            )
 
     def step(self, inputs: Inputs, *, release: bool) -> dict[str, Value]:
         """Heed what has arrived, and tell what is measured."""
@@ -164,7 +233,10 @@ class _Arm:
         """Return the word at the start, and those that are echoed."""
         first = () if self._told[0] else (StringMessage(data=_STATES[self._name][1]),)
         self._told[0] = 1.0
-        return (*first, *cast("tuple[StringMessage, ...]", inputs.events(f"dvrk/{self._name}/set_robot_state")))
+        return (
+            *first,
+            *cast("tuple[StringMessage, ...]", inputs.events(f"dvrk/{self._name}/set_robot_state")),
+        )
 
     def _open(self, opening: float) -> None:
         if self._jaw is not None:
@@ -173,11 +245,20 @@ class _Arm:
 
 def _measured(name: str, names: tuple[str, ...]) -> Port:
     still = (0.0,) * (3 * len(names))
-    return Port(name=name, causality="input", type=_JOINT_STATE, names=names, fields=("position", "velocity", "effort"), start=still)
+    return Port(
+        name=name,
+        causality="input",
+        type=_JOINT_STATE,
+        names=names,
+        fields=("position", "velocity", "effort"),
+        start=still,
+    )
 
 
 def _fits(wish: JointState, count: int) -> bool:
-    """Say whether a wish has as many positions as there are joints, and all are numbers; others are dropped, as there is nobody to tell."""
+    """Say whether a wish has as many positions as there are joints, and all are numbers; others are dropped,
+    as there is nobody to tell.
+    """
     return wish.position.size == count and bool(np.isfinite(wish.position).all())
 
 

@@ -1,4 +1,6 @@
-"""What a piece of hardware has to say of itself: each change of its condition once, on an event port and in the log."""
+"""What a piece of hardware has to say of itself: each change of its condition once, on an event port and in
+the log.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +29,21 @@ class Level(IntEnum):
 class Diagnosis:
     """The condition of one piece of hardware."""
 
-    def __init__(self, device: str, port: str = "diagnostics", *, clock: Literal["simulated", "wall"] = "wall") -> None:
-        """Take the participant's name, followed by the part of it that has a condition of its own: `touch/right`."""
+    def __init__(
+        self, device: str, port: str = "diagnostics", *, clock: Literal["simulated", "wall"] = "wall"
+    ) -> None:
+        """Take the participant's name, followed by the part of it that has a condition of its own:
+        `touch/right`.
+        """
         said = "each change of the device's condition: what, and what to do"
-        self.port = Port(name=port, causality="output", type=DiagnosticStatus.ros_type, variability="event", clock=clock, description=said)
+        self.port = Port(
+            name=port,
+            causality="output",
+            type=DiagnosticStatus.ros_type,
+            variability="event",
+            clock=clock,
+            description=said,
+        )
         self._device = device
         self._last: tuple[Level, str, str] | None = None
 
@@ -45,5 +58,12 @@ class Diagnosis:
         if (level, message, hardware) == self._last:
             return []
         self._last = level, message, hardware
-        log.log(logging.INFO if level is Level.OK else logging.WARNING, "device '%s': %s", self._device, message)
-        return [Sample(self.port.name, DiagnosticStatus(level=level, name=self._device, message=message, hardware_id=hardware))]
+        log.log(
+            logging.INFO if level is Level.OK else logging.WARNING, "device '%s': %s", self._device, message
+        )
+        return [
+            Sample(
+                self.port.name,
+                DiagnosticStatus(level=level, name=self._device, message=message, hardware_id=hardware),
+            )
+        ]

@@ -1,6 +1,8 @@
-"""A headset as a device: what its runtime knows of the head, in the axes of REP 103, and a diagnosis when that is nothing.
+"""A headset as a device: what its runtime knows of the head, in the axes of REP 103, and a diagnosis when
+that is nothing.
 
-The libraries differ in where a head comes from; ports, frames, rate, retries and messages are the same and stand here.
+The libraries differ in where a head comes from; ports, frames, rate, retries and messages are the same and
+stand here.
 """
 
 from __future__ import annotations
@@ -29,20 +31,31 @@ __all__ = ["HeadState", "Headset", "HeadsetParams", "NoHead", "Runtime"]
 class HeadsetParams(Params):
     """What any headset is told."""
 
-    rate: float = Field(default=250.0, gt=0.0, le=1000.0, description="samples per second at most; a head's own motion stays far below 100 Hz")
-    max_age: Duration = Field(default=100_000_000, gt=0, description="a pose or twist that is older is marked stale")
+    rate: float = Field(
+        default=250.0,
+        gt=0.0,
+        le=1000.0,
+        description="samples per second at most; a head's own motion stays far below 100 Hz",
+    )
+    max_age: Duration = Field(
+        default=100_000_000, gt=0, description="a pose or twist that is older is marked stale"
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class HeadState:
-    """Pose and velocity of a head as its runtime has them: vendors' axes (x right, y up, z towards the user), m, m/s, rad/s, of the base frame."""
+    """Pose and velocity of a head as its runtime has them: vendors' axes (x right, y up, z towards the user),
+    m, m/s, rad/s, of the base frame.
+    """
 
     time: float
     """When this was so, s of the runtime's clock: states of one time are one sample."""
     position: Vector3
     orientation: Quaternion
     linear: Vector3 | None
-    """None where the runtime does not know it: then it is how far the head has come since the state before, over the time between."""
+    """None where the runtime does not know it: then it is how far the head has come since the state before,
+    over the time between.
+    """
     angular: Vector3 | None
 
 
@@ -74,8 +87,9 @@ class Runtime(Protocol):
 class Headset(Device):
     """Publishes `pose` and `twist` of a head in `<participant>_base`, and `diagnostics`.
 
-    The head's own frame has x ahead, y to the left and z up. The twist is the velocity of that frame's origin and its angular velocity, both
-    along the axes of the base frame. Runtimes are connected to and asked in the thread that reads, as some demand.
+    The head's own frame has x ahead, y to the left and z up. The twist is the velocity of that frame's origin
+    and its angular velocity, both along the axes of the base frame. Runtimes are connected to and asked in
+    the thread that reads, as some demand.
     """
 
     def __init__(self, name: str, params: HeadsetParams) -> None:
@@ -84,7 +98,15 @@ class Headset(Device):
         self._rate, self._max_age_ns = params.rate, params.max_age
         self._diagnosis = Diagnosis(name)
         self._pose, self._twist = (
-            Port(name=port, causality="output", type=type_, frame=f"{name}_base", max_age_ns=params.max_age, clock="wall", description=text)
+            Port(
+                name=port,
+                causality="output",
+                type=type_,
+                frame=f"{name}_base",
+                max_age_ns=params.max_age,
+                clock="wall",
+                description=text,
+            )
             for port, type_, text in (
                 ("pose", "geometry_msgs/msg/PoseStamped", "of the head: x ahead, y to the left, z up"),
                 ("twist", "geometry_msgs/msg/TwistStamped", "of the head, along the axes of the base frame"),
@@ -129,7 +151,13 @@ class Headset(Device):
             return self._diagnosis.tell(state.level, state.message, runtime.hardware)
         if before is not None and state.time == before.time:
             still = t - self._newest_ns > self._max_age_ns
-            return self._diagnosis.tell(Level.STALE, "the runtime gives no new poses; look at its own software", runtime.hardware) if still else []
+            return (
+                self._diagnosis.tell(
+                    Level.STALE, "the runtime gives no new poses; look at its own software", runtime.hardware
+                )
+                if still
+                else []
+            )
         self._newest, self._newest_ns = state, t
         try:
             samples = [pose_sample(self._pose, t, vector(*state.position), quaternion(*state.orientation))]
@@ -138,7 +166,9 @@ class Headset(Device):
                 samples.append(twist_sample(self._twist, t, vector(*linear), vector(*angular)))
         except ValueError as error:  # what is not finite, too
             self._newest = None
-            return self._diagnosis.tell(Level.ERROR, f"the runtime gives no pose: {error}; look at its own software", runtime.hardware)
+            return self._diagnosis.tell(
+                Level.ERROR, f"the runtime gives no pose: {error}; look at its own software", runtime.hardware
+            )
         return [*self._diagnosis.tell(Level.OK, "the head is tracked", runtime.hardware), *samples]
 
     def close(self) -> None:
@@ -150,7 +180,9 @@ class Headset(Device):
 
 
 def _velocities(before: HeadState | None, now: HeadState) -> tuple[Vector3 | None, Vector3 | None]:
-    """Return velocity and angular velocity in the vendors' axes; None where neither the runtime nor two poses tell."""
+    """Return velocity and angular velocity in the vendors' axes; None where neither the runtime nor two poses
+    tell.
+    """
     if before is None or (now.linear is not None and now.angular is not None):
         return now.linear, now.angular
     dt = now.time - before.time

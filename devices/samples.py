@@ -24,7 +24,9 @@ def pose_sample(port: Port, time_ns: int, position: Vector3, orientation: Quater
 
 
 def twist_sample(port: Port, time_ns: int, linear: Vector3, angular: Vector3) -> Sample:
-    """Return the velocity (m/s) of a frame's origin and its angular velocity (rad/s), both along the axes of the port's frame."""
+    """Return the velocity (m/s) of a frame's origin and its angular velocity (rad/s), both along the axes of
+    the port's frame.
+    """
     (vx, vy, vz), (wx, wy, wz) = linear, angular
     twist = Twist(linear=Vector3Message(x=vx, y=vy, z=vz), angular=Vector3Message(x=wx, y=wy, z=wz))
     return Sample(port.name, TwistStamped(header=_header(port, time_ns), twist=twist))

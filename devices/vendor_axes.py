@@ -1,7 +1,8 @@
-"""From the axes that HDAPI, LibOVR and OpenXR share (x right, y up, z towards the user) to those of REP 103 (x ahead, y left, z up).
+"""From the axes that HDAPI, LibOVR and OpenXR share (x right, y up, z towards the user) to those of REP 103
+(x ahead, y left, z up).
 
-The same turn takes vectors of the base frame and, as these interfaces give a head's own frame the same axes, the head's own ones:
-(x, y, z) = (-z_v, -x_v, y_v).
+The same turn takes vectors of the base frame and, as these interfaces give a head's own frame the same axes,
+the head's own ones: (x, y, z) = (-z_v, -x_v, y_v).
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ def vector(x: float, y: float, z: float) -> Vector3:
 
 
 def quaternion(x: float, y: float, z: float, w: float) -> Quaternion:
-    """Return the unit quaternion (x, y, z, w) of a rotation whose two frames both have the vendors' axes, with those of REP 103.
+    """Return the unit quaternion (x, y, z, w) of a rotation whose two frames both have the vendors' axes,
+    with those of REP 103.
 
-    Raises ValueError if it has no direction (all zeros, or not finite): some runtimes give that while they do not track.
+    Raises ValueError if it has no direction (all zeros, or not finite): some runtimes give that while they do
+    not track.
     """
     norm = sqrt(x * x + y * y + z * z + w * w)
     if not 0.5 < norm < 2.0:  # of single precision; also false for NaN

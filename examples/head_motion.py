@@ -1,10 +1,12 @@
-"""Write the head of the surgeon in the scenario teleop: pose, velocity and the wish to turn or to move the camera, as a rosbag2 directory.
+"""Write the head of the surgeon in the scenario teleop: pose, velocity and the wish to turn or to move the
+camera, as a rosbag2 directory.
 
     python examples/head_motion.py configs/data/head
 
-The head looks left, right, up and back, leans to its right shoulder, comes nearer and goes back. Each movement is one of minimum jerk (Flash and
-Hogan 1985, J. Neurosci. 5(7), eq. 3), slower than the endoscope's joints may move. Axes are those of REP 103 (x ahead, y left, z up) in the
-base frame and in the head's own, which start as one.
+The head looks left, right, up and back, leans to its right shoulder, comes nearer and goes back. Each
+movement is one of minimum jerk (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3), slower than the endoscope's
+joints may move. Axes are those of REP 103 (x ahead, y left, z up) in the base frame and in the head's own,
+which start as one.
 """
 
 from __future__ import annotations
@@ -54,7 +56,10 @@ WAYS: list[tuple[float, str, float]] = [
     (2.4, "x", 0.0),
     (0.6, "x", 0.0),
 ]
-"""Seconds, what moves, and where it is then (rad, m): 20 s. One at a time and from the middle, so each turns about an axis of the base frame."""
+"""Seconds, what moves, and where it is then (rad, m): 20 s.
+
+One at a time and from the middle, so each turns about an axis of the base frame.
+"""
 AXES = ("roll", "pitch", "yaw", "x")
 
 
@@ -81,10 +86,16 @@ def messages() -> list[tuple[str, int, Message]]:
         header = Header(stamp=Time.from_ns(time_ns), frame_id=FRAME)
         x, y, z, w = rotation.exp(value[:3]).tolist()
         pose = Pose(position=Point(x=float(value[3])), orientation=Quaternion(x=x, y=y, z=z, w=w))
-        twist = Twist(linear=Vector3(x=float(rate[3])), angular=Vector3(x=float(rate[0]), y=float(rate[1]), z=float(rate[2])))
+        twist = Twist(
+            linear=Vector3(x=float(rate[3])),
+            angular=Vector3(x=float(rate[0]), y=float(rate[1]), z=float(rate[2])),
+        )
         if k == nearer - 1:
             found.append(("/mode", time_ns, StringMessage(data="position")))
-        found += [("/pose", time_ns, PoseStamped(header=header, pose=pose)), ("/twist", time_ns, TwistStamped(header=header, twist=twist))]
+        found += [
+            ("/pose", time_ns, PoseStamped(header=header, pose=pose)),
+            ("/twist", time_ns, TwistStamped(header=header, twist=twist)),
+        ]
     return found
 
 

@@ -2,9 +2,9 @@
 
     python examples/palpation_hand.py configs/data/palpation_hand
 
-Each way point is reached by a minimum-jerk movement (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3): the hand path of
-an undisturbed reach. The z axis points up; positions are relative to where the hand starts, in millimetres of the probe;
-teleoperation scales the hand down by `SCALE`.
+Each way point is reached by a minimum-jerk movement (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3): the
+hand path of an undisturbed reach. The z axis points up; positions are relative to where the hand starts, in
+millimetres of the probe; teleoperation scales the hand down by `SCALE`.
 """
 
 from __future__ import annotations
@@ -26,15 +26,23 @@ SCALE = 0.2
 RESOLUTION_M = 2.0**-20
 """About 1 um: finer than a hand can tell, and short mantissas compress well."""
 CONTACT_MM = -5.0
-"""In configs/palpation.yaml the probe, a sphere of 5 mm radius, starts with its centre 10 mm above the tissue."""
+"""In configs/palpation.yaml the probe, a sphere of 5 mm radius, starts with its centre 10 mm above the
+tissue.
+"""
 HOVER_MM = CONTACT_MM + 1.5
 
 
 def way_points() -> list[tuple[float, float, float]]:
-    """Return (seconds, x in mm, z in mm): approach, three presses of growing depth, a drag along the surface, retreat."""
+    """Return (seconds, x in mm, z in mm): approach, three presses of growing depth, a drag along the surface,
+    retreat.
+    """
     points = [(0.5, 0.0, 0.0), (2.0, 0.0, HOVER_MM)]
     for depth_mm, seconds in ((2.0, 1.2), (4.0, 1.4), (6.0, 1.6)):
-        points += [(seconds, 0.0, CONTACT_MM - depth_mm), (0.7, 0.0, CONTACT_MM - depth_mm), (seconds, 0.0, HOVER_MM)]
+        points += [
+            (seconds, 0.0, CONTACT_MM - depth_mm),
+            (0.7, 0.0, CONTACT_MM - depth_mm),
+            (seconds, 0.0, HOVER_MM),
+        ]
     points += [(1.2, 0.0, CONTACT_MM - 3.0), (3.0, 20.0, CONTACT_MM - 3.0), (1.2, 20.0, HOVER_MM)]
     return [*points, (1.4, 20.0, 0.0), (0.2, 20.0, 0.0)]
 
@@ -59,7 +67,10 @@ def write(directory: Path) -> None:
         connection = writer.add_connection("/pose", PoseStamped.ros_type, typestore=typestore())
         for index, (x, y, z) in enumerate(hand_path()):
             time_ns = index * 10**9 // RATE_HZ
-            pose = PoseStamped(header=Header(stamp=Time.from_ns(time_ns), frame_id="stylus_base"), pose=Pose(position=Point(x=x, y=y, z=z)))
+            pose = PoseStamped(
+                header=Header(stamp=Time.from_ns(time_ns), frame_id="stylus_base"),
+                pose=Pose(position=Point(x=x, y=y, z=z)),
+            )
             writer.write(connection, time_ns, encode(pose))
 
 

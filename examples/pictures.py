@@ -21,11 +21,15 @@ def write(recording: Path, folder: Path) -> None:
     """Write `<participant>_<left or right>.<format>` to `folder` for every camera of `recording`."""
     folder.mkdir(parents=True, exist_ok=True)
     with AnyReader([recording]) as reader:
-        cameras = [connection for connection in reader.connections if connection.msgtype == CompressedImage.ros_type]
+        cameras = [
+            connection for connection in reader.connections if connection.msgtype == CompressedImage.ros_type
+        ]
         last = {connection.topic: data for connection, _, data in reader.messages(cameras)}
         for topic, data in last.items():
             picture = decode(CompressedImage, bytes(data))
-            participant, eye = topic.removeprefix("/engine/").removesuffix("/image_raw/compressed").split("/out/")
+            participant, eye = (
+                topic.removeprefix("/engine/").removesuffix("/image_raw/compressed").split("/out/")
+            )
             file = folder / f"{participant}_{eye}.{picture.format}"
             file.write_bytes(picture.data.tobytes())
             print(file)

@@ -1,6 +1,8 @@
-"""Home PSM1 and move it there and back, on a console machine with ROS 2 and crtk_msgs: as it is done on a dVRK.
+"""Home PSM1 and move it there and back, on a console machine with ROS 2 and crtk_msgs: as it is done on a
+dVRK.
 
-Where the simulation is, `trocar run ros`; where ROS is, `RMW_IMPLEMENTATION=rmw_zenoh_cpp python3 ros2_psm.py` (docs/ros.md).
+Where the simulation is, `trocar run ros`; where ROS is, `RMW_IMPLEMENTATION=rmw_zenoh_cpp python3
+ros2_psm.py` (docs/ros.md).
 """
 
 import time
@@ -24,7 +26,10 @@ class Arm:
         self.state_command = node.create_publisher(StringStamped, f"/{name}/state_command", 10)
         self.move_jp = node.create_publisher(JointState, f"/{name}/move_jp", 10)
         self.until(lambda: self.states and self.position is not None, f"the states of /{name}")
-        self.until(lambda: self.state_command.get_subscription_count() and self.move_jp.get_subscription_count(), f"who heeds commands to /{name}")
+        self.until(
+            lambda: self.state_command.get_subscription_count() and self.move_jp.get_subscription_count(),
+            f"who heeds commands to /{name}",
+        )
 
     def _measured(self, message):
         self.position = message.position

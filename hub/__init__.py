@@ -1,1 +1,3 @@
-"""The hub: session, clock, hosts, coupling, recording, control and command line; and the participant side that others build on."""
+"""The hub: session, clock, hosts, coupling, recording, control and command line; and the participant side
+that others build on.
+"""

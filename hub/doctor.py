@@ -34,19 +34,40 @@ class Finding:
 
 _ROS = (
     ("ROS 2", "rclpy", "source the setup.bash of a ROS 2 installation before starting trocar"),
-    ("ROS 1", "rospy", "apt-get install python3-rospy, and let this environment see /usr/lib/python3/dist-packages"),
+    (
+        "ROS 1",
+        "rospy",
+        "apt-get install python3-rospy, and let this environment see /usr/lib/python3/dist-packages",
+    ),
 )
 
 
 def examine() -> list[Finding]:
-    """Look at Python, Zenoh, certificates, the extras, the kinds of participants, what packages bring checks for, and ROS. Starts no device."""
-    sections: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _zenoh, _certificates, _extras, _kinds, _checks, _ros)
+    """Look at Python, Zenoh, certificates, the extras, the kinds of participants, what packages bring checks
+    for, and ROS. Starts no device.
+    """
+    sections: tuple[Callable[[], Iterator[Finding]], ...] = (
+        _python,
+        _zenoh,
+        _certificates,
+        _extras,
+        _kinds,
+        _checks,
+        _ros,
+    )
     return [finding for section in sections for finding in section()]
 
 
 def _python() -> Iterator[Finding]:
     version = platform.python_version()
-    yield Finding("base", "Python", sys.version_info >= (3, 11), f"{version} on {platform.platform()}", "install Python 3.11 or newer", needed=True)
+    yield Finding(
+        "base",
+        "Python",
+        sys.version_info >= (3, 11),
+        f"{version} on {platform.platform()}",
+        "install Python 3.11 or newer",
+        needed=True,
+    )
 
 
 def _zenoh() -> Iterator[Finding]:
@@ -56,9 +77,22 @@ def _zenoh() -> Iterator[Finding]:
         with open_session("router", listen=[endpoint]), open_session("client", connect=[endpoint]):
             pass
     except TrocarError as error:
-        yield Finding("base", "Zenoh", False, f"no session over loopback: {error}", "allow TCP connections to 127.0.0.1", needed=True)
+        yield Finding(
+            "base",
+            "Zenoh",
+            False,
+            f"no session over loopback: {error}",
+            "allow TCP connections to 127.0.0.1",
+            needed=True,
+        )
     else:
-        yield Finding("base", "Zenoh", True, f"eclipse-zenoh {distribution('eclipse-zenoh').version}, session over loopback", needed=True)
+        yield Finding(
+            "base",
+            "Zenoh",
+            True,
+            f"eclipse-zenoh {distribution('eclipse-zenoh').version}, session over loopback",
+            needed=True,
+        )
 
 
 def _certificates() -> Iterator[Finding]:
@@ -66,29 +100,59 @@ def _certificates() -> Iterator[Finding]:
     directory = credentials.default_directory()
     files = [file for file in sorted(directory.glob("*.pem")) if file.name != "ca.pem"]
     if not files:
-        remedy = "trocar certs init, where the hub runs; elsewhere, a copy of what trocar certs issue NAME makes there"
-        yield Finding("network", "certificates", False, f"none in {directory}: a hub or a device on this machine cannot meet other machines", remedy)
+        remedy = (
+            "trocar certs init, where the hub runs; elsewhere, a copy of what trocar certs issue NAME makes"
+            " there"
+        )
+        yield Finding(
+            "network",
+            "certificates",
+            False,
+            f"none in {directory}: a hub or a device on this machine cannot meet other machines",
+            remedy,
+        )
     for file in files:
         try:
             certificate = credentials.examine(credentials.load(file.stem, directory))
         except TrocarError as error:
-            yield Finding("network", file.stem, False, str(error), f"trocar certs {'renew' if file.stem == credentials.HUB else f'issue {file.stem}'}")
+            yield Finding(
+                "network",
+                file.stem,
+                False,
+                str(error),
+                f"trocar certs {'renew' if file.stem == credentials.HUB else f'issue {file.stem}'}",
+            )
         else:
-            yield Finding("network", file.stem, True, f"certificate in {directory}, valid until {certificate.until:%Y-%m-%d %H:%M} UTC")
+            yield Finding(
+                "network",
+                file.stem,
+                True,
+                f"certificate in {directory}, valid until {certificate.until:%Y-%m-%d %H:%M} UTC",
+            )
 
 
 def _extras() -> Iterator[Finding]:
     trocar = distribution("trocar")
     for extra in sorted(trocar.metadata.get_all("Provides-Extra") or []):
         missing = registry.missing_packages(trocar, extra)
-        detail = f"not installed: {', '.join(missing)}" if missing else ", ".join(registry.installed_packages(trocar, extra))
+        detail = (
+            f"not installed: {', '.join(missing)}"
+            if missing
+            else ", ".join(registry.installed_packages(trocar, extra))
+        )
         yield Finding("extra", extra, not missing, detail, f"pip install 'trocar[{extra}]'")
 
 
 def _kinds() -> Iterator[Finding]:
     broken = registry.broken()
     for name, kind in sorted(registry.kinds().items()):
-        yield Finding(kind.role, name, name not in broken, broken.get(name, f"from {kind.distribution}"), f"pip install --force-reinstall {kind.distribution}")
+        yield Finding(
+            kind.role,
+            name,
+            name not in broken,
+            broken.get(name, f"from {kind.distribution}"),
+            f"pip install --force-reinstall {kind.distribution}",
+        )
 
 
 def _checks() -> Iterator[Finding]:
@@ -97,15 +161,30 @@ def _checks() -> Iterator[Finding]:
         try:
             yield Finding("machine", entry.name, *entry.load()())
         except Exception as error:  # noqa: BLE001 - whatever a package's check does, the others go on
-            yield Finding("machine", entry.name, False, f"{entry.value} failed: {type(error).__name__}: {error}", f"report it to the makers of {entry.value}")
+            yield Finding(
+                "machine",
+                entry.name,
+                False,
+                f"{entry.value} failed: {type(error).__name__}: {error}",
+                f"report it to the makers of {entry.value}",
+            )
 
 
 def _ros() -> Iterator[Finding]:
     for name, module, remedy in _ROS:
         found = find_spec(module)
-        yield Finding("ROS", name, found is not None, f"{module} {'can be imported' if found else 'cannot be imported'}", remedy)
+        yield Finding(
+            "ROS",
+            name,
+            found is not None,
+            f"{module} {'can be imported' if found else 'cannot be imported'}",
+            remedy,
+        )
 
 
 def as_json(findings: list[Finding]) -> str:
     """Return the findings as JSON: an object with `works` (all that is needed does) and the list `findings`."""
-    return json.dumps({"works": all(f.works for f in findings if f.needed), "findings": [vars(f) for f in findings]}, indent=2)
+    return json.dumps(
+        {"works": all(f.works for f in findings if f.needed), "findings": [vars(f) for f in findings]},
+        indent=2,
+    )

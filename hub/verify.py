@@ -1,4 +1,6 @@
-"""Re-simulates a recording from its grants and compares every state hash: the same bits, or the first step that differs."""
+"""Re-simulates a recording from its grants and compares every state hash: the same bits, or the first step
+that differs.
+"""
 
 from __future__ import annotations
 
@@ -34,18 +36,37 @@ class VerifySummary:
     first_difference_participant: str | None
 
 
-def verify(recording: Recording, *, endpoint: str | None = None, progress: Callable[[Progress], None] | None = None) -> VerifySummary:
+def verify(
+    recording: Recording, *, endpoint: str | None = None, progress: Callable[[Progress], None] | None = None
+) -> VerifySummary:
     """Run the recorded session again, in fresh processes, with what entered it then.
 
     Raises RecordingError if the recording is not one of a session, and what `Session.run` raises.
     """
-    scenario, plan, directory = recording.scenario().model_copy(update={"pace": "fast"}), _plan(recording), recording.directory()
+    scenario, plan, directory = (
+        recording.scenario().model_copy(update={"pace": "fast"}),
+        _plan(recording),
+        recording.directory(),
+    )
     here = [member for member in plan.members.values() if member.host == "hub" and member.role != "device"]
-    made = {member.name: registry.make(member.kind, member.name, scenario.participants[member.name].params, directory) for member in here}
+    made = {
+        member.name: registry.make(
+            member.kind, member.name, scenario.participants[member.name].params, directory
+        )
+        for member in here
+    }
     for path in changed_files(recording.files()):
         log.warning("'%s' is not the file that was read when this was recorded: expect differences", path)
     comparison = _Comparison(recording, plan)
-    session = Session(scenario, plan, made, directory, endpoint=endpoint, grants=recording.grants(), on_report=comparison.take)
+    session = Session(
+        scenario,
+        plan,
+        made,
+        directory,
+        endpoint=endpoint,
+        grants=recording.grants(),
+        on_report=comparison.take,
+    )
     comparison.stop = session.state.shutdown
     ran = session.run(progress)
     first = comparison.first
@@ -81,7 +102,14 @@ class _Comparison:
             return  # the recording was cut short between the grant and this ack
         recorded = then.state_hash.tolist()
         self.hashes += min(len(recorded), len(report.state_hash))
-        first = next((i for i, (one, other) in enumerate(zip(recorded, report.state_hash, strict=False)) if one != other), None)
+        first = next(
+            (
+                i
+                for i, (one, other) in enumerate(zip(recorded, report.state_hash, strict=False))
+                if one != other
+            ),
+            None,
+        )
         if then.step != report.step or len(recorded) != len(report.state_hash):
             self._differ(report.step, member)
         elif first is not None:
@@ -93,8 +121,13 @@ class _Comparison:
 
 
 def _plan(recording: Recording) -> Plan:
-    """Return the recorded wiring; a participant that joined from elsewhere gets a process here, and devices are left alone."""
+    """Return the recorded wiring; a participant that joined from elsewhere gets a process here, and devices
+    are left alone.
+    """
     plan = recording.plan()
-    members = {name: member.model_copy(update={"host": member.host.replace("/", "_")}) for name, member in plan.members.items()}
+    members = {
+        name: member.model_copy(update={"host": member.host.replace("/", "_")})
+        for name, member in plan.members.items()
+    }
     links = tuple(link for link in plan.links if plan.members[link.target].role != "device")
     return plan.model_copy(update={"members": members, "links": links, "outlets": ()})

@@ -1,4 +1,7 @@
-"""What `trocar model fk` says: where an arm's tip stands. The command itself is mounted beside the model's other commands."""
+"""What `trocar model fk` says: where an arm's tip stands.
+
+The command itself is mounted beside the model's other commands.
+"""
 
 from __future__ import annotations
 
@@ -45,11 +48,25 @@ def fk(arm: str, tool: str | None, q: Sequence[float]) -> TipPose:
         raise MotionError(f"{arm}: {len(q)} joint positions, expected {len(names)}: {', '.join(names)}")
     kinematics.check(np.array(positions, np.float64))
     tip = kinematics.forward(np.array(positions, np.float64)) + 0.0  # no negative zeros
-    return TipPose(arm=arm, frame=base_frame(arm), joints=names, q=positions, p=tip[:3, 3].tolist(), R=tip[:3, :3].tolist())
+    return TipPose(
+        arm=arm,
+        frame=base_frame(arm),
+        joints=names,
+        q=positions,
+        p=tip[:3, 3].tolist(),
+        R=tip[:3, :3].tolist(),
+    )
 
 
 def table(pose: TipPose) -> str:
     """Return the pose as lines for a person: joints, position and rotation matrix."""
     joints = ", ".join(f"{name} {value:g}" for name, value in zip(pose["joints"], pose["q"], strict=True))
     rows = (f"R row {i}  " + "  ".join(f"{cell: .9f}" for cell in row) for i, row in enumerate(pose["R"]))
-    return "\n".join([f"{pose['arm']} at {joints} (rad, m)", f"tip in frame {pose['frame']}", "p (m)    " + "  ".join(f"{x: .9f}" for x in pose["p"]), *rows])
+    return "\n".join(
+        [
+            f"{pose['arm']} at {joints} (rad, m)",
+            f"tip in frame {pose['frame']}",
+            "p (m)    " + "  ".join(f"{x: .9f}" for x in pose["p"]),
+            *rows,
+        ]
+    )

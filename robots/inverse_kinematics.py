@@ -1,8 +1,8 @@
 """Inverse kinematics of a serial chain by damped least squares on the pose error.
 
-Levenberg-Marquardt after Sugihara, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt Method", IEEE
-Transactions on Robotics 27(5), 2011: the damping falls with the squared error, so that a reachable goal is met quadratically
-and an unreachable one approached without chatter.
+Levenberg-Marquardt after Sugihara, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt
+Method", IEEE Transactions on Robotics 27(5), 2011: the damping falls with the squared error, so that a
+reachable goal is met quadratically and an unreachable one approached without chatter.
 """
 
 from __future__ import annotations
@@ -16,29 +16,43 @@ from schemas.vectors import Vector
 __all__ = ["pursue"]
 
 _LENGTH = 0.1
-"""Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the RCM makes of it."""
+"""Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the
+RCM makes of it.
+"""
 _LITTLE = 1e-4
-"""The same for an arm of fewer than six joints, which cannot have both: position first. What orientation then costs of it is some nanometres."""
+"""The same for an arm of fewer than six joints, which cannot have both: position first.
+
+What orientation then costs of it is some nanometres.
+"""
 _LEAST_DAMPING = 1e-12
-"""Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still moves the tip by a micrometre."""
+"""Of the normal equations (m^2): below any singular value of the weighted Jacobian at which a joint still
+moves the tip by a micrometre.
+"""
 _MET = 1e-15
-"""m; length of the weighted error at which a goal is met: some ten times the rounding error of the forward kinematics."""
+"""m; length of the weighted error at which a goal is met: some ten times the rounding error of the forward
+kinematics.
+"""
 _CORRECTIONS = 4
 """At most, per call; each squares the error, so that two do at the usual speeds."""
 
 
-def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector) -> Vector:
-    """Return joint positions, shape (n,), that meet the goal, or come nearer to it than `q` inside the joint ranges and `largest_move`.
+def pursue(
+    chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector
+) -> Vector:
+    """Return joint positions, shape (n,), that meet the goal, or come nearer to it than `q` inside the joint
+    ranges and `largest_move`.
 
-    For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach followed to where the weighted error is
-    least; a goal that is met moves nothing, not by rounding either. An arm of fewer than six joints meets the position and turns as well as it can.
+    For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach
+    followed to where the weighted error is least; a goal that is met moves nothing, not by rounding either.
+    An arm of fewer than six joints meets the position and turns as well as it can.
 
     Args:
         chain: the kinematics.
         q: where to start, shape (n,), rad and m.
         position: goal of the tip in the base frame, m, shape (3,).
         orientation: goal of the tip in the base frame, quaternion (x, y, z, w).
-        largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays straight.
+        largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays
+        straight.
     """
     found, length = q, _LENGTH if len(q) >= 6 else _LITTLE
     for _ in range(_CORRECTIONS):
@@ -55,15 +69,21 @@ def pursue(chain: SerialChain, q: Vector, position: Vector, orientation: Vector,
 
 
 def _error(tip: Vector, position: Vector, orientation: Vector, length: float) -> Vector:
-    """Return what is left to the goal from the pose `tip`, shape (4, 4): way, then turn as a rotation vector in metres, shape (6,)."""
+    """Return what is left to the goal from the pose `tip`, shape (4, 4): way, then turn as a rotation vector
+    in metres, shape (6,).
+    """
     error = np.empty(6)
     error[:3] = position - tip[:3, 3]
-    error[3:] = length * rotation.log(rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip))))
+    error[3:] = length * rotation.log(
+        rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip)))
+    )
     return error
 
 
 def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector, length: float) -> Vector:
-    """Return a move, shape (n,), that stays inside the joint ranges: joints that would leave theirs go to its end, and the others make the best of it."""
+    """Return a move, shape (n,), that stays inside the joint ranges: joints that would leave theirs go to its
+    end, and the others make the best of it.
+    """
     jacobian = chain.jacobian(frames)
     jacobian[3:] *= length
     normal = jacobian.T @ jacobian
@@ -75,5 +95,7 @@ def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector, le
     while (outside := free & ((move < least) | (move > most))).any():
         free &= ~outside
         move[outside] = np.where(move < least, least, most)[outside]
-        move[free] = np.linalg.solve(normal[np.ix_(free, free)], gradient[free] - normal[np.ix_(free, ~free)] @ move[~free])
+        move[free] = np.linalg.solve(
+            normal[np.ix_(free, free)], gradient[free] - normal[np.ix_(free, ~free)] @ move[~free]
+        )
     return np.minimum(np.maximum(q + move, chain.lower), chain.upper) - q

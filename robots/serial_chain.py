@@ -1,7 +1,8 @@
 """Kinematics of a serial chain in modified Denavit-Hartenberg form.
 
-Link i stands to link i-1 as Rx(alpha) Tx(a) Rz(theta) Tz(d) (Craig, Introduction to Robotics, section 3.4); q is added to
-theta of a revolute and to d of a prismatic joint. A table in standard form becomes one in modified form by `from_standard`.
+Link i stands to link i-1 as Rx(alpha) Tx(a) Rz(theta) Tz(d) (Craig, Introduction to Robotics, section 3.4); q
+is added to theta of a revolute and to d of a prismatic joint. A table in standard form becomes one in
+modified form by `from_standard`.
 
 A chain takes one configuration, shape (n,), or many at once, shape (..., n).
 """
@@ -23,7 +24,9 @@ __all__ = ["Joint", "SerialChain"]
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: its modified DH row (rad, m) and what it can do (rad, m; rad/s, m/s; N m, N; rad/s^2, m/s^2; rad/s^3, m/s^3)."""
+    """One joint: its modified DH row (rad, m) and what it can do (rad, m; rad/s, m/s; N m, N; rad/s^2, m/s^2;
+    rad/s^3, m/s^3).
+    """
 
     name: str
     kind: Literal["revolute", "prismatic"]
@@ -47,7 +50,14 @@ class Joint:
         """Return the pose of this link in the link before it, shape (4, 4), at joint position `q`."""
         theta, d = (self.theta + q, self.d) if self.kind == "revolute" else (self.theta, self.d + q)
         ca, sa, ct, st = _cos(self.alpha), _sin(self.alpha), _cos(theta), _sin(theta)
-        return np.array([[ct, -st, 0.0, self.a], [st * ca, ct * ca, -sa, -d * sa], [st * sa, ct * sa, ca, d * ca], [0.0, 0.0, 0.0, 1.0]])
+        return np.array(
+            [
+                [ct, -st, 0.0, self.a],
+                [st * ca, ct * ca, -sa, -d * sa],
+                [st * sa, ct * sa, ca, d * ca],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
 
 
 def _cos(angle: float) -> float:
@@ -67,7 +77,8 @@ class SerialChain:
         Args:
             joints: the n joints.
             tip: pose of the tip in the last link's frame, shape (4, 4).
-            base: pose of the frame before the first joint in the base frame, shape (4, 4); None where they are one.
+            base: pose of the frame before the first joint in the base frame, shape (4, 4); None where they
+            are one.
         """
         self.joints = tuple(joints)
         self.tip = tip
@@ -80,7 +91,9 @@ class SerialChain:
         self._prismatic = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
         # A link's transform is affine in (cos q, sin q) or in q: all of them come from one multiplication.
         zero = np.array([joint.transform(0.0) for joint in joints])
-        quarter = np.array([joint.transform(np.pi / 2 if joint.kind == "revolute" else 1.0) for joint in joints])
+        quarter = np.array(
+            [joint.transform(np.pi / 2 if joint.kind == "revolute" else 1.0) for joint in joints]
+        )
         half = np.array([joint.transform(np.pi) for joint in joints])
         revolute = np.array([joint.kind == "revolute" for joint in joints])[:, None, None]
         constant = np.where(revolute, (zero + half) / 2, zero)
@@ -94,17 +107,22 @@ class SerialChain:
 
     @classmethod
     def from_standard(cls, joints: Sequence[Joint], tip: Vector) -> SerialChain:
-        """Return the chain whose joints carry rows of standard form: link i stands to link i-1 as Rz(theta) Tz(d) Tx(a) Rx(alpha).
+        """Return the chain whose joints carry rows of standard form: link i stands to link i-1 as Rz(theta)
+        Tz(d) Tx(a) Rx(alpha).
 
-        Only the frames between base and tip differ from those of the standard form: each stands before the a and alpha
-        of its own row, which go to the row after it, the last ones to the tip.
+        Only the frames between base and tip differ from those of the standard form: each stands before the a
+        and alpha of its own row, which go to the row after it, the last ones to the tip.
         """
         last = Joint("", "revolute", joints[-1].alpha, joints[-1].a, 0.0, 0.0, 0.0, 0.0).transform(0.0)
         before = [(0.0, 0.0), *((joint.alpha, joint.a) for joint in joints[:-1])]
-        return cls([replace(joint, alpha=alpha, a=a) for joint, (alpha, a) in zip(joints, before, strict=True)], last @ tip)
+        return cls(
+            [replace(joint, alpha=alpha, a=a) for joint, (alpha, a) in zip(joints, before, strict=True)],
+            last @ tip,
+        )
 
     def frames(self, q: Vector) -> Vector:
-        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4), at `q`, shape (..., n).
+        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4), at `q`,
+        shape (..., n).
 
         Raises MotionError for another number of joints.
         """
@@ -138,7 +156,9 @@ class SerialChain:
         return poses
 
     def out_of_range(self, q: Vector, *, slack: float = 0.0) -> list[str]:
-        """Return what is wrong with the positions `q`, shape (n,): a sentence for each joint outside its range by more than `slack`."""
+        """Return what is wrong with the positions `q`, shape (n,): a sentence for each joint outside its
+        range by more than `slack`.
+        """
         return [
             f"joint {joint.name} at {value:.6g} {joint.unit}, allowed are {joint.lower:g} .. {joint.upper:g}"
             for joint, value in zip(self.joints, q.tolist(), strict=True)
@@ -158,12 +178,15 @@ class SerialChain:
         """Raise MotionError if `q` is not n finite numbers, each inside the range of its joint."""
         self.check_form(q)
         if q.ndim > 1:
-            raise MotionError(f"positions of shape {q.shape}, expected those of one configuration, ({len(self.joints)},)")
+            raise MotionError(
+                f"positions of shape {q.shape}, expected those of one configuration, ({len(self.joints)},)"
+            )
         if wrong := self.out_of_range(q):
             raise MotionError("; ".join(wrong))
 
     def forward(self, q: Vector) -> Vector:
-        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n), inside the joint ranges or not.
+        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n), inside the
+        joint ranges or not.
 
         Raises MotionError for another number of joints, or a position that is not finite.
         """
@@ -175,8 +198,10 @@ class SerialChain:
 
         Args:
             frames: what `frames(q)` returned.
-            frame: in which the twist is expressed; its point is the tip's origin either way. In the tip's frame it is the dVRK's
-                `body/jacobian`; its `spatial/jacobian` is the twist of the point at the base frame's origin instead
+            frame: in which the twist is expressed; its point is the tip's origin either way. In the tip's
+            frame it is the dVRK's
+                `body/jacobian`; its `spatial/jacobian` is the twist of the point at the base frame's origin
+                instead
                 (jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp, JacobianSpatial).
         """
         axes = frames[..., :-1, :3, 2]  # (..., n, 3)

@@ -13,10 +13,21 @@ from schemas import crtk, ros, trocar_msgs
 from schemas.errors import MessageError, did_you_mean
 from schemas.message import Message, msg_text
 
-__all__ = ["decode", "encode", "message_type", "message_types", "rihs01", "ros2msg_definition", "typestore", "validated"]
+__all__ = [
+    "decode",
+    "encode",
+    "message_type",
+    "message_types",
+    "rihs01",
+    "ros2msg_definition",
+    "typestore",
+    "validated",
+]
 
 MAX_MESSAGE_BYTES = 16 * 2**20
-"""Larger payloads are refused unread: the largest honest message, an uncompressed 1080p stereo image, has 12 MB."""
+"""Larger payloads are refused unread: the largest honest message, an uncompressed 1080p stereo image, has 12
+MB.
+"""
 
 _PLAIN_CDR = (b"\x00\x00", b"\x00\x01")
 """The representation identifiers CDR_BE and CDR_LE of OMG DDSI-RTPS."""
@@ -28,7 +39,9 @@ M = TypeVar("M", bound=Message)
 def message_types() -> dict[str, type[Message]]:
     """Return every message model by its ROS type name."""
     models = (value for module in (ros, crtk, trocar_msgs) for value in vars(module).values())
-    return {m.ros_type: m for m in models if isinstance(m, type) and issubclass(m, Message) and m is not Message}
+    return {
+        m.ros_type: m for m in models if isinstance(m, type) and issubclass(m, Message) and m is not Message
+    }
 
 
 def message_type(name: str) -> type[Message]:
@@ -45,7 +58,8 @@ def typestore() -> Typestore:
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, model in message_types().items():
         if name not in store.types:
-            (fields,) = get_types_from_msg(msg_text(model), name).values()  # the parser puts `msg` into the name of a service's parts
+            # the parser puts `msg` into the name of a service's parts
+            (fields,) = get_types_from_msg(msg_text(model), name).values()
             store.register({name: fields})
     return store
 
@@ -58,21 +72,31 @@ def encode(message: Message) -> bytes:
 def decode(model: type[M], payload: bytes) -> M:
     """Return the message of type `model` in `payload`.
 
-    Raises MessageError if the bytes are too many, too few or no such message, or if a value is out of its range.
+    Raises MessageError if the bytes are too many, too few or no such message, or if a value is out of its
+    range.
     """
     if len(payload) > MAX_MESSAGE_BYTES:
         raise MessageError(f"{model.ros_type}: {len(payload)} bytes exceed the limit of {MAX_MESSAGE_BYTES}")
     if bytes(payload[:2]) not in _PLAIN_CDR:
-        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message (they do not begin as CDR)")
+        raise MessageError(
+            f"{model.ros_type}: {len(payload)} bytes are no such message (they do not begin as CDR)"
+        )
     try:
         raw = typestore().deserialize_cdr(payload, model.ros_type)
-    except Exception as error:  # rosbags lets struct.error, IndexError, AssertionError, UnicodeDecodeError and more through
-        raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})") from error
+    except (
+        Exception
+    ) as error:  # rosbags lets struct.error, IndexError, AssertionError, UnicodeDecodeError and more through
+        raise MessageError(
+            f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})"
+        ) from error
     return validated(model, raw)
 
 
 def validated(model: type[M], raw: object) -> M:
-    """Return the message of type `model` that has the fields of `raw`, a message of `rosbags`. Raises MessageError if a value is out of its range."""
+    """Return the message of type `model` that has the fields of `raw`, a message of `rosbags`.
+
+    Raises MessageError if a value is out of its range.
+    """
     try:
         return model.model_validate(raw, from_attributes=True)
     except ValidationError as error:
@@ -89,6 +113,8 @@ def rihs01(name: str) -> str:
 
 @cache
 def ros2msg_definition(name: str) -> str:
-    """Return the definition of `name` and of every type it holds, as MCAP's `ros2msg` schema encoding wants it."""
+    """Return the definition of `name` and of every type it holds, as MCAP's `ros2msg` schema encoding wants
+    it.
+    """
     text, _ = typestore().generate_msgdef(name, ros_version=2)
     return text

@@ -1,4 +1,6 @@
-"""The message types of CRTK, the Collaborative Robotics Toolkit, field for field as collaborative-robotics/crtk_msgs (commit 14b04fcf) has them."""
+"""The message types of CRTK, the Collaborative Robotics Toolkit, field for field as
+collaborative-robotics/crtk_msgs (commit 14b04fcf) has them.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def _empty() -> NDArray[np.float64]:
 
 
 class OperatingState(Message):
-    """What a device is doing: `DISABLED`, `ENABLED`, `PAUSED` or `FAULT`, whether it is homed, and whether it is busy."""
+    """What a device is doing: `DISABLED`, `ENABLED`, `PAUSED` or `FAULT`, whether it is homed, and whether it
+    is busy.
+    """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/OperatingState"
     header: Header = Header()
@@ -60,7 +64,9 @@ class CartesianState(Message):
 
 
 class CartesianImpedanceHalfPlaneGains(Message):
-    """Gains per axis on one side of a goal: N/m and N s/m of a displacement, N m/rad and N m s/rad of a rotation; a spring's are negative."""
+    """Gains per axis on one side of a goal: N/m and N s/m of a displacement, N m/rad and N m s/rad of a
+    rotation; a spring's are negative.
+    """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains"
     p: Vector3 = Vector3()
@@ -72,7 +78,9 @@ class CartesianImpedanceHalfPlaneGains(Message):
 
 
 class CartesianImpedance(Message):
-    """Springs and dampers between a tip and a goal, along the axes of one orientation for forces and of another for torques."""
+    """Springs and dampers between a tip and a goal, along the axes of one orientation for forces and of
+    another for torques.
+    """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedance"
     header: Header = Header()

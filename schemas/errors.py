@@ -44,7 +44,9 @@ class ScenarioError(TrocarError):
     """The scenario cannot be run as written; the message says where and what was allowed."""
 
     def __init__(self, message: str, *, path: tuple[str | int, ...] = ()) -> None:
-        """Take the message, and the path of the offending value inside the scenario: `("participants", "robot", "kind")`."""
+        """Take the message, and the path of the offending value inside the scenario: `("participants",
+        "robot", "kind")`.
+        """
         super().__init__(message)
         self.path = path
 
@@ -54,7 +56,10 @@ class MissingExtraError(ScenarioError):
 
     def __init__(self, part: str, extra: str, package: str, distribution: str = "trocar") -> None:
         """Name the part that was asked for and the pip line that brings what it needs."""
-        super().__init__(f"{part} needs the package '{package}', which is not installed. Install it with: pip install '{distribution}[{extra}]'")
+        super().__init__(
+            f"{part} needs the package '{package}', which is not installed. Install it with: pip install"
+            f" '{distribution}[{extra}]'"
+        )
         self.extra = extra
 
 

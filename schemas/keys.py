@@ -11,7 +11,9 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def valid_name(name: str) -> bool:
-    """Say whether `name` may name a session, a participant or a part of a port: a letter, then letters, digits, underscores."""
+    """Say whether `name` may name a session, a participant or a part of a port: a letter, then letters,
+    digits, underscores.
+    """
     return _NAME.fullmatch(name) is not None
 
 
@@ -47,11 +49,15 @@ class Keys:
         return f"{self.prefix}/engine/{participant}/feed/{port}"
 
     def signals(self, participant: str, device: str) -> str:
-        """Key on which the signals of a participant are for a device of the wall clock: one that does not keep up misses some, and holds nobody up."""
+        """Key on which the signals of a participant are for a device of the wall clock: one that does not
+        keep up misses some, and holds nobody up.
+        """
         return f"{self.prefix}/engine/{participant}/signals/{device}"
 
     def refused(self, role: str, participant: str) -> str:
-        """Key on which a host tells of messages that it had to drop, under the name of one of its participants."""
+        """Key on which a host tells of messages that it had to drop, under the name of one of its
+        participants.
+        """
         return f"{self.prefix}/{role}/{participant}/refused"
 
     def device_status(self, device: str) -> str:

@@ -1,8 +1,8 @@
 """Grants without inlet samples, and acks without an error, straight to CDR and back: what every step needs.
 
-The layout is that of `Grant` and `Ack` in `schemas.trocar_msgs` (the tests hold it against `schemas.codec`); whatever is
-not of this simple form goes through the codec. Packing and unpacking an ack takes 1 us each this way, 11 us through the
-models (`bench/lockstep.py`).
+The layout is that of `Grant` and `Ack` in `schemas.trocar_msgs` (the tests hold it against `schemas.codec`);
+whatever is not of this simple form goes through the codec. Packing and unpacking an ack takes 1 us each this
+way, 11 us through the models (`bench/lockstep.py`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ class Permission(NamedTuple):
 
 
 class Report(NamedTuple):
-    """An `Ack` as the step loop uses it: one hash and one compute time per step, the works of all bonds per step."""
+    """An `Ack` as the step loop uses it: one hash and one compute time per step, the works of all bonds per
+    step.
+    """
 
     run: int
     epoch: int
@@ -65,7 +67,9 @@ def unpack_permission(payload: bytes) -> Permission:
 
 @cache
 def _ack(steps: int, works: int) -> struct.Struct:
-    """Return the layout of an ack without an error: the elements of a sequence are aligned to 8 bytes, an empty one has none."""
+    """Return the layout of an ack without an error: the elements of a sequence are aligned to 8 bytes, an
+    empty one has none.
+    """
     align = "4x" if steps else ""
     return struct.Struct(f"<4sQI4xqI{align}{steps}QI{align}{steps}QI{'4x' if works else ''}{works}dIB")
 
@@ -76,21 +80,42 @@ def pack_report(report: Report) -> bytes:
         return encode(Ack.model_validate(report._asdict()))
     steps, works = len(report.state_hash), len(report.work_j)
     head = report[:3]
-    return _ack(steps, works).pack(_CDR, *head, steps, *report.state_hash, steps, *report.compute_ns, works, *report.work_j, 1, 0)
+    return _ack(steps, works).pack(
+        _CDR, *head, steps, *report.state_hash, steps, *report.compute_ns, works, *report.work_j, 1, 0
+    )
 
 
 def unpack_report(payload: bytes, steps: int, works: int) -> Report:
     """Return the `Ack` in `payload`, of which `steps` hashes and `works` works are expected.
 
-    Raises MessageError if it is none, has other lengths or a work that is not finite. An ack with an error may have any lengths.
+    Raises MessageError if it is none, has other lengths or a work that is not finite. An ack with an error
+    may have any lengths.
     """
     layout = _ack(steps, works)
     if len(payload) == layout.size:
         cdr, run, epoch, step, n, *rest = layout.unpack(payload)
-        hashes, times, work = rest[:steps], rest[steps + 1 : 2 * steps + 1], rest[2 * steps + 2 : 2 * steps + 2 + works]
-        if cdr == _CDR and (n, rest[steps], rest[2 * steps + 1], rest[-2], rest[-1]) == (steps, steps, works, 1, 0) and all(map(isfinite, work)):
+        hashes, times, work = (
+            rest[:steps],
+            rest[steps + 1 : 2 * steps + 1],
+            rest[2 * steps + 2 : 2 * steps + 2 + works],
+        )
+        if (
+            cdr == _CDR
+            and (n, rest[steps], rest[2 * steps + 1], rest[-2], rest[-1]) == (steps, steps, works, 1, 0)
+            and all(map(isfinite, work))
+        ):
             return Report(run, epoch, step, hashes, times, work)
     ack = decode(Ack, payload)
     if not ack.error and (ack.state_hash.size, ack.compute_ns.size, ack.work_j.size) != (steps, steps, works):
-        raise MessageError(f"ack of {ack.state_hash.size} steps and {ack.work_j.size} works, expected {steps} and {works}")
-    return Report(ack.run, ack.epoch, ack.step, ack.state_hash.tolist(), ack.compute_ns.tolist(), ack.work_j.tolist(), ack.error)
+        raise MessageError(
+            f"ack of {ack.state_hash.size} steps and {ack.work_j.size} works, expected {steps} and {works}"
+        )
+    return Report(
+        ack.run,
+        ack.epoch,
+        ack.step,
+        ack.state_hash.tolist(),
+        ack.compute_ns.tolist(),
+        ack.work_j.tolist(),
+        ack.error,
+    )

@@ -46,11 +46,14 @@ class RosType:
         self.dtype = None if dtype is None else np.dtype(dtype)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Validate arrays as one-dimensional, of the right element type, finite and (if fixed) of the right length."""
+        """Validate arrays as one-dimensional, of the right element type, finite and (if fixed) of the right
+        length.
+        """
         if self.dtype is None:
             return handler(source)
         return core_schema.no_info_plain_validator_function(
-            partial(self._array, self.dtype), serialization=core_schema.plain_serializer_function_ser_schema(lambda a: a.tolist())
+            partial(self._array, self.dtype),
+            serialization=core_schema.plain_serializer_function_ser_schema(lambda a: a.tolist()),
         )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
@@ -59,7 +62,8 @@ class RosType:
 
     def _array(self, dtype: np.dtype[Any], value: Any) -> NDArray[Any]:
         try:
-            exact = dtype.kind != "f" and not isinstance(value, np.ndarray)  # Python's integers are longer than any of numpy's
+            # Python's integers are longer than any of numpy's
+            exact = dtype.kind != "f" and not isinstance(value, np.ndarray)
             given: NDArray[Any] = np.asarray(value, object if exact else None)
             if dtype.kind == "f" and given.size and given.dtype.kind not in "biuf":
                 raise ValueError(f"these are {given.dtype}")
@@ -81,7 +85,8 @@ class RosType:
 
 Float64 = Annotated[float, Field(allow_inf_nan=False), RosType("float64")]
 Bool = Annotated[bool, RosType("bool")]
-Byte = Annotated[int, Field(ge=0, lt=2**7), RosType("byte")]  # ROS 2 has eight bits, of which rosbags takes the eighth for a sign
+# ROS 2 has eight bits, of which rosbags takes the eighth for a sign
+Byte = Annotated[int, Field(ge=0, lt=2**7), RosType("byte")]
 String = Annotated[str, RosType("string")]
 UInt8 = Annotated[int, Field(ge=0, lt=2**8), RosType("uint8")]
 Int32 = Annotated[int, Field(ge=-(2**31), lt=2**31), RosType("int32")]

@@ -1,4 +1,6 @@
-"""The link of a device as a scenario states it: what a network between the device and the hub would do to their messages."""
+"""The link of a device as a scenario states it: what a network between the device and the hub would do to
+their messages.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +22,17 @@ PRESETS = {
 }
 """Delay (ns) in each direction, and what has that delay.
 
-Light goes through fibre at c / 1.468 (group index of G.652 fibre at 1550 nm), 204 km in a millisecond; a geostationary satellite stands
-35 786 km above the equator.
+Light goes through fibre at c / 1.468 (group index of G.652 fibre at 1550 nm), 204 km in a millisecond; a
+geostationary satellite stands 35 786 km above the equator.
 """
 
 
 def _preset(value: int) -> int:
     if value not in PRESETS:
-        raise ValueError(f"{value / 1e6:g} ms is no preset, there are {', '.join(f'{ns // 10**6} ms' for ns in PRESETS)}; any other delay is a 'delay'")
+        raise ValueError(
+            f"{value / 1e6:g} ms is no preset, there are {', '.join(f'{ns // 10**6} ms' for ns in PRESETS)};"
+            " any other delay is a 'delay'"
+        )
     return value
 
 
@@ -41,7 +46,9 @@ class Outage(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    at: Duration = Field(ge=0, description="since the session's start, or since the device joined if it lives in wall time")
+    at: Duration = Field(
+        ge=0, description="since the session's start, or since the device joined if it lives in wall time"
+    )
     duration: Duration = Field(gt=0)
 
 
@@ -51,9 +58,21 @@ class LinkSpec(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     preset: Preset | None = Field(default=None, description=f"a delay that stands for something: {_MEANINGS}")
-    delay: Duration = Field(default=0, ge=0, le=10**10, description="shortest time on the way, in each direction: there and back takes twice as long")
-    jitter: Duration = Field(default=0, ge=0, le=10**10, description="each message takes up to this much longer, any time between as likely")
-    loss: float = Field(default=0.0, ge=0.0, lt=1.0, description="share of the messages that get lost, each by chance")
+    delay: Duration = Field(
+        default=0,
+        ge=0,
+        le=10**10,
+        description="shortest time on the way, in each direction: there and back takes twice as long",
+    )
+    jitter: Duration = Field(
+        default=0,
+        ge=0,
+        le=10**10,
+        description="each message takes up to this much longer, any time between as likely",
+    )
+    loss: float = Field(
+        default=0.0, ge=0.0, lt=1.0, description="share of the messages that get lost, each by chance"
+    )
     outages: tuple[Outage, ...] = Field(default=(), description="times in which nothing gets through")
     seed: int = Field(default=0, description="of the chance in jitter and loss: the same seed, the same way")
 

@@ -12,9 +12,9 @@ __all__ = ["BondSide", "Port", "bond_ports"]
 class Port(BaseModel):
     """A named, typed input or output of a participant.
 
-    A *signal* has one value at a time, a float64 vector whenever the type has a fixed layout (see `schemas.vectors`).
-    An *event* port carries a queue of messages of which none is lost.
-    A signal may feed an event port: each new value is one message.
+    A *signal* has one value at a time, a float64 vector whenever the type has a fixed layout (see
+    `schemas.vectors`). An *event* port carries a queue of messages of which none is lost. A signal may feed
+    an event port: each new value is one message.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -27,7 +27,9 @@ class Port(BaseModel):
     size: int = Field(default=1, ge=1)
     """Number of elements where the type leaves it open (multi-arrays)."""
     shape: tuple[int, ...] = ()
-    """Of a multi-array that is a matrix, row after row: stands in the message's layout; the product is the size."""
+    """Of a multi-array that is a matrix, row after row: stands in the message's layout; the product is the
+    size.
+    """
     names: tuple[str, ...] = ()
     """Joint names of a `JointState`."""
     fields: tuple[Literal["position", "velocity", "effort"], ...] = ("position",)
@@ -35,7 +37,9 @@ class Port(BaseModel):
     unit: str = ""
     """Unit of a bare number or array; empty where the message type implies SI units."""
     frame: str = ""
-    """`frame_id` in which the value is expressed; empty where there is none. An input without a frame takes any."""
+    """`frame_id` in which the value is expressed; empty where there is none. An input without a frame takes
+    any.
+    """
     period_ns: int = Field(default=0, ge=0)
     """An output is produced at this period, a multiple of the step; 0: whenever the participant steps."""
     start: tuple[float, ...] | None = None
@@ -48,15 +52,19 @@ class Port(BaseModel):
 
     def filled_from(self, other: Port) -> Port:
         """Return this port with the frame and the joint names of `other` where it leaves them open."""
-        return self.model_copy(update={"frame": self.frame or other.frame, "names": self.names or other.names})
+        return self.model_copy(
+            update={"frame": self.frame or other.frame, "names": self.names or other.names}
+        )
 
 
 class BondSide(BaseModel):
-    """One end of a power bond: the motion side gives pose and twist and takes a wrench, the force side the reverse.
+    """One end of a power bond: the motion side gives pose and twist and takes a wrench, the force side the
+    reverse.
 
-    `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity, force). With
-    `dof` 3 there may be several `points`, the contact spheres of one instrument: their coordinates follow each other.
-    The numbers feed the stable-step rule and the linearised coupling; stiffness, damping and proxy mass are those at each point.
+    `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity,
+    force). With `dof` 3 there may be several `points`, the contact spheres of one instrument: their
+    coordinates follow each other. The numbers feed the stable-step rule and the linearised coupling;
+    stiffness, damping and proxy mass are those at each point.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -80,7 +88,8 @@ class BondSide(BaseModel):
     effective_mass: float | None = None
     """Motion side: smallest effective mass at the bond, kg; known once the participant is configured.
 
-    1 / max eig(J M^-1 J^T) with J, shape (size, nv), of all points together: with n springs on one body each must see a mass of m / n.
+    1 / max eig(J M^-1 J^T) with J, shape (size, nv), of all points together: with n springs on one body each
+    must see a mass of m / n.
     """
 
     @model_validator(mode="after")
@@ -115,10 +124,20 @@ def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
         )
         size = 1
     else:
-        rows = tuple((name, "std_msgs/msg/Float64MultiArray", unit) for name, unit in (("position", "m"), ("velocity", "m/s"), ("force", "N")))
+        rows = tuple(
+            (name, "std_msgs/msg/Float64MultiArray", unit)
+            for name, unit in (("position", "m"), ("velocity", "m/s"), ("force", "N"))
+        )
         size = bond.size
     position, velocity, force = (
-        Port(name=f"{bond.name}/{name}", causality=causality, type=type_, size=size, unit=unit, frame=bond.frame)
+        Port(
+            name=f"{bond.name}/{name}",
+            causality=causality,
+            type=type_,
+            size=size,
+            unit=unit,
+            frame=bond.frame,
+        )
         for (name, type_, unit), causality in zip(rows, (moves, moves, takes), strict=True)
     )
     return position, velocity, force

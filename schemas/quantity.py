@@ -1,4 +1,5 @@
-"""Physical quantities in scenarios: `80 mm`, `10 kPa`, `1 ms` become SI floats (durations: integer nanoseconds).
+"""Physical quantities in scenarios: `80 mm`, `10 kPa`, `1 ms` become SI floats (durations: integer
+nanoseconds).
 
 A bare number is taken in the SI unit of the field; another dimension is refused.
 """
@@ -14,7 +15,21 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-__all__ = ["Acceleration", "Angle", "Damping", "Density", "Duration", "Force", "Length", "Mass", "Pressure", "Speed", "Stiffness", "same_unit", "to_si"]
+__all__ = [
+    "Acceleration",
+    "Angle",
+    "Damping",
+    "Density",
+    "Duration",
+    "Force",
+    "Length",
+    "Mass",
+    "Pressure",
+    "Speed",
+    "Stiffness",
+    "same_unit",
+    "to_si",
+]
 
 
 _FACTOR = r"(?:1|%|°?[^\W\d]\w*)(?:(?:\^|\*\*)-?\d)?"
@@ -43,7 +58,10 @@ def _converted(number: float, unit: str, target: str) -> float:
 
 
 def to_si(value: Any, unit: str) -> float:
-    """Return `value`, a number or a text such as `80 mm`, in the SI unit `unit`. Raises ValueError if it is no such finite quantity."""
+    """Return `value`, a number or a text such as `80 mm`, in the SI unit `unit`.
+
+    Raises ValueError if it is no such finite quantity.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit}, such as '1 {unit}'")
     try:
@@ -72,7 +90,11 @@ def same_unit(one: str, other: str) -> bool:
 
 
 def _quantity(unit: str, example: str) -> Any:
-    schema = {"anyOf": [{"type": "number"}, {"type": "string"}], "description": f"a number in {unit}, or a text with its unit", "examples": [example]}
+    schema = {
+        "anyOf": [{"type": "number"}, {"type": "string"}],
+        "description": f"a number in {unit}, or a text with its unit",
+        "examples": [example],
+    }
     return BeforeValidator(lambda value: to_si(value, unit)), WithJsonSchema(schema)
 
 
@@ -100,6 +122,12 @@ Duration = Annotated[
     int,
     BeforeValidator(_nanoseconds),
     PlainSerializer(lambda ns: f"{ns} ns", when_used="json"),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}], "description": "seconds, or a text with its unit", "examples": ["1 ms"]}),
+    WithJsonSchema(
+        {
+            "anyOf": [{"type": "number"}, {"type": "string"}],
+            "description": "seconds, or a text with its unit",
+            "examples": ["1 ms"],
+        }
+    ),
 ]
 """Integer nanoseconds."""

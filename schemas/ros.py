@@ -296,7 +296,9 @@ class Joy(Message):
 
 
 class Image(Message):
-    """An uncompressed image, row after row from the top; the stamp is when it was taken, the frame the camera's optical frame."""
+    """An uncompressed image, row after row from the top; the stamp is when it was taken, the frame the
+    camera's optical frame.
+    """
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/Image"
     header: Header = Header()
@@ -329,7 +331,9 @@ class RegionOfInterest(Message):
 
 
 class CameraInfo(Message):
-    """A camera's calibration: distortion d, intrinsics k (3 x 3), rectification r (3 x 3), projection p (3 x 4), row after row."""
+    """A camera's calibration: distortion d, intrinsics k (3 x 3), rectification r (3 x 3), projection p (3 x
+    4), row after row.
+    """
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
     header: Header = Header()

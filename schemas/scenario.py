@@ -1,4 +1,7 @@
-"""The scenario: the file that describes a session. All quantities are SI after validation, times integer nanoseconds."""
+"""The scenario: the file that describes a session.
+
+All quantities are SI after validation, times integer nanoseconds.
+"""
 
 from __future__ import annotations
 
@@ -49,21 +52,31 @@ class Endpoint(_Part):
 
 
 class ParticipantSpec(_Part):
-    """A participant: its kind, where it runs, how often it steps, what lies between it and the hub, and the parameters of its kind."""
+    """A participant: its kind, where it runs, how often it steps, what lies between it and the hub, and the
+    parameters of its kind.
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
     kind: str = Field(description="name of an installed engine, controller or device")
     host: Name = Field(default="hub", description="'hub', the name of a process to start here, or 'remote'")
     period: Duration | None = Field(
-        default=None, description="a multiple of the step; default: the step. Of a device that lives in wall time: how often it is read; default: 1 ms"
+        default=None,
+        description=(
+            "a multiple of the step; default: the step. Of a device that lives in wall time: how often it is"
+            " read; default: 1 ms"
+        ),
     )
-    link: LinkSpec | None = Field(default=None, description="of a device: the network that is put between it and the hub; default: none")
+    link: LinkSpec | None = Field(
+        default=None, description="of a device: the network that is put between it and the hub; default: none"
+    )
     rate_limit: float = Field(
         default=2000.0,
         gt=0.0,
         allow_inf_nan=False,
-        description="of a device: messages per second that the hub takes from each of its ports, bursts aside",
+        description=(
+            "of a device: messages per second that the hub takes from each of its ports, bursts aside"
+        ),
     )
     RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period", "link", "rate_limit")
 
@@ -76,8 +89,8 @@ class ParticipantSpec(_Part):
 class Connection(_Part):
     """An output port feeds an input port: `source -> target`.
 
-    `motion.drive/* -> robot.*` stands for one connection from each output of `motion` under `drive/` to the input of the same
-    name of `robot`; outputs that have no such input stay unconnected.
+    `motion.drive/* -> robot.*` stands for one connection from each output of `motion` under `drive/` to the
+    input of the same name of `robot`; outputs that have no such input stay unconnected.
     """
 
     source: Endpoint
@@ -97,8 +110,12 @@ class Connection(_Part):
     @model_validator(mode="after")
     def _check_wildcard(self) -> Connection:
         stars = [end.port.count("*") for end in (self.source, self.target)]
-        if any(stars) and not (stars == [1, 1] and self.source.port.endswith("*") and self.target.port.endswith("*")):
-            raise ValueError(f"'{self.source} -> {self.target}': a wildcard is one '*' at the end of both ports")
+        if any(stars) and not (
+            stars == [1, 1] and self.source.port.endswith("*") and self.target.port.endswith("*")
+        ):
+            raise ValueError(
+                f"'{self.source} -> {self.target}': a wildcard is one '*' at the end of both ports"
+            )
         return self
 
     @property
@@ -114,10 +131,15 @@ class Bond(_Part):
     force: Endpoint
     algorithm: Algorithm = "impulse"
     prediction: Literal["velocity", "slope"] = Field(
-        default="velocity", description="for impulse: held velocity, or with its slope (smooth linear couplings only)"
+        default="velocity",
+        description="for impulse: held velocity, or with its slope (smooth linear couplings only)",
     )
-    order: list[str] | None = Field(default=None, description="for gauss-seidel: the two participants in the order they step")
-    check: Literal["refuse", "warn"] = Field(default="refuse", description="what to do if the stable-step rule is broken")
+    order: list[str] | None = Field(
+        default=None, description="for gauss-seidel: the two participants in the order they step"
+    )
+    check: Literal["refuse", "warn"] = Field(
+        default="refuse", description="what to do if the stable-step rule is broken"
+    )
 
     @property
     def name(self) -> str:
@@ -126,11 +148,16 @@ class Bond(_Part):
 
 
 class Measure(_Part):
-    """A number for the summary, from the values of one output port: `participant.port` or `participant.port.field`."""
+    """A number for the summary, from the values of one output port: `participant.port` or
+    `participant.port.field`.
+    """
 
     kind: Literal["peak-norm", "peak", "least", "mean", "final", "drop", "swing", "time-above"] = Field(
-        description="drop: the largest fall after the peak; swing: from the least to the largest, of several numbers that of the one that varies most;"
-        " time-above: the longest time (s) at `level` or above; for all else of several numbers the norm is taken"
+        description=(
+            "drop: the largest fall after the peak; swing: from the least to the largest, of several numbers"
+            " that of the one that varies most; time-above: the longest time (s) at `level` or above; for all"
+            " else of several numbers the norm is taken"
+        )
     )
     of: Endpoint
     after: Duration = Field(default=0, ge=0, description="simulated time before which values do not count")
@@ -141,7 +168,9 @@ class Measure(_Part):
     @model_validator(mode="after")
     def _level_where_it_counts(self) -> Self:
         if (self.level is not None) != (self.kind == "time-above"):
-            raise ValueError(f"measure of kind {self.kind}: a level belongs to time-above, and to nothing else")
+            raise ValueError(
+                f"measure of kind {self.kind}: a level belongs to time-above, and to nothing else"
+            )
         return self
 
 
@@ -155,15 +184,31 @@ class Scenario(_Part):
     name: Name
     description: str = ""
     step: Duration = Field(gt=0, description="communication step H")
-    duration: Duration | None = Field(default=None, gt=0, description="simulated time; without it the session runs until it is stopped")
+    duration: Duration | None = Field(
+        default=None, gt=0, description="simulated time; without it the session runs until it is stopped"
+    )
     pace: Literal["fast", "realtime"] = "fast"
     window: int | None = Field(
-        default=None, ge=1, le=1000, description="most steps that one grant may cover; without it 10 ms in pace fast with one host, else one step"
+        default=None,
+        ge=1,
+        le=1000,
+        description=(
+            "most steps that one grant may cover; without it 10 ms in pace fast with one host, else one step"
+        ),
     )
-    algorithm: Literal["gauss-seidel", "jacobi"] = Field(default="gauss-seidel", description="for connections that belong to no bond")
-    order: list[str] | None = Field(default=None, description="the order in which participants step; needed where connections form a cycle")
-    answer_limit: Duration = Field(default=10**10, gt=0, description="wall time after which a silent participant ends the session")
-    join_limit: Duration = Field(default=60 * 10**9, gt=0, description="wall time to wait for all participants to join")
+    algorithm: Literal["gauss-seidel", "jacobi"] = Field(
+        default="gauss-seidel", description="for connections that belong to no bond"
+    )
+    order: list[str] | None = Field(
+        default=None,
+        description="the order in which participants step; needed where connections form a cycle",
+    )
+    answer_limit: Duration = Field(
+        default=10**10, gt=0, description="wall time after which a silent participant ends the session"
+    )
+    join_limit: Duration = Field(
+        default=60 * 10**9, gt=0, description="wall time to wait for all participants to join"
+    )
     participants: dict[Name, ParticipantSpec] = Field(min_length=1)
     connections: Annotated[list[Connection], BeforeValidator(lambda v: [] if v is None else v)] = []
     bonds: Annotated[list[Bond], BeforeValidator(lambda v: [] if v is None else v)] = []

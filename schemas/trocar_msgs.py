@@ -43,7 +43,9 @@ __all__ = [
 
 
 class InletSample(Message):
-    """One device sample as it enters simulated time: the CDR bytes that arrived, or only a change of staleness."""
+    """One device sample as it enters simulated time: the CDR bytes that arrived, or only a change of
+    staleness.
+    """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/InletSample"
     participant: String
@@ -56,7 +58,9 @@ class InletSample(Message):
 
 
 class Grant(Message):
-    """The hub's permission to advance from step `step` at `start_ns` to `horizon_ns`, with all that enters there."""
+    """The hub's permission to advance from step `step` at `start_ns` to `horizon_ns`, with all that enters
+    there.
+    """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/Grant"
     run: UInt64
@@ -78,12 +82,16 @@ class Ack(Message):
     state_hash: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
     compute_ns: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
     work_j: Float64Array = Field(default_factory=lambda: np.zeros(0))
-    """Per step, per bond in declared order: work since the start (J), done by a motion side, received by a force side."""
+    """Per step, per bond in declared order: work since the start (J), done by a motion side, received by a
+    force side.
+    """
     error: String = ""
 
 
 class CouplingEnergy(Message):
-    """The energy book of one bond: what the motion side gave, what the force side got, and the difference, all in J since the start."""
+    """The energy book of one bond: what the motion side gave, what the force side got, and the difference,
+    all in J since the start.
+    """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/CouplingEnergy"
     header: Header
@@ -97,7 +105,8 @@ class CouplingEnergy(Message):
 class ContactPlane(Message):
     """A surface near a hand, as flat: it pushes what is below it back along its normal.
 
-    With depth = distance + velocity age - normal . x of a hand at x, the force is normal max(0, stiffness depth - damping v_n), and friction across it.
+    With depth = distance + velocity age - normal . x of a hand at x, the force is normal max(0, stiffness
+    depth - damping v_n), and friction across it.
     """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ContactPlane"
@@ -116,7 +125,9 @@ class ContactPlane(Message):
 
 
 class ContactModel(Message):
-    """All that a haptic device needs to render contact until the next one comes; in `header.frame_id`, the device's base frame."""
+    """All that a haptic device needs to render contact until the next one comes; in `header.frame_id`, the
+    device's base frame.
+    """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ContactModel"
     header: Header
@@ -132,7 +143,8 @@ class SoftBodyState(Message):
     body: String
     nodes_m: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
     triangles: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
-    """Surface triangles as node indices, three after the other; sent with the first state, empty afterwards."""
+    """Surface triangles as node indices, three after the other; sent with the first state, empty afterwards.
+    """
 
 
 class TissueGrasp(Message):
@@ -165,8 +177,10 @@ class Latency(Message):
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/Latency"
     way: String
-    """`device to grant`: from when a device had a sample to the communication point at which it entered the simulation; `grant to state`: from a
-    grant to the acknowledgement of all its steps; `state to force`: from when a value was there to when it was written to a device."""
+    """`device to grant`: from when a device had a sample to the communication point at which it entered the
+    simulation; `grant to state`: from a grant to the acknowledgement of all its steps; `state to force`: from
+    when a value was there to when it was written to a device.
+    """
     stream: String
     """`device.port`, `source.port -> device.port`, or `all participants`."""
     count: UInt64
@@ -183,7 +197,9 @@ class DeviceStatus(Message):
     offset_ns: Int64 = 0
     """What is added to the monotonic clock of the device's host to have that of the hub."""
     round_trip_ns: Int64 = -1
-    """Of the exchange that told the offset, which is right within half of it; -1: there was none yet, or the host is the hub's own."""
+    """Of the exchange that told the offset, which is right within half of it; -1: there was none yet, or the
+    host is the hub's own.
+    """
     link: String = ""
     """What lies between device and hub by the scenario, or by what was set since; empty: nothing."""
     latencies: list[Latency] = Field(default_factory=list[Latency])

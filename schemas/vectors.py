@@ -1,8 +1,9 @@
 """Values of signal ports as float64 vectors, and their CDR form without going through message objects.
 
-The layout of a port's message is fixed once its size, names and frame are known: only the stamp and one or more
-blocks of doubles change from step to step. `VectorCodec` writes them into a template that `rosbags` serialised once
-(0.6 us against 24 us through the models, `bench/engine_steps.py`), and reads them back after comparing all other bytes.
+The layout of a port's message is fixed once its size, names and frame are known: only the stamp and one or
+more blocks of doubles change from step to step. `VectorCodec` writes them into a template that `rosbags`
+serialised once (0.6 us against 24 us through the models, `bench/engine_steps.py`), and reads them back after
+comparing all other bytes.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ _LAYOUTS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "geometry_msgs/msg/AccelStamped": (("accel.linear", _XYZ), ("accel.angular", _XYZ)),
     "sensor_msgs/msg/JointState": (),
 }
-"""Per type: the blocks of numbers, each with the names of its elements (none: an array or a single number)."""
+"""Per type: the blocks of numbers, each with the names of its elements (none: an array or a single number).
+"""
 
 _QUATERNION_TOLERANCE = 1e-3
 _NANOSEC = struct.Struct("<I")
@@ -57,7 +59,9 @@ class VectorCodec:
         self.port = port
         self.model = message_type(port.type)
         self.fields: dict[str, slice] = {}
-        """Position of each block in the vector, and of each number with a name, by its full path and by the block's last word: `position`, `position.z`."""
+        """Position of each block in the vector, and of each number with a name, by its full path and by the
+        block's last word: `position`, `position.z`.
+        """
         self._blocks = list(self._layout())
         self.size: int = self._blocks[-1][2].stop
         self.neutral = np.zeros(self.size)
@@ -82,16 +86,24 @@ class VectorCodec:
             at += count
 
     def _compile(self) -> None:
-        """Find where the stamp and the blocks stand in the CDR bytes, by serialising numbers that occur nowhere else."""
+        """Find where the stamp and the blocks stand in the CDR bytes, by serialising numbers that occur
+        nowhere else.
+        """
         marks: Vector = np.random.default_rng(0).random(self.size)
         template = bytearray(encode(self.to_message(marks, 0)))
-        starts = [(template.index(struct.pack("<d", marks[block.start])), 8 * block.start, 8 * block.stop) for _, _, block in self._blocks]
+        starts = [
+            (template.index(struct.pack("<d", marks[block.start])), 8 * block.start, 8 * block.stop)
+            for _, _, block in self._blocks
+        ]
         # where each block begins and ends in the message, and which of the vector's bytes it is
         self._spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
         self._has_stamp = "header" in self.model.model_fields
         self._fixed: list[tuple[int, int, bytes]] = []
         at = 0
-        for start, stop in [*sorted((start, stop) for start, stop, _ in self._spans), (len(template), len(template))]:
+        for start, stop in [
+            *sorted((start, stop) for start, stop, _ in self._spans),
+            (len(template), len(template)),
+        ]:
             if at == 0 and self._has_stamp:
                 self._fixed.append((0, 4, bytes(template[0:4])))
                 at = 12
@@ -116,26 +128,42 @@ class VectorCodec:
         Raises MessageError on any other length, frame, name or layout and on numbers that are not finite.
         """
         if len(payload) != self._length:
-            raise MessageError(f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}")
+            raise MessageError(
+                f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}"
+            )
         if not self.fits(payload):
-            raise MessageError(f"port '{self.port.name}': frame, names or layout differ from what the port declares")
-        numbers = bytearray().join([payload[start:stop] for start, stop, _ in self._spans])  # a third of the cost of np.concatenate
+            raise MessageError(
+                f"port '{self.port.name}': frame, names or layout differ from what the port declares"
+            )
+        # a third of the cost of np.concatenate
+        numbers = bytearray().join([payload[start:stop] for start, stop, _ in self._spans])
         return self.checked(np.frombuffer(numbers))
 
     def fits(self, payload: bytes) -> bool:
-        """Say whether all bytes but the numbers and the stamp, which must be one, are as this codec writes them."""
-        if len(payload) != self._length or (self._has_stamp and not _NANOSEC.unpack_from(payload, 8)[0] < 10**9):
+        """Say whether all bytes but the numbers and the stamp, which must be one, are as this codec writes
+        them.
+        """
+        if len(payload) != self._length or (
+            self._has_stamp and not _NANOSEC.unpack_from(payload, 8)[0] < 10**9
+        ):
             return False
         return all(payload[start:stop] == expected for start, stop, expected in self._fixed)
 
     def checked(self, value: Vector) -> Vector:
-        """Return `value` if it holds doubles, has the right shape, is finite and its quaternion (if any) is a unit quaternion."""
+        """Return `value` if it holds doubles, has the right shape, is finite and its quaternion (if any) is a
+        unit quaternion.
+        """
         if value.shape != (self.size,) or value.dtype != np.float64:
-            raise MessageError(f"port '{self.port.name}': {value.dtype} of shape {value.shape}, expected float64 of shape ({self.size},)")
+            raise MessageError(
+                f"port '{self.port.name}': {value.dtype} of shape {value.shape}, expected float64 of shape"
+                f" ({self.size},)"
+            )
         if 0 in np.isfinite(value).tobytes():  # a third of the cost of np.isfinite(...).all()
             raise MessageError(f"port '{self.port.name}': not all of {value} are finite")
         if self._is_pose and abs((norm := math.hypot(*value[3:].tolist())) - 1.0) > _QUATERNION_TOLERANCE:
-            raise MessageError(f"port '{self.port.name}': quaternion (x, y, z, w) has norm {norm:.6g}, expected 1")
+            raise MessageError(
+                f"port '{self.port.name}': quaternion (x, y, z, w) has norm {norm:.6g}, expected 1"
+            )
         return value
 
     def to_message(self, value: Vector, time_ns: int) -> Message:
@@ -159,7 +187,8 @@ class VectorCodec:
     def from_message(self, message: Message) -> Vector:
         """Return the vector, shape (size,), of a validated message from outside.
 
-        Joints may come in any order if they are named. Raises MessageError if frame, names or sizes do not fit the port.
+        Joints may come in any order if they are named. Raises MessageError if frame, names or sizes do not
+        fit the port.
         """
         if not isinstance(message, self.model):
             raise MessageError(f"port '{self.port.name}': {message.ros_type}, expected {self.port.type}")
@@ -170,10 +199,19 @@ class VectorCodec:
         value = np.empty(self.size)
         for path, names, block in self._blocks:
             content: Any = reduce(getattr, path.split("."), message)
-            numbers = np.array([getattr(content, name) for name in names]) if names else np.atleast_1d(np.asarray(content, np.float64))
+            numbers = (
+                np.array([getattr(content, name) for name in names])
+                if names
+                else np.atleast_1d(np.asarray(content, np.float64))
+            )
             if numbers.size != block.stop - block.start:
-                raise MessageError(f"port '{self.port.name}': {numbers.size} values in {path}, expected {block.stop - block.start}")
-            value[block] = numbers[self._joint_order(message)] if path in ("position", "velocity", "effort") else numbers
+                raise MessageError(
+                    f"port '{self.port.name}': {numbers.size} values in {path}, expected"
+                    f" {block.stop - block.start}"
+                )
+            value[block] = (
+                numbers[self._joint_order(message)] if path in ("position", "velocity", "effort") else numbers
+            )
         return self.checked(value)
 
     def _joint_order(self, message: Message) -> Any:
@@ -186,7 +224,14 @@ class VectorCodec:
 
 
 def _layout_of(shape: tuple[int, ...]) -> MultiArrayLayout:
-    """Return the layout of a dense array, row-major, as std_msgs/MultiArrayLayout defines strides: that of a dimension counts it too."""
+    """Return the layout of a dense array, row-major, as std_msgs/MultiArrayLayout defines strides: that of a
+    dimension counts it too.
+    """
     labels = ("rows", "cols") if len(shape) == 2 else tuple(f"dim{axis}" for axis in range(len(shape)))
     rows = zip(labels, shape, strict=True)
-    return MultiArrayLayout(dim=[MultiArrayDimension(label=label, size=size, stride=math.prod(shape[axis:])) for axis, (label, size) in enumerate(rows)])
+    return MultiArrayLayout(
+        dim=[
+            MultiArrayDimension(label=label, size=size, stride=math.prod(shape[axis:]))
+            for axis, (label, size) in enumerate(rows)
+        ]
+    )

@@ -45,7 +45,9 @@ def messages(model: type[Message]) -> st.SearchStrategy[Message]:
 
 
 def _field(model: type[Message], ros_type: str, name: str) -> st.SearchStrategy[Any]:
-    if ros_type == "float64" and any(getattr(mark, "ge", None) == 0.0 for mark in model.model_fields[name].metadata):
+    if ros_type == "float64" and any(
+        getattr(mark, "ge", None) == 0.0 for mark in model.model_fields[name].metadata
+    ):
         return finite.map(abs)
     if ros_type in _SCALARS:
         return _SCALARS[ros_type]
@@ -61,7 +63,12 @@ def _field(model: type[Message], ros_type: str, name: str) -> st.SearchStrategy[
 any_message = st.sampled_from(sorted(message_types())).flatmap(lambda name: messages(message_types()[name]))
 """A message of any type."""
 
-_unit_quaternions = vectors(4).map(lambda q: q / max(math.hypot(*q), 1.0)).filter(lambda q: math.hypot(*q) > 0.1).map(lambda q: q / math.hypot(*q))
+_unit_quaternions = (
+    vectors(4)
+    .map(lambda q: q / max(math.hypot(*q), 1.0))
+    .filter(lambda q: math.hypot(*q) > 0.1)
+    .map(lambda q: q / math.hypot(*q))
+)
 _poses = st.tuples(vectors(3), _unit_quaternions).map(np.concatenate)
 
 
@@ -71,7 +78,11 @@ frames = st.sampled_from(["", "world", "PSM1/base"])
 @st.composite
 def ports(draw: st.DrawFn) -> Port:
     """Signal ports whose values are vectors."""
-    kind = draw(st.sampled_from(["Float64", "Float64MultiArray", "PoseStamped", "TwistStamped", "WrenchStamped", "JointState"]))
+    kind = draw(
+        st.sampled_from(
+            ["Float64", "Float64MultiArray", "PoseStamped", "TwistStamped", "WrenchStamped", "JointState"]
+        )
+    )
     given: dict[str, Any] = {"name": "arm/port", "causality": "output"}
     if kind.startswith("Float64"):
         size = draw(st.integers(1, 5)) if kind.endswith("Array") else 1
@@ -79,7 +90,13 @@ def ports(draw: st.DrawFn) -> Port:
     if kind == "JointState":
         joints = draw(st.lists(names, min_size=1, max_size=4, unique=True))
         fields = draw(st.lists(st.sampled_from(["position", "velocity", "effort"]), min_size=1, unique=True))
-        return Port(**given, type="sensor_msgs/msg/JointState", names=tuple(joints), fields=tuple(fields), frame=draw(frames))
+        return Port(
+            **given,
+            type="sensor_msgs/msg/JointState",
+            names=tuple(joints),
+            fields=tuple(fields),
+            frame=draw(frames),
+        )
     return Port(**given, type=f"geometry_msgs/msg/{kind}", frame=draw(frames))
 
 

@@ -1,4 +1,6 @@
-"""Hub, device host and servo process, each for itself, with a simulated hand behind the stand-in of HDAPI: what the hand feels when the hub is killed."""
+"""Hub, device host and servo process, each for itself, with a simulated hand behind the stand-in of HDAPI:
+what the hand feels when the hub is killed.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,11 @@ SCENARIO = {
             "planes": [{"normal": [0, 0, 1], "distance": "-136 mm", "stiffness": "200 N/m"}],
         },
     },
-    "connections": ["stylus.right/pose -> teleop.master", "stylus.right/buttons -> teleop.buttons", "teleop.contact -> stylus.right/contact"],
+    "connections": [
+        "stylus.right/pose -> teleop.master",
+        "stylus.right/buttons -> teleop.buttons",
+        "teleop.contact -> stylus.right/contact",
+    ],
 }
 
 
@@ -59,7 +65,10 @@ class Hand:
             sleep(0.02)
 
     def press(self) -> None:
-        """Let go, take up the arm from where the hand is, and press the table until it is felt. The sessions' arm starts where it always does."""
+        """Let go, take up the arm from where the hand is, and press the table until it is felt.
+
+        The sessions' arm starts where it always does.
+        """
         self.go(0.0, held=False)
         sleep(0.2)
         self.go(0.0, held=True)
@@ -74,7 +83,11 @@ def start(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
     def popen(*arguments: str, **environment: str) -> subprocess.Popen[bytes]:
         with (tmp_path / f"{len(started)}.log").open("wb") as log:
             command = [sys.executable, "-P", "-m", "hub.command_line", *arguments]
-            started.append(subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment}, cwd=tmp_path))
+            started.append(
+                subprocess.Popen(
+                    command, stdout=log, stderr=log, env={**os.environ, **environment}, cwd=tmp_path
+                )
+            )
         return started[-1]
 
     yield popen
@@ -83,7 +96,9 @@ def start(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
         process.wait()
 
 
-def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(start: Callable[..., subprocess.Popen[bytes]], tmp_path: Path) -> None:
+def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(
+    start: Callable[..., subprocess.Popen[bytes]], tmp_path: Path
+) -> None:
     library = build.compile_library("hd.c", tmp_path / "libHD.so")
     world = HdWorld(library, tmp_path / "world")
     hand = Hand(world)
@@ -103,7 +118,8 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(star
     rows = world.rows(since=killed)
     pushing = rows[np.linalg.norm(rows[:, Row.FORCE], axis=1) > 0.0]
     assert len(rows) > 100
-    assert len(pushing) == 0 or pushing[-1, Row.TIME] - killed < 0.15 + rows[:, Row.GAP].max()  # a tick may come late on a busy machine
+    # a tick may come late on a busy machine
+    assert len(pushing) == 0 or pushing[-1, Row.TIME] - killed < 0.15 + rows[:, Row.GAP].max()
     start("run", str(file), "--listen", endpoint)
     hand.until(lambda: _presses(hand), "the hand feels the table of the next session")
     forces = np.linalg.norm(world.rows()[:, Row.FORCE], axis=1)
@@ -121,7 +137,9 @@ def _listens(endpoint: str) -> bool:
 
 
 def _presses(hand: Hand) -> bool:
-    """Try to press, and say whether there is force; a session that has just begun may not have heard the button."""
+    """Try to press, and say whether there is force; a session that has just begun may not have heard the
+    button.
+    """
     hand.press()
     end = monotonic() + 1.5
     while monotonic() < end and hand.force() < 0.6:

@@ -1,4 +1,6 @@
-"""A hand at a stylus, and what the instrument touches: whole sessions, with the way between hand and robot as long as half the world."""
+"""A hand at a stylus, and what the instrument touches: whole sessions, with the way between hand and robot as
+long as half the world.
+"""
 
 import json
 from collections.abc import Iterable
@@ -45,7 +47,10 @@ TABLE = {
         "teleop.contact -> console.right/contact",
     ],
 }
-"""The paper's table: 200 N/m, 22.5 mm below where the tip starts; the hand wants to be 10 mm below that. It is felt where the tip is told to be."""
+"""The paper's table: 200 N/m, 22.5 mm below where the tip starts; the hand wants to be 10 mm below that.
+
+It is felt where the tip is told to be.
+"""
 
 
 class Felt(NamedTuple):
@@ -84,7 +89,10 @@ def _run(scenario: dict, file: Path, link: dict) -> Felt:
         return samples
 
     console.read = listen
-    assert Session(checked, plan, participants, file.parent, endpoint=free_endpoint(range(1))).run().state == "done"
+    assert (
+        Session(checked, plan, participants, file.parent, endpoint=free_endpoint(range(1))).run().state
+        == "done"
+    )
     return Felt(*np.array(rows).T)
 
 
@@ -94,7 +102,9 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "link", [{}, {"preset": "100 ms", "jitter": "20 ms"}, {"preset": "300 ms", "jitter": "50 ms", "loss": 0.1}], ids=lambda link: link.get("preset", "0 ms")
+    "link",
+    [{}, {"preset": "100 ms", "jitter": "20 ms"}, {"preset": "300 ms", "jitter": "50 ms", "loss": 0.1}],
+    ids=lambda link: link.get("preset", "0 ms"),
 )
 def test_a_hand_on_the_virtual_table_comes_to_rest_whatever_the_delay(file: Path, link: dict) -> None:
     felt = _run(deepcopy(TABLE), file, link)
@@ -106,11 +116,13 @@ def test_a_hand_on_the_virtual_table_comes_to_rest_whatever_the_delay(file: Path
 def test_a_link_that_drops_ends_the_force_within_150_ms_and_the_arm_waits_for_the_button(file: Path) -> None:
     scenario = deepcopy(TABLE) | {"step": "1 ms"}
     felt = _run(scenario, file, {"preset": "70 ms", "outages": [{"at": "3 s", "duration": "300 ms"}]})
-    pressed, silent = felt.force[felt.time == 3.0], felt.force[(felt.time >= 3.22) & (felt.time < 3.3)]  # models are under way for 70 ms
+    # models are under way for 70 ms
+    pressed, silent = felt.force[felt.time == 3.0], felt.force[(felt.time >= 3.22) & (felt.time < 3.3)]
     assert pressed == pytest.approx(1.0, abs=0.05)
     assert not silent.any()
     assert np.diff(felt.force).max() <= 0.1 + 1e-9
-    assert not felt.force[felt.time > 3.3].any()  # the arm has been without a hand: the clutch button is to be pressed anew
+    # the arm has been without a hand: the clutch button is to be pressed anew
+    assert not felt.force[felt.time > 3.3].any()
 
 
 def test_a_session_through_a_bad_link_gives_the_same_bits_again(file: Path) -> None:
@@ -126,9 +138,17 @@ TISSUE = {
         "kind": "mujoco",
         "looks": False,
         "publish_period": "20 ms",
-        "arms": {"PSM1": {"instrument": "palpation-probe", "probe_radius": "5 mm", "position": [0, 0, "123.5 mm"]}},
+        "arms": {
+            "PSM1": {"instrument": "palpation-probe", "probe_radius": "5 mm", "position": [0, 0, "123.5 mm"]}
+        },
     },
-    "teleop": {"kind": "teleoperation", "period": "4 ms", "scale": 0.5, "engage": "held", "contact_period": "4 ms"},
+    "teleop": {
+        "kind": "teleoperation",
+        "period": "4 ms",
+        "scale": 0.5,
+        "engage": "held",
+        "contact_period": "4 ms",
+    },
     "tissue": {
         "kind": "bullet",
         "organs": {"block": {"size": ["60 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": 100}},

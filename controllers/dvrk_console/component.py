@@ -1,8 +1,9 @@
 """One teleoperation component: a master, the arm that it leads, and how far they are on the way to it.
 
-The states are those of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): DISABLED; SETTING_ARMS_STATE until master and arm are enabled and
-homed; ALIGNING_MTM until the master is turned like the tip and somebody holds it; ENABLED, in which the arm follows unless the clutch is pressed.
-Whether the hand may take over is decided by the `teleoperation`, which knows where both are; here it is only let, or not.
+The states are those of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): DISABLED;
+SETTING_ARMS_STATE until master and arm are enabled and homed; ALIGNING_MTM until the master is turned like
+the tip and somebody holds it; ENABLED, in which the arm follows unless the clutch is pressed. Whether the
+hand may take over is decided by the `teleoperation`, which knows where both are; here it is only let, or not.
 """
 
 from __future__ import annotations
@@ -53,7 +54,16 @@ class Component:
         self._orders = Master(self.master, voice)
         self.state = np.zeros(13)
         parts = np.split(self.state, 13)
-        self._desired, self._wish, self._current, self._phase, self._following, self._let, self.selected, *parts = parts
+        (
+            self._desired,
+            self._wish,
+            self._current,
+            self._phase,
+            self._following,
+            self._let,
+            self.selected,
+            *parts,
+        ) = parts
         self.scale, self.gripper, self._align, self._rotation, self._translation, self._aligned_ns = parts
         self._let[0], self._align[0] = -1.0, params.align_mtm
         self.scale[0], self.gripper[0] = params.scale, -1.0
@@ -64,7 +74,11 @@ class Component:
         self._say("desired_state", StringMessage(data=State(int(self._desired[0])).name))
         self._say("following", BoolMessage(data=False))
         self._say("scale", Float64Message(data=float(self.scale[0])))
-        for name, flag in (("align_mtm", self._align), ("rotation_locked", self._rotation), ("translation_locked", self._translation)):
+        for name, flag in (
+            ("align_mtm", self._align),
+            ("rotation_locked", self._rotation),
+            ("translation_locked", self._translation),
+        ):
             self._say(name, BoolMessage(data=bool(flag[0])))
 
     def set_scale(self, scale: float) -> None:
@@ -83,15 +97,26 @@ class Component:
             self._give_up(lost)
         before, followed = self._current[0], self._following[0]
         self._current[0] = self._next(readiness, clutched=clutched)
-        self._let_lead(let=self._desired[0] == State.ENABLED and self._current[0] >= State.ALIGNING_MTM and not clutched)
-        self._following[0] = self._current[0] == State.ENABLED and _PHASES[int(self._phase[0])] == "ENABLED" and not clutched
+        self._let_lead(
+            let=self._desired[0] == State.ENABLED and self._current[0] >= State.ALIGNING_MTM and not clutched
+        )
+        self._following[0] = (
+            self._current[0] == State.ENABLED and _PHASES[int(self._phase[0])] == "ENABLED" and not clutched
+        )
         if before != self._current[0]:
             self._enter()
         if self._current[0] == State.SETTING_ARMS_STATE:
-            self._set_arms(readiness, {self.arm, self.master} if before != self._current[0] else readiness.new)
+            self._set_arms(
+                readiness, {self.arm, self.master} if before != self._current[0] else readiness.new
+            )
         if followed != self._following[0]:
             self._say("following", BoolMessage(data=bool(self._following[0])))
-        self._lead_master(inputs, now_ns, floats=followed != self._following[0] and self._current[0] == State.ENABLED, clutched=clutched)
+        self._lead_master(
+            inputs,
+            now_ns,
+            floats=followed != self._following[0] and self._current[0] == State.ENABLED,
+            clutched=clutched,
+        )
 
     def _heed(self, inputs: Inputs) -> None:
         """Take what programs and the teleoperation say."""
@@ -99,13 +124,20 @@ class Component:
             if order.string in _COMMANDS:
                 self._want(_COMMANDS[order.string])
             else:
-                self.warn(f"there is no state_command '{order.string}'.{did_you_mean(order.string, _COMMANDS)}")
+                self.warn(
+                    f"there is no state_command '{order.string}'.{did_you_mean(order.string, _COMMANDS)}"
+                )
         for scale in cast("tuple[Float64Message, ...]", inputs.events(f"{self.name}/set_scale")):
             if 0.0 < scale.data <= 1.0:
                 self.set_scale(scale.data)
             else:
-                self.warn(f"scale {scale.data:g} is refused, allowed are over 0 to 1; it stays {self.scale[0]:g}")
-        for name, told, flag in (("rotation", "rotation_locked", self._rotation), ("translation", "translation_locked", self._translation)):
+                self.warn(
+                    f"scale {scale.data:g} is refused, allowed are over 0 to 1; it stays {self.scale[0]:g}"
+                )
+        for name, told, flag in (
+            ("rotation", "rotation_locked", self._rotation),
+            ("translation", "translation_locked", self._translation),
+        ):
             for wish in cast("tuple[BoolMessage, ...]", inputs.events(f"{self.name}/lock_{name}")):
                 flag[0] = wish.data
                 self._say(told, wish)
@@ -125,7 +157,9 @@ class Component:
     def _give_up(self, lost: Set[str]) -> None:
         """Somebody is not ready any more: as on the real system, nobody is led until it is asked for anew."""
         if self._current[0] >= State.ALIGNING_MTM:
-            self.warn(f"{' and '.join(sorted(lost))} not ENABLED and homed any more; send state_command enable")
+            self.warn(
+                f"{' and '.join(sorted(lost))} not ENABLED and homed any more; send state_command enable"
+            )
             self._want(State.DISABLED)
 
     def _next(self, readiness: Readiness, *, clutched: bool) -> State:
@@ -151,7 +185,9 @@ class Component:
     def _enter(self) -> None:
         """Say what the state is; begin it."""
         self._tell_state()
-        if self._current[0] == State.DISABLED or (self._current[0] == State.ALIGNING_MTM and not self._align[0]):
+        if self._current[0] == State.DISABLED or (
+            self._current[0] == State.ALIGNING_MTM and not self._align[0]
+        ):
             self._orders.hold()
         if self._current[0] == State.ALIGNING_MTM:
             self._aligned_ns[0] = -_ALIGN_NS
@@ -166,7 +202,12 @@ class Component:
         if aligns and now_ns - self._aligned_ns[0] >= _ALIGN_NS:
             self._aligned_ns[0] = now_ns
             self._orders.turn(master, tip[3:])
-            self._say("alignment_offset", QuaternionStamped(header=Header(stamp=Time.from_ns(now_ns)), quaternion=offset(master[3:], tip[3:])))
+            self._say(
+                "alignment_offset",
+                QuaternionStamped(
+                    header=Header(stamp=Time.from_ns(now_ns)), quaternion=offset(master[3:], tip[3:])
+                ),
+            )
 
     def warn(self, text: str) -> None:
         """Say what is not done."""

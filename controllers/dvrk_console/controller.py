@@ -1,7 +1,8 @@
 """The surgeon's console of a dVRK as a participant: who leads which arm, and when.
 
-Power, home, enable, select, scale, operator, clutch and camera mean what they mean on the real system (jhu-dvrk/sawIntuitiveResearchKit, console.cpp,
-system.cpp, and mtsIntuitiveResearchKitConsole.cpp of 2.2, UpdateTeleopState); docs/decisions/0032 says where the sources leave room.
+Power, home, enable, select, scale, operator, clutch and camera mean what they mean on the real system
+(jhu-dvrk/sawIntuitiveResearchKit, console.cpp, system.cpp, and mtsIntuitiveResearchKitConsole.cpp of 2.2,
+UpdateTeleopState); docs/decisions/0032 says where the sources leave room.
 """
 
 from __future__ import annotations
@@ -41,24 +42,37 @@ class Console(Stepped):
     def __init__(self, name: str, params: ConsoleParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._voice = Voice(port.name for port in self.ports if port.causality == "output" and port.variability == "event")
+        self._voice = Voice(
+            port.name for port in self.ports if port.causality == "output" and port.variability == "event"
+        )
         self._components = {name: Component(name, params, self._voice) for name in params.teleoperations}
         masters = sorted({component.master for component in self._components.values()})
         self._readiness = Readiness((*params.arms, *masters))
         self._memory = np.zeros(6)
-        self._enabled, self._operator, self._clutch, self._camera, self._leads_camera, self._introduced = np.split(self._memory, 6)
+        self._enabled, self._operator, self._clutch, self._camera, self._leads_camera, self._introduced = (
+            np.split(self._memory, 6)
+        )
         self._pressed = dict(zip(_BUTTONS, (self._operator, self._clutch, self._camera), strict=True))
         self._enabled[0], self._leads_camera[0] = params.enabled, -1.0
         for component in self._components.values():
             component.selected[0] = not self._rivals(component)
-        self._state = (self._memory, self._readiness.state, *(component.state for component in self._components.values()))
+        self._state = (
+            self._memory,
+            self._readiness.state,
+            *(component.state for component in self._components.values()),
+        )
         self._outputs = self._voice.outputs
         for name, component in self._components.items():
-            self._outputs |= {f"teleop/{name}/scale": component.scale, f"teleop/{name}/gripper": component.gripper}
+            self._outputs |= {
+                f"teleop/{name}/scale": component.scale,
+                f"teleop/{name}/gripper": component.gripper,
+            }
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The topics of `console`, `system`, `footpedals` and of each teleoperation component; `pedals/` in, `teleop/` to those who lead."""
+        """The topics of `console`, `system`, `footpedals` and of each teleoperation component; `pedals/` in,
+        `teleop/` to those who lead.
+        """
         return console_ports(self.params)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -77,7 +91,9 @@ class Console(Stepped):
         self._heed_pedals(inputs)
         self._lead_camera()
         for component in self._components.values():
-            component.step(t + h, inputs, self._wish(component), self._readiness, clutched=bool(self._clutch[0]))
+            component.step(
+                t + h, inputs, self._wish(component), self._readiness, clutched=bool(self._clutch[0])
+            )
         return self._outputs
 
     def _introduce(self) -> None:
@@ -125,9 +141,15 @@ class Console(Stepped):
             for joy in inputs.events(f"pedals/{pedal}"):
                 self._voice.say(f"footpedals/{pedal}", joy)
         for button, pedal in _BUTTONS.items():
-            for joy in cast("tuple[Joy, ...]", (*inputs.events(f"pedals/{pedal}"), *inputs.events(f"console/emulate_{button}"))):
+            for joy in cast(
+                "tuple[Joy, ...]",
+                (*inputs.events(f"pedals/{pedal}"), *inputs.events(f"console/emulate_{button}")),
+            ):
                 if not joy.buttons.size:
-                    self._warn(f"{button}: a Joy without a button is refused, expected buttons[0]: 0 released, 1 pressed, 2 a quick tap")
+                    self._warn(
+                        f"{button}: a Joy without a button is refused, expected buttons[0]: 0 released, 1"
+                        " pressed, 2 a quick tap"
+                    )
                     continue
                 if joy.buttons[0] != _TAP:
                     self._pressed[button][0] = joy.buttons[0] != 0
@@ -147,18 +169,24 @@ class Console(Stepped):
 
     def _rivals(self, component: Component) -> list[Component]:
         """Return those that are selected and have the same master or the same arm."""
-        others = (other for other in self._components.values() if other is not component and other.selected[0])
+        others = (
+            other for other in self._components.values() if other is not component and other.selected[0]
+        )
         return [other for other in others if other.master == component.master or other.arm == component.arm]
 
     def _select(self, name: str, *, wish: bool) -> None:
-        """Select a component, instead of another one of the same master; an arm that another master leads is not taken from it."""
+        """Select a component, instead of another one of the same master; an arm that another master leads is
+        not taken from it.
+        """
         component = self._components.get(name)
         if component is None:
             self._warn(f"there is no teleoperation '{name}'.{did_you_mean(name, self._components)}")
         elif not wish:
             component.selected[0] = 0.0
         elif taken := [other.name for other in self._rivals(component) if other.arm == component.arm]:
-            self._warn(f"'{name}' is not selected: {component.arm} is led in '{taken[0]}', unselect that first")
+            self._warn(
+                f"'{name}' is not selected: {component.arm} is led in '{taken[0]}', unselect that first"
+            )
         else:
             for other in self._rivals(component):
                 other.selected[0] = 0.0
@@ -167,7 +195,10 @@ class Console(Stepped):
 
     def _tell_selected(self) -> None:
         for name, component in self._components.items():
-            self._voice.say(f"console/teleop/{'selected' if component.selected[0] else 'unselected'}", StringMessage(data=name))
+            self._voice.say(
+                f"console/teleop/{'selected' if component.selected[0] else 'unselected'}",
+                StringMessage(data=name),
+            )
 
     def _lead_camera(self) -> None:
         """Tell who leads the endoscope whether it may; make the endoscope ready first."""

@@ -1,4 +1,5 @@
-"""What a master with motors is told: to turn as the tip does, to float while it leads, to keep its orientation while the clutch is pressed.
+"""What a master with motors is told: to turn as the tip does, to float while it leads, to keep its
+orientation while the clutch is pressed.
 
 As jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp (RunAligningMTM, EnterEnabled, Clutch) does.
 """
@@ -33,7 +34,9 @@ class Master:
         self._voice.say(f"{self._name}/hold", EmptyMessage())
 
     def turn(self, where: Vector, orientation: Vector) -> None:
-        """Stay at the pose `where` but turn to `orientation` (x, y, z, w), which is the tip's in the camera's frame."""
+        """Stay at the pose `where` but turn to `orientation` (x, y, z, w), which is the tip's in the camera's
+        frame.
+        """
         position = Point(**dict(zip("xyz", where[:3].tolist(), strict=True)))
         pose = Pose(position=position, orientation=_quaternion(orientation))
         self._voice.say(f"{self._name}/move_cp", PoseStamped(pose=pose))
@@ -50,11 +53,17 @@ class Master:
 
 def opening(angle: float) -> float:
     """Return the opening 0 .. 1 of a gripper at `angle` (rad); negative if there is none."""
-    return -1.0 if angle <= NO_GRIPPER else min(max((angle - _GRIPPER_ZERO) / (_GRIPPER_MAX - _GRIPPER_ZERO), 0.0), 1.0)
+    return (
+        -1.0
+        if angle <= NO_GRIPPER
+        else min(max((angle - _GRIPPER_ZERO) / (_GRIPPER_MAX - _GRIPPER_ZERO), 0.0), 1.0)
+    )
 
 
 def offset(master: Vector, tip: Vector) -> Quaternion:
-    """Return how the tip is turned as the master sees it; both quaternions (x, y, z, w) in frames whose axes stand for each other."""
+    """Return how the tip is turned as the master sees it; both quaternions (x, y, z, w) in frames whose axes
+    stand for each other.
+    """
     return _quaternion(rotation.product(rotation.conjugate(master), tip))
 
 

@@ -18,13 +18,30 @@ ComponentName = Annotated[str, Field(pattern=r"^MTM[LR]_PSM[123]$")]
 class ConsoleParams(Params):
     """Which arms there are, and which master may lead which of them."""
 
-    arms: tuple[CartArm, ...] = Field(min_length=1, description="simulated arms that `system/power_on`, `power_off` and `home` are for")
-    teleoperations: tuple[ComponentName, ...] = Field(
-        default=(), description="a master and the arm that it leads, such as MTMR_PSM1; of those that share a master or an arm the first is selected at time 0"
+    arms: tuple[CartArm, ...] = Field(
+        min_length=1, description="simulated arms that `system/power_on`, `power_off` and `home` are for"
     )
-    scale: float = Field(default=0.2, gt=0.0, le=1.0, description="metres of the tip per metre of the master at time 0")
-    enabled: bool = Field(default=False, description="whether teleoperation is enabled at time 0; on the real system nobody is led until somebody asks for it")
-    align_mtm: bool = Field(default=True, description="masters are turned by their motors as the tips are before they lead; false for styluses")
+    teleoperations: tuple[ComponentName, ...] = Field(
+        default=(),
+        description=(
+            "a master and the arm that it leads, such as MTMR_PSM1; of those that share a master or an arm"
+            " the first is selected at time 0"
+        ),
+    )
+    scale: float = Field(
+        default=0.2, gt=0.0, le=1.0, description="metres of the tip per metre of the master at time 0"
+    )
+    enabled: bool = Field(
+        default=False,
+        description=(
+            "whether teleoperation is enabled at time 0; on the real system nobody is led until somebody asks"
+            " for it"
+        ),
+    )
+    align_mtm: bool = Field(
+        default=True,
+        description="masters are turned by their motors as the tips are before they lead; false for styluses",
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -1,4 +1,6 @@
-"""The ports of the console: named as the topics of a dVRK; `pedals/` from what is pressed, `teleop/` to and from those who lead."""
+"""The ports of the console: named as the topics of a dVRK; `pedals/` from what is pressed, `teleop/` to and
+from those who lead.
+"""
 
 from __future__ import annotations
 
@@ -34,25 +36,46 @@ _MASTER_TOLD = {
 def console_ports(params: ConsoleParams) -> tuple[Port, ...]:
     """Return the ports of a console as `params` say."""
     masters, led = (sorted({name.split("_")[i] for name in params.teleoperations}) for i in (0, 1))
-    heard = _named("console", CONSOLE.heard) | {f"system/{name}": SYSTEM.heard[name] for name in _SYSTEM_HEARD} | _named("pedals", PEDALS.told)
+    heard = (
+        _named("console", CONSOLE.heard)
+        | {f"system/{name}": SYSTEM.heard[name] for name in _SYSTEM_HEARD}
+        | _named("pedals", PEDALS.told)
+    )
     told = _named("console", CONSOLE.told) | _named("system", SYSTEM.told) | _named("footpedals", PEDALS.told)
     return (
         *_events("input", heard | {f"{arm}/operating_state": _OPERATING_STATE for arm in params.arms}),
         *_events("output", told | {f"{arm}/state_command": _STATE_COMMAND for arm in params.arms}),
-        Port(name="teleop/ECM/buttons", causality="output", type=BUTTON, variability="event", description="button 0: the camera pedal leads the endoscope"),
+        Port(
+            name="teleop/ECM/buttons",
+            causality="output",
+            type=BUTTON,
+            variability="event",
+            description="button 0: the camera pedal leads the endoscope",
+        ),
         *(port for master in masters for port in _master(master)),
-        *(_pose(f"{arm}/setpoint_cp", "of the tip, in the camera's frame: masters are turned like it") for arm in led),
+        *(
+            _pose(f"{arm}/setpoint_cp", "of the tip, in the camera's frame: masters are turned like it")
+            for arm in led
+        ),
         *(port for name in params.teleoperations for port in _teleoperation(name, params)),
     )
 
 
 def _events(causality: str, types: Mapping[str, str]) -> Iterator[Port]:
     for name, type_ in types.items():
-        yield Port.model_validate({"name": name, "causality": causality, "type": type_, "variability": "event"})
+        yield Port.model_validate(
+            {"name": name, "causality": causality, "type": type_, "variability": "event"}
+        )
 
 
 def _pose(name: str, meaning: str) -> Port:
-    return Port(name=name, causality="input", type=_POSE, start=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), description=meaning)
+    return Port(
+        name=name,
+        causality="input",
+        type=_POSE,
+        start=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+        description=meaning,
+    )
 
 
 def _named(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
@@ -60,12 +83,23 @@ def _named(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
 
 
 def _master(master: str) -> Iterable[Port]:
-    gripper, opening = f"{master}/gripper/measured_js", "opening of the gripper, as the motors' encoders tell it"
+    gripper, opening = (
+        f"{master}/gripper/measured_js",
+        "opening of the gripper, as the motors' encoders tell it",
+    )
     fields = ("position", "velocity", "effort")
     return (
         *_events("input", {f"{master}/operating_state": _OPERATING_STATE}),
         _pose(f"{master}/measured_cp", "of the master, in the display's frame"),
-        Port(name=gripper, causality="input", type=_JOINT_STATE, names=("gripper",), fields=fields, start=(NO_GRIPPER, 0.0, 0.0), description=opening),
+        Port(
+            name=gripper,
+            causality="input",
+            type=_JOINT_STATE,
+            names=("gripper",),
+            fields=fields,
+            start=(NO_GRIPPER, 0.0, 0.0),
+            description=opening,
+        ),
         *_events("output", _named(master, _MASTER_TOLD)),
     )
 
@@ -73,9 +107,22 @@ def _master(master: str) -> Iterable[Port]:
 def _teleoperation(name: str, params: ConsoleParams) -> Iterable[Port]:
     leads, tells = f"teleop/{name}", "to the `teleoperation`"
     return (
-        *_events("input", _named(name, TELEOPERATION.heard) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING}),
+        *_events(
+            "input",
+            _named(name, TELEOPERATION.heard) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING},
+        ),
         *_events("output", _named(name, TELEOPERATION.told)),
-        *_events("output", {f"{leads}/buttons": BUTTON, f"{leads}/lock_rotation": _BOOL, f"{leads}/lock_translation": _BOOL}),
-        Port(name=f"{leads}/scale", causality="output", type=_FLOAT, start=(params.scale,), description=tells),
-        Port(name=f"{leads}/gripper", causality="output", type=_FLOAT, description=f"{tells}: 0 closed .. 1 open, negative: none"),
+        *_events(
+            "output",
+            {f"{leads}/buttons": BUTTON, f"{leads}/lock_rotation": _BOOL, f"{leads}/lock_translation": _BOOL},
+        ),
+        Port(
+            name=f"{leads}/scale", causality="output", type=_FLOAT, start=(params.scale,), description=tells
+        ),
+        Port(
+            name=f"{leads}/gripper",
+            causality="output",
+            type=_FLOAT,
+            description=f"{tells}: 0 closed .. 1 open, negative: none",
+        ),
     )

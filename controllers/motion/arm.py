@@ -47,8 +47,12 @@ _BARE = 2.0
 class Arm:
     """One arm. All that changes is in the arrays of `state`."""
 
-    def __init__(self, name: CartArm, params: MotionParams, camera: Callable[[], Vector | None], period: float) -> None:
-        """Take the arm's name, what the scenario says, what returns the ECM's tip in the world, shape (4, 4), and the step (s)."""
+    def __init__(
+        self, name: CartArm, params: MotionParams, camera: Callable[[], Vector | None], period: float
+    ) -> None:
+        """Take the arm's name, what the scenario says, what returns the ECM's tip in the world, shape (4, 4),
+        and the step (s).
+        """
         arm = params.arms.driven[name]
         self._name, self._period = name, period
         held = arm.equipment
@@ -60,19 +64,41 @@ class Arm:
         self._weight = KnownWeight(name, arm.chain, base_in_world(name, params))
         self._commands = Commands(self._drives, period)
         self._cartesian = CartesianCommands(name, self._drives, self._base, self._commands.ratio, period)
-        self._lifecycle = Lifecycle(self._drives, self._messages, np.array(arm.home), params.power_time * 1e-9, homed=params.initial_state == "homed")
+        self._lifecycle = Lifecycle(
+            self._drives,
+            self._messages,
+            np.array(arm.home),
+            params.power_time * 1e-9,
+            homed=params.initial_state == "homed",
+        )
         heeding = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
         self._state_port = f"{name}/state_command"
         commands = (*COMMANDS, *self._equipment.handlers)
-        self._ports = [(command, f"{name}/{command}", heeding[command]) for command in commands if command != "state_command"]
+        self._ports = [
+            (command, f"{name}/{command}", heeding[command])
+            for command in commands
+            if command != "state_command"
+        ]
         self._prefixes = [name]
         if (gripper := arm.gripper) is not None:
             self._prefixes.append(f"{name}/{gripper.name}")
-            grasping = [(f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS]
+            grasping = [
+                (f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS
+            ]
             self._ports += [(command, f"{name}/{command}", heed) for command, heed in grasping]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
-        self.state = (self._started, *self._commands.state, *self._base.state, *self._lifecycle.arrays, self._messages.state, *self._drives.state)
-        self._sensed = [(f"sense/{prefix}/measured_js", axes) for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)]
+        self.state = (
+            self._started,
+            *self._commands.state,
+            *self._base.state,
+            *self._lifecycle.arrays,
+            self._messages.state,
+            *self._drives.state,
+        )
+        self._sensed = [
+            (f"sense/{prefix}/measured_js", axes)
+            for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)
+        ]
         self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
         self.events = self._messages.outputs
         """Event outputs of the last step."""
@@ -80,12 +106,22 @@ class Arm:
     @property
     def outputs(self) -> dict[str, Any]:
         """All outputs; the arrays stay the same ones."""
-        outputs: dict[str, Any] = {**self.events, **self._telemetry.outputs, f"drive/{self._name}/control_mode": self._modes}
+        outputs: dict[str, Any] = {
+            **self.events,
+            **self._telemetry.outputs,
+            f"drive/{self._name}/control_mode": self._modes,
+        }
         for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True):
-            outputs |= {f"drive/{prefix}/servo_jp": axes.setpoint.position, f"drive/{prefix}/servo_jf": axes.effort}
+            outputs |= {
+                f"drive/{prefix}/servo_jp": axes.setpoint.position,
+                f"drive/{prefix}/servo_jf": axes.effort,
+            }
         if self._drives.gripper is not None:
             prefix = self._prefixes[1]
-            outputs |= {f"{prefix}/measured_js": self._drives.gripper.measured, f"{prefix}/setpoint_js": self._gripper_setpoint}
+            outputs |= {
+                f"{prefix}/measured_js": self._drives.gripper.measured,
+                f"{prefix}/setpoint_js": self._gripper_setpoint,
+            }
         return outputs
 
     @property
@@ -121,7 +157,9 @@ class Arm:
         """Bring the states that are not published at every step up to date."""
         drives, commands = self._drives, self._commands
         joints = drives.joints
-        self._telemetry.update(joints.measured, joints.commanded, self._base.pose, absolute=bool(drives.absolute[0]))
+        self._telemetry.update(
+            joints.measured, joints.commanded, self._base.pose, absolute=bool(drives.absolute[0])
+        )
         bears = joints.mode is not Mode.OFF and bool(commands.gravity_compensation[0])
         self._telemetry.tell_settings(commands.ratio, bears * self._weight.effort(joints.position))
         if drives.gripper is not None:
@@ -142,7 +180,9 @@ class Arm:
         return self._lifecycle.state, self._lifecycle.is_homed, self._lifecycle.is_busy
 
     def _heed(self, inputs: Inputs) -> bool:
-        """Carry out what has arrived; return whether there was a command after which clients wait for the operating state."""
+        """Carry out what has arrived; return whether there was a command after which clients wait for the
+        operating state.
+        """
         if inputs.quiet:  # nearly always, and an arm has 35 ports
             return False
         awaited = False
@@ -163,7 +203,8 @@ class Arm:
         except MotionError as error:
             self._messages.refuse(command, str(error), ready=True)
             if "move_" in command and not self._drives.is_moving:
-                self._messages.goal_reached(reached=False)  # as the real controller does; a move under way goes on
+                # as the real controller does; a move under way goes on
+                self._messages.goal_reached(reached=False)
             return
         self._messages.heeded(command)
         if command in CARTESIAN_COMMANDS:
@@ -173,4 +214,6 @@ class Arm:
         """Return why the arm does not take `command` now; empty if it does."""
         if command in _ANY_TIME:
             return ""
-        return self._lifecycle.not_ready() or (self._cartesian.not_ready() if command in CARTESIAN_COMMANDS else "")
+        return self._lifecycle.not_ready() or (
+            self._cartesian.not_ready() if command in CARTESIAN_COMMANDS else ""
+        )

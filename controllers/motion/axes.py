@@ -1,4 +1,6 @@
-"""Joints that are driven together, an arm's or its gripper's: what is measured of them, and what their drives are told."""
+"""Joints that are driven together, an arm's or its gripper's: what is measured of them, and what their drives
+are told.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,10 @@ class Mode(IntEnum):
 
 
 class Axes:
-    """n joints with their setpoint. While the drives do not hold a position, the setpoint is where the joints are."""
+    """n joints with their setpoint.
+
+    While the drives do not hold a position, the setpoint is where the joints are.
+    """
 
     def __init__(self, chain: SerialChain, start: Vector) -> None:
         """Take the joints, and their positions at time 0, shape (n,)."""
@@ -54,12 +59,16 @@ class Axes:
 
     @property
     def newest_goal(self) -> Vector:
-        """What relative commands start from, shape (n,): the goal that is followed or moved to, else the setpoint."""
+        """What relative commands start from, shape (n,): the goal that is followed or moved to, else the
+        setpoint.
+        """
         under_way = self.setpoint.activity is Activity.FOLLOW or self.setpoint.is_moving
         return self.setpoint.goal if under_way else self.setpoint.position
 
     def finished(self) -> bool:
-        """Say, once, that the move has arrived: a step later, so that even a move to where the joints are takes a step."""
+        """Say, once, that the move has arrived: a step later, so that even a move to where the joints are
+        takes a step.
+        """
         arrived = self.is_moving and not self.setpoint.is_moving
         if arrived:
             self._moving[0] = 0.0
@@ -78,7 +87,9 @@ class Axes:
         self.setpoint.drift(velocity)
 
     def move(self, goal: Vector, ratio: Vector) -> None:
-        """Move to `goal`, shape (n,), inside the ranges, at the shares `ratio`, shape (2,), of velocity and acceleration."""
+        """Move to `goal`, shape (n,), inside the ranges, at the shares `ratio`, shape (2,), of velocity and
+        acceleration.
+        """
         self._hold_position()
         self._moving[0] = 1.0
         self.setpoint.move(goal, ratio)

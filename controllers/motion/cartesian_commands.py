@@ -25,14 +25,18 @@ from schemas.vectors import Vector
 __all__ = ["CartesianCommands"]
 
 _SINGULAR = 1e-6
-"""Singular values of the Jacobian below this share of the largest move no joint, as for the wrench that is told (`telemetry`)."""
+"""Singular values of the Jacobian below this share of the largest move no joint, as for the wrench that is
+told (`telemetry`).
+"""
 
 
 class CartesianCommands:
     """What carries out the Cartesian commands of one arm, by their names, in `handlers`."""
 
     def __init__(self, arm: CartArm, drives: Drives, base: BaseFrame, ratio: Vector, period: float) -> None:
-        """Take the arm, its drives, its base frame, the shares that moves use (shape (2,), read as it is then), and the controller's step (s)."""
+        """Take the arm, its drives, its base frame, the shares that moves use (shape (2,), read as it is
+        then), and the controller's step (s).
+        """
         self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
         self._joints, self._chain = drives.joints, drives.joints.chain
         self._cannula = Cannula.of(self._chain)
@@ -72,13 +76,22 @@ class CartesianCommands:
         self._drives.follow(self._joints, self._inverse(goal), self._period)
 
     def _servo_cs(self, message: CartesianState) -> None:
-        posed, moved, pushed = message.pose_is_valid.data, message.twist_is_valid.data, message.wrench_is_valid.data
+        posed, moved, pushed = (
+            message.pose_is_valid.data,
+            message.twist_is_valid.data,
+            message.wrench_is_valid.data,
+        )
         frame = self._from(message.header.frame_id)
         if pushed and (posed or moved):
-            raise MotionError("a wrench beside a pose or a twist, allowed is one or the other: the drives apply efforts or hold positions")
+            raise MotionError(
+                "a wrench beside a pose or a twist, allowed is one or the other: the drives apply efforts or"
+                " hold positions"
+            )
         velocity = self._joint_velocity(turned(frame[:3, :3], goals.twist(message.twist))) if moved else None
         if posed:
-            self._drives.follow(self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity)
+            self._drives.follow(
+                self._joints, self._inverse(frame @ goals.frame(message.pose)), self._period, velocity
+            )
         elif velocity is not None:
             self._drives.drift(velocity)
         else:
@@ -90,7 +103,9 @@ class CartesianCommands:
         self._drives.resist(message)
 
     def _body_servo_cf(self, message: WrenchStamped) -> None:
-        goals.check_frame(message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip")
+        goals.check_frame(
+            message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip"
+        )
         self._drives.press(goals.wrench(message.wrench), WrenchFrame.BODY)
 
     def _spatial_servo_cf(self, message: WrenchStamped) -> None:
@@ -106,18 +121,24 @@ class CartesianCommands:
         return self._inverse(frame @ goals.frame(message.pose))
 
     def _from(self, frame_id: str) -> Vector:
-        """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4); by default the reference."""
+        """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4); by default
+        the reference.
+        """
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
         return np.eye(4) if named == self._base.local else inverse_pose(self._base.pose)
 
     def _inverse(self, tip: Vector) -> Vector:
-        """Return the joint positions, shape (n,), nearest to the setpoint, of a pose in the arm's base frame, shape (4, 4)."""
+        """Return the joint positions, shape (n,), nearest to the setpoint, of a pose in the arm's base frame,
+        shape (4, 4).
+        """
         goal = inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
         self._cannula.check(goal, self._joints.position)
         return goal
 
     def _joint_velocity(self, twist: Vector) -> Vector:
-        """Return the joint velocities, shape (n,), of a twist of the tip in the base frame: slower as a whole where a joint is at its limit."""
+        """Return the joint velocities, shape (n,), of a twist of the tip in the base frame: slower as a whole
+        where a joint is at its limit.
+        """
         jacobian = self._chain.jacobian(self._chain.frames(self._joints.setpoint.position))
         velocity = np.linalg.pinv(jacobian, rcond=_SINGULAR) @ twist
         return velocity / max(1.0, float((np.abs(velocity) / self._chain.velocity).max()))

@@ -20,7 +20,9 @@ __all__ = ["Commands"]
 
 
 class Commands:
-    """What carries out the commands of one arm, by their names, in `handlers`; those of its jaw or hand by `gripper/...`."""
+    """What carries out the commands of one arm, by their names, in `handlers`; those of its jaw or hand by
+    `gripper/...`.
+    """
 
     def __init__(self, drives: Drives, period: float) -> None:
         """Take the arm's drives and the controller's step (s)."""
@@ -67,7 +69,10 @@ class Commands:
         self._drives.apply(self._joints, np.zeros(len(self._chain.joints)))
 
     def _servo_jp(self, message: JointState) -> None:
-        goal, velocity = goals.joint_values(self._chain, message, "position"), goals.stated_velocity(self._chain, message)
+        goal, velocity = (
+            goals.joint_values(self._chain, message, "position"),
+            goals.stated_velocity(self._chain, message),
+        )
         self._drives.follow(self._joints, goal, self._period, velocity)
 
     def _servo_jr(self, message: JointState) -> None:

@@ -21,7 +21,9 @@ __all__ = ["MotionController"]
 
 
 class MotionController(Stepped):
-    """Takes CRTK's commands for each arm, and tells the drives where to be: `motion.drive/* -> robot.*`, `robot.* -> motion.sense/*`."""
+    """Takes CRTK's commands for each arm, and tells the drives where to be: `motion.drive/* -> robot.*`,
+    `robot.* -> motion.sense/*`.
+    """
 
     params_model: ClassVar[type[Params]] = MotionParams
     params: MotionParams
@@ -36,14 +38,23 @@ class MotionController(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Per arm: CRTK's commands in, its states and events out; `drive/<arm>/...` and `sense/<arm>/...` towards the robot.
+        """Per arm: CRTK's commands in, its states and events out; `drive/<arm>/...` and `sense/<arm>/...`
+        towards the robot.
 
         On the cart also `SUJ/<arm>/...`, the setup joints that carry it.
         """
         params, period = self.params, self.params.publish_period
-        ports = [port for name, arm in params.arms.driven.items() for port in arm_ports(name, arm, reference_frame(name, params), period)]
+        ports = [
+            port
+            for name, arm in params.arms.driven.items()
+            for port in arm_ports(name, arm, reference_frame(name, params), period)
+        ]
         if params.mounting == "cart":
-            ports += [port for name in params.arms.driven for port in setup_joint_ports(name, joint_names(name), CART_FRAME, period)]
+            ports += [
+                port
+                for name in params.arms.driven
+                for port in setup_joint_ports(name, joint_names(name), CART_FRAME, period)
+            ]
         return tuple(ports)
 
     def configure(self, setup: Setup) -> Outputs:

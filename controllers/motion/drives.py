@@ -1,4 +1,6 @@
-"""Arm and gripper (jaw or hand) together: what is done with them, and telling when a move has ended or was given up."""
+"""Arm and gripper (jaw or hand) together: what is done with them, and telling when a move has ended or was
+given up.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ __all__ = ["Drives", "WrenchFrame"]
 class WrenchFrame(IntEnum):
     """How a commanded wrench is meant.
 
-    At the tip along the tip's axes (or the reference's, see `Drives.absolute`), at the base frame's origin along the base frame's,
-    at the tip along the reference's, or as the impedance has it.
+    At the tip along the tip's axes (or the reference's, see `Drives.absolute`), at the base frame's origin
+    along the base frame's, at the tip along the reference's, or as the impedance has it.
     """
 
     NONE = 0
@@ -38,18 +40,28 @@ class Drives:
     """The joints of an arm, and its gripper if it has one."""
 
     def __init__(self, arm: PsmParams | EcmParams, messages: Messages, base: Callable[[], Vector]) -> None:
-        """Take the arm's parameters, where to tell what ends, and what returns the base frame in the reference, shape (4, 4)."""
+        """Take the arm's parameters, where to tell what ends, and what returns the base frame in the
+        reference, shape (4, 4).
+        """
         self._messages, self._base = messages, base
         self.joints = Axes(arm.chain, np.array(arm.start))
         gripper = arm.gripper
-        self.gripper = None if gripper is None else Axes(SerialChain(gripper.joints, np.eye(4)), np.array(gripper.start))
+        self.gripper = (
+            None if gripper is None else Axes(SerialChain(gripper.joints, np.eye(4)), np.array(gripper.start))
+        )
         self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
         """All that is driven: the arm's joints, then the gripper."""
         self._control = np.zeros(9)
         self._wrench, self._frame, self.absolute, self.cartesian = np.split(self._control, [6, 7, 8])
-        """`absolute`: 1 where body wrenches are along the axes of the reference; `cartesian`: 1 while the arm is under Cartesian control."""
+        """`absolute`: 1 where body wrenches are along the axes of the reference; `cartesian`: 1 while the arm
+        is under Cartesian control.
+        """
         self._impedance = Impedance()
-        self.state = (self._control, self._impedance.state, *(array for axes in self.groups for array in axes.state))
+        self.state = (
+            self._control,
+            self._impedance.state,
+            *(array for axes in self.groups for array in axes.state),
+        )
 
     @property
     def is_moving(self) -> bool:
@@ -77,7 +89,8 @@ class Drives:
                 axes.hold()
 
     def follow(self, axes: Axes, goal: Vector, h: float, velocity: Vector | None = None) -> None:
-        """Let `axes` follow `goal`, shape (n,), with the velocity that the sender states, if any; `h` is the step (s).
+        """Let `axes` follow `goal`, shape (n,), with the velocity that the sender states, if any; `h` is the
+        step (s).
 
         Raises MotionError if it is out of range.
         """
@@ -91,7 +104,8 @@ class Drives:
         self.joints.drift(velocity)
 
     def move(self, axes: Axes, goal: Vector, ratio: Vector) -> None:
-        """Let `axes` move to `goal`, shape (n,), at the shares `ratio`, shape (2,), of velocity and acceleration.
+        """Let `axes` move to `goal`, shape (n,), at the shares `ratio`, shape (2,), of velocity and
+        acceleration.
 
         Raises MotionError if it is out of range.
         """
@@ -149,7 +163,9 @@ class Drives:
         chain = self.joints.chain
         frames = chain.frames(self.joints.position)
         frame = self._frame[0]
-        if frame in (WrenchFrame.REFERENCE, WrenchFrame.IMPEDANCE) or (frame == WrenchFrame.BODY and self.absolute[0]):
+        if frame in (WrenchFrame.REFERENCE, WrenchFrame.IMPEDANCE) or (
+            frame == WrenchFrame.BODY and self.absolute[0]
+        ):
             jacobian = chain.jacobian(frames)
             wrench = self._in_base(frames[-1], jacobian)
         else:
@@ -159,9 +175,13 @@ class Drives:
         self.joints.apply(np.clip(jacobian.T @ wrench, -chain.effort, chain.effort))
 
     def _in_base(self, tip: Vector, jacobian: Vector) -> Vector:
-        """Return the wrench at the tip, shape (6,), from the axes of the reference in those of the base frame."""
+        """Return the wrench at the tip, shape (6,), from the axes of the reference in those of the base
+        frame.
+        """
         base, n = self._base(), len(self.joints.chain.joints)
         wrench = self._wrench
         if self._frame[0] == WrenchFrame.IMPEDANCE:
-            wrench = self._impedance.wrench(base @ tip, turned(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n]))
+            wrench = self._impedance.wrench(
+                base @ tip, turned(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n])
+            )
         return turned(base[:3, :3].T, wrench)

@@ -1,7 +1,8 @@
 """Poses as (4, 4) matrices and as ROS has them, and the frames in which the world outside speaks of an arm.
 
-On the real system (jhu-dvrk/sawIntuitiveResearchKit) a PSM is seen from the camera: its base frame there is inv(cart -> camera)
-(cart -> RCM), both through the setup joints. The ECM is seen from the cart. Without setup joints a client says where an arm stands.
+On the real system (jhu-dvrk/sawIntuitiveResearchKit) a PSM is seen from the camera: its base frame there is
+inv(cart -> camera) (cart -> RCM), both through the setup joints. The ECM is seen from the cart. Without setup
+joints a client says where an arm stands.
 """
 
 from __future__ import annotations
@@ -18,7 +19,16 @@ from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["CAMERA_FRAME", "CART_FRAME", "BaseFrame", "base_in_world", "pose", "reference_frame", "setup_positions", "turned"]
+__all__ = [
+    "CAMERA_FRAME",
+    "CART_FRAME",
+    "BaseFrame",
+    "base_in_world",
+    "pose",
+    "reference_frame",
+    "setup_positions",
+    "turned",
+]
 
 CAMERA_FRAME, CART_FRAME, _WORLD_FRAME = "ECM", "Cart", "world"
 """The first two as the da Vinci's own interface and the dVRK call them in `header.frame_id`."""
@@ -30,7 +40,9 @@ def pose(frame: Vector) -> Vector:
 
 
 def turned(rotation_matrix: Vector, vector: Vector) -> Vector:
-    """Return a twist or wrench, shape (6,), with the axes of its two parts turned by a matrix of shape (3, 3)."""
+    """Return a twist or wrench, shape (6,), with the axes of its two parts turned by a matrix of shape (3,
+    3).
+    """
     return np.concatenate([rotation_matrix @ vector[:3], rotation_matrix @ vector[3:]])
 
 
@@ -63,7 +75,9 @@ class BaseFrame:
     """The base frame of one arm in the frame that its Cartesian ports speak of."""
 
     def __init__(self, arm: CartArm, params: MotionParams, camera: Callable[[], Vector | None]) -> None:
-        """Take the arm, what the scenario says, and what returns the pose of the ECM's tip in the world, shape (4, 4)."""
+        """Take the arm, what the scenario says, and what returns the pose of the ECM's tip in the world,
+        shape (4, 4).
+        """
         self.reference, self.local = reference_frame(arm, params), f"{arm}_base"
         """`frame_id` of ports that are not `local/`, and of those that are."""
         self._camera, self._carried = camera, params.mounting == "cart"
@@ -79,7 +93,9 @@ class BaseFrame:
         return self._world if camera is None else inverse_pose(camera) @ self._world
 
     def place(self, base: Vector) -> None:
-        """Let the arm's base frame stand at `base`, shape (4, 4), in the world; the arm itself stays where it is."""
+        """Let the arm's base frame stand at `base`, shape (4, 4), in the world; the arm itself stays where it
+        is.
+        """
         self._world[:] = base
 
     def check_free(self) -> None:
@@ -87,4 +103,7 @@ class BaseFrame:
         if self._carried:
             raise MotionError("the setup joints say where the arm stands (`setup_joints` of the scenario)")
         if self.reference != _WORLD_FRAME:
-            raise MotionError(f"poses of the arm are in frame '{self.reference}'; `reference: world` of the motion controller leaves its base frame to clients")
+            raise MotionError(
+                f"poses of the arm are in frame '{self.reference}'; `reference: world` of the motion"
+                " controller leaves its base frame to clients"
+            )

@@ -1,4 +1,7 @@
-"""From CRTK's messages to goals of an arm. Whatever is wrong with a message raises MotionError, which says what is allowed."""
+"""From CRTK's messages to goals of an arm.
+
+Whatever is wrong with a message raises MotionError, which says what is allowed.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +16,33 @@ from schemas.errors import MotionError
 from schemas.ros import JointState, Point, Pose, Quaternion, Twist, Vector3, Wrench
 from schemas.vectors import Vector
 
-__all__ = ["check_frame", "efforts", "frame", "joint_values", "rotation_matrix", "stated_velocity", "twist", "vector", "wrench"]
+__all__ = [
+    "check_frame",
+    "efforts",
+    "frame",
+    "joint_values",
+    "rotation_matrix",
+    "stated_velocity",
+    "twist",
+    "vector",
+    "wrench",
+]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
 _MOST = 1e9
-"""In SI units. No force, velocity, gain or place is meant to be larger, and what is computed of such numbers stays finite."""
+"""In SI units.
+
+No force, velocity, gain or place is meant to be larger, and what is computed of such numbers stays finite.
+"""
 
 
-def joint_values(chain: SerialChain, message: JointState, part: Literal["position", "velocity", "effort"]) -> Vector:
-    """Return positions, velocities or efforts, shape (n,), in the order of the chain; a message that names its joints may have them in any."""
+def joint_values(
+    chain: SerialChain, message: JointState, part: Literal["position", "velocity", "effort"]
+) -> Vector:
+    """Return positions, velocities or efforts, shape (n,), in the order of the chain; a message that names
+    its joints may have them in any.
+    """
     names = [joint.name for joint in chain.joints]
     values: Vector = getattr(message, part)
     if values.shape != (len(names),):
@@ -36,7 +56,9 @@ def joint_values(chain: SerialChain, message: JointState, part: Literal["positio
 
 
 def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
-    """Return the velocities, shape (n,), with which a goal is to be passed; None where none are stated, or zeros alone."""
+    """Return the velocities, shape (n,), with which a goal is to be passed; None where none are stated, or
+    zeros alone.
+    """
     return joint_values(chain, message, "velocity") if message.velocity.any() else None
 
 
@@ -44,7 +66,8 @@ def efforts(chain: SerialChain, message: JointState) -> Vector:
     """Return the efforts, shape (n,), none over what its drive can do."""
     values = joint_values(chain, message, "effort")
     wrong = [
-        f"joint {joint.name} at {value:.6g} {'N m' if joint.kind == 'revolute' else 'N'}, allowed are {-joint.effort:g} .. {joint.effort:g}"
+        f"joint {joint.name} at {value:.6g} {'N m' if joint.kind == 'revolute' else 'N'}, allowed are"
+        f" {-joint.effort:g} .. {joint.effort:g}"
         for joint, value in zip(chain.joints, values.tolist(), strict=True)
         if abs(value) > joint.effort
     ]
@@ -73,7 +96,9 @@ def rotation_matrix(q: Quaternion) -> Vector:
     _check_finite(quaternion, "orientation")
     norm = hypot(*quaternion.tolist())
     if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
-        raise MotionError(f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}")
+        raise MotionError(
+            f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}"
+        )
     return rotation.matrix(quaternion / norm)
 
 

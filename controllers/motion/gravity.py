@@ -1,4 +1,7 @@
-"""The weight that the real controller bears: the endoscope's. All else of an arm is balanced by springs and weights (docs/decisions/0010)."""
+"""The weight that the real controller bears: the endoscope's.
+
+All else of an arm is balanced by springs and weights (docs/decisions/0010).
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,10 @@
-"""Cartesian impedance: springs and dampers between the tip and a goal, with gains of their own on either side of it.
+"""Cartesian impedance: springs and dampers between the tip and a goal, with gains of their own on either side
+of it.
 
-The law is that of the real controller (jhu-saw/sawControllers, osaCartesianImpedanceController.cpp). With e the tip's displacement along
-the axes of an orientation, v its velocity along them, and the gains of the side where it is: f = p e' + d v + bias, e' being e less the
-deadband. For the torque e is the rotation vector from the goal's orientation, along whose axes it is.
+The law is that of the real controller (jhu-saw/sawControllers, osaCartesianImpedanceController.cpp). With e
+the tip's displacement along the axes of an orientation, v its velocity along them, and the gains of the side
+where it is: f = p e' + d v + bias, e' being e less the deadband. For the torque e is the rotation vector from
+the goal's orientation, along whose axes it is.
 """
 
 from __future__ import annotations
@@ -29,16 +31,30 @@ class Impedance:
         """p, d, bias and deadband; on the positive and on the negative side; of force and torque; x, y, z."""
 
     def set(self, message: CartesianImpedance) -> None:
-        """Take another goal. Raises MotionError, and keeps the old one, if a number is not finite or a quaternion is none."""
-        axes = goals.rotation_matrix(message.force_orientation), goals.rotation_matrix(message.torque_orientation)
+        """Take another goal.
+
+        Raises MotionError, and keeps the old one, if a number is not finite or a quaternion is none.
+        """
+        axes = (
+            goals.rotation_matrix(message.force_orientation),
+            goals.rotation_matrix(message.torque_orientation),
+        )
         position = goals.vector(message.force_position, "force_position")
-        sides = (message.position_positive, message.orientation_positive), (message.position_negative, message.orientation_negative)
+        sides = (
+            (message.position_positive, message.orientation_positive),
+            (
+                message.position_negative,
+                message.orientation_negative,
+            ),
+        )
         gains = np.array([[_gains(half) for half in side] for side in sides])  # (2, 2, 4, 3)
         self._force_axes[:], self._torque_axes[:] = axes
         self._position[:], self._gains[:] = position, gains.transpose(2, 0, 1, 3)
 
     def wrench(self, tip: Vector, twist: Vector) -> Vector:
-        """Return the wrench on the tip, shape (6,), of its pose, shape (4, 4), and twist, shape (6,), all in the frame of the goal."""
+        """Return the wrench on the tip, shape (6,), of its pose, shape (4, 4), and twist, shape (6,), all in
+        the frame of the goal.
+        """
         turn = rotation.log(rotation.from_matrix(self._torque_axes.T @ tip[:3, :3]))
         away = np.array([self._force_axes.T @ (tip[:3, 3] - self._position), turn])  # (2, 3)
         velocity = np.array([self._force_axes.T @ twist[:3], self._torque_axes.T @ twist[3:]])

@@ -24,14 +24,20 @@ _FULL = np.ones(2)
 class Lifecycle:
     """The operating state of one arm, and what its change does to the drives."""
 
-    def __init__(self, drives: Drives, messages: Messages, home: Vector, power_time: float, *, homed: bool) -> None:
-        """Take the drives, where to tell what happens, home, shape (n,), the time (s) to power, and whether to start homed."""
+    def __init__(
+        self, drives: Drives, messages: Messages, home: Vector, power_time: float, *, homed: bool
+    ) -> None:
+        """Take the drives, where to tell what happens, home, shape (n,), the time (s) to power, and whether
+        to start homed.
+        """
         self._drives, self._messages = drives, messages
         self._home, self._power_time = home, power_time
         n = len(home)
         self._tolerance = np.array([*TRACKING_TOLERANCE, *TRACKING_TOLERANCE[-1:] * n][:n])
         self.flags = np.zeros(6)
-        self._state, self._homed, self._powering, self._homing, self._late, self._desired = np.split(self.flags, 6)
+        self._state, self._homed, self._powering, self._homing, self._late, self._desired = np.split(
+            self.flags, 6
+        )
         self._repeats = Repeats()
         self.arrays = (self.flags, self._repeats.state)
         """All that changes."""
@@ -60,17 +66,27 @@ class Lifecycle:
     @property
     def is_busy(self) -> bool:
         """Whether the arm powers, homes or moves."""
-        return bool(self._powering[0] or (self._homing[0] and self.state is not State.PAUSED)) or self._drives.is_moving
+        return (
+            bool(self._powering[0] or (self._homing[0] and self.state is not State.PAUSED))
+            or self._drives.is_moving
+        )
 
     @property
     def desired_state(self) -> str:
         """Where the arm was told to go: CRTK's `desired_state`."""
-        return self.state.name if self.state in (State.PAUSED, State.FAULT) else Desired(int(self._desired[0])).name
+        return (
+            self.state.name
+            if self.state in (State.PAUSED, State.FAULT)
+            else Desired(int(self._desired[0])).name
+        )
 
     def not_ready(self) -> str:
         """Return why the arm takes no motion commands; empty if it does."""
         if self.state is not State.ENABLED:
-            return f"the arm is {self.state.name}{' and powering' if self._powering[0] else ''}, allowed in ENABLED and homed"
+            return (
+                f"the arm is {self.state.name}{' and powering' if self._powering[0] else ''}, allowed in"
+                " ENABLED and homed"
+            )
         if self._homing[0]:
             return "the arm is homing, allowed when it is homed"
         return "" if self._homed[0] else "the arm is not homed, send state_command home first"
@@ -163,7 +179,9 @@ class Lifecycle:
             return ""
         rows = zip(joints.chain.joints, away.tolist(), self._tolerance.tolist(), strict=True)
         return "tracking error, " + "; ".join(
-            f"joint {joint.name} is {distance:.3g} {joint.unit} from its setpoint, allowed are {most:g}" for joint, distance, most in rows if distance > most
+            f"joint {joint.name} is {distance:.3g} {joint.unit} from its setpoint, allowed are {most:g}"
+            for joint, distance, most in rows
+            if distance > most
         )
 
     def _check_home(self, h: float) -> None:
@@ -174,4 +192,7 @@ class Lifecycle:
             return
         self._late[0] += h
         if self._late[0] > HOMING_TIMEOUT:
-            self._fault(f"home not reached {HOMING_TIMEOUT:g} s after its trajectory, {away:.3g} (rad, m) away, allowed are {GOAL_TOLERANCE:.3g}")
+            self._fault(
+                f"home not reached {HOMING_TIMEOUT:g} s after its trajectory, {away:.3g} (rad, m) away,"
+                f" allowed are {GOAL_TOLERANCE:.3g}"
+            )

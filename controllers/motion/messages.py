@@ -15,11 +15,23 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 __all__ = ["Messages"]
 
 _STREAMS = (
-    *("servo_jp", "servo_jr", "servo_cp", "servo_cr", "servo_cs", "servo_ci", "servo_jf", "body/servo_cf", "spatial/servo_cf"),
+    *(
+        "servo_jp",
+        "servo_jr",
+        "servo_cp",
+        "servo_cr",
+        "servo_cs",
+        "servo_ci",
+        "servo_jf",
+        "body/servo_cf",
+        "spatial/servo_cf",
+    ),
     *("jaw/servo_jp", "jaw/servo_jf", "hand/servo_jp", "hand/servo_jf"),
 )
 _REPEAT = 2.0
-"""s before a refusal of the same words is repeated to a stream (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitArm.cpp, ArmIsReady)."""
+"""s before a refusal of the same words is repeated to a stream (jhu-dvrk/sawIntuitiveResearchKit,
+mtsIntuitiveResearchKitArm.cpp, ArmIsReady).
+"""
 
 
 class Messages:
@@ -33,7 +45,8 @@ class Messages:
         self._quiet = True
         self._now_ns = 0
         self.state = np.zeros((len(_STREAMS), 3))
-        """Per stream: checksum of the last refusal's words, when it was told, how often it came since then."""
+        """Per stream: checksum of the last refusal's words, when it was told, how often it came since then.
+        """
 
     def begin(self, now_ns: int) -> None:
         """Forget what was said; the step that begins ends at `now_ns`."""
@@ -45,7 +58,10 @@ class Messages:
     def operating_state(self, state: State, *, homed: bool, busy: bool) -> None:
         """Tell the operating state."""
         stamp = Time.from_ns(self._now_ns)
-        self._put("operating_state", OperatingState(header=Header(stamp=stamp), state=state.name, is_homed=homed, is_busy=busy))
+        self._put(
+            "operating_state",
+            OperatingState(header=Header(stamp=stamp), state=state.name, is_homed=homed, is_busy=busy),
+        )
 
     def desired_state(self, state: str) -> None:
         """Tell where the arm was told to go."""
@@ -72,7 +88,8 @@ class Messages:
         self._put("status", StringMessage(data=f"{self._arm}: {text}"))
 
     def refuse(self, command: str, reason: str, *, ready: bool) -> None:
-        """Say why `command` is not heeded: an error if it cannot be, a warning if it came while the arm was not `ready`.
+        """Say why `command` is not heeded: an error if it cannot be, a warning if it came while the arm was
+        not `ready`.
 
         A stream is told the same only once in two seconds, with how often it came.
         """
@@ -87,8 +104,14 @@ class Messages:
             self.state[_STREAMS.index(command)] = 0.0
 
     def _repeats(self, command: str, reason: str) -> int:
-        """Return how often the same refusal has come since it was last told; 0 while it is too early to tell it again."""
-        row, words, now = self.state[_STREAMS.index(command)], float(crc32(reason.encode())), self._now_ns * 1e-9
+        """Return how often the same refusal has come since it was last told; 0 while it is too early to tell
+        it again.
+        """
+        row, words, now = (
+            self.state[_STREAMS.index(command)],
+            float(crc32(reason.encode())),
+            self._now_ns * 1e-9,
+        )
         if row[0] == words and now - row[1] < _REPEAT:
             row[2] += 1.0
             return 0

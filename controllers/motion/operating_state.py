@@ -1,7 +1,8 @@
 """CRTK's operating states, and which command each of them takes.
 
-As on the dVRK (jhu-cisst/cisst, prmOperatingState): what is not listed is refused with a warning. Two accidents of that code are not
-followed: there `pause` is let through in DISABLED, and so is `home`, which then powers the arm first; the second is kept, as clients use it.
+As on the dVRK (jhu-cisst/cisst, prmOperatingState): what is not listed is refused with a warning. Two
+accidents of that code are not followed: there `pause` is let through in DISABLED, and so is `home`, which
+then powers the arm first; the second is kept, as clients use it.
 """
 
 from __future__ import annotations
@@ -48,12 +49,17 @@ def refusal(state: State, command: str) -> str | None:
     if command not in known:
         return f"state_command '{command}' is unknown.{did_you_mean(command, known)}"
     if command not in _COMMANDS[state]:
-        return f"state_command '{command}' is refused in state {state.name}, which takes {', '.join(_COMMANDS[state])}"
+        return (
+            f"state_command '{command}' is refused in state {state.name}, which takes"
+            f" {', '.join(_COMMANDS[state])}"
+        )
     return None
 
 
 class Repeats:
-    """Finds state commands that come a second time: latched, they do so whenever a client's connection is made anew."""
+    """Finds state commands that come a second time: latched, they do so whenever a client's connection is
+    made anew.
+    """
 
     _KEPT = 8
     """How many commands are remembered; more clients than that do not command one arm."""
@@ -64,13 +70,18 @@ class Repeats:
         """Stamps (s, ns) and checksums of the commands heeded last, the newest first."""
 
     def refusal(self, message: StringStamped) -> str | None:
-        """Return why a command that was heeded before is not heeded again, else None, and remember it; one without a stamp is always new."""
+        """Return why a command that was heeded before is not heeded again, else None, and remember it; one
+        without a stamp is always new.
+        """
         stamp = message.header.stamp
         if not (stamp.sec or stamp.nanosec):
             return None
         mark = np.array([stamp.sec, stamp.nanosec, crc32(message.string.encode())], np.float64)
         if (self.state == mark).all(axis=1).any():
-            return f"state_command '{message.string}' of time {stamp.sec}.{stamp.nanosec:09d} s is refused: it was heeded before; a new one has a new stamp"
+            return (
+                f"state_command '{message.string}' of time {stamp.sec}.{stamp.nanosec:09d} s is refused: it"
+                " was heeded before; a new one has a new stamp"
+            )
         self.state[1:] = self.state[:-1].copy()
         self.state[0] = mark
         return None

@@ -88,7 +88,12 @@ class Arms(Params):
     @property
     def driven(self) -> Mapping[CartArm, PsmParams | EcmParams]:
         """Those that are there, by name."""
-        named: dict[CartArm, PsmParams | EcmParams | None] = {"PSM1": self.PSM1, "PSM2": self.PSM2, "PSM3": self.PSM3, "ECM": self.ECM}
+        named: dict[CartArm, PsmParams | EcmParams | None] = {
+            "PSM1": self.PSM1,
+            "PSM2": self.PSM2,
+            "PSM3": self.PSM3,
+            "ECM": self.ECM,
+        }
         return {name: arm for name, arm in named.items() if arm is not None}
 
 
@@ -106,16 +111,32 @@ class MotionParams(Params):
 
     arms: Arms
     mounting: Literal["free", "cart"] = Field(
-        default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
+        default="free",
+        description=(
+            "each arm where its position and orientation say, or on the setup joints of the cart, whose frame"
+            " is the world then"
+        ),
     )
     setup_joints: SetupJoints = SetupJoints()
     reference: Literal["camera", "base", "world"] = Field(
         default="camera",
-        description="frame of measured_cp and of Cartesian commands: the camera view, as on the real system (the ECM itself: the cart; without an ECM: base),"
-        " each arm's own base, or the world, where set_base_frame says anew where a free arm's base is taken to stand",
+        description=(
+            "frame of measured_cp and of Cartesian commands: the camera view, as on the real system (the ECM"
+            " itself: the cart; without an ECM: base), each arm's own base, or the world, where"
+            " set_base_frame says anew where a free arm's base is taken to stand"
+        ),
     )
-    initial_state: Literal["disabled", "homed"] = Field(default="disabled", description="operating state at time 0")
-    power_time: Duration = Field(default=100_000_000, ge=0, description="from `enable` to ENABLED; the real arm takes 3 s")
+    initial_state: Literal["disabled", "homed"] = Field(
+        default="disabled", description="operating state at time 0"
+    )
+    power_time: Duration = Field(
+        default=100_000_000, ge=0, description="from `enable` to ENABLED; the real arm takes 3 s"
+    )
     publish_period: Duration = Field(
-        default=10_000_000, gt=0, description="of all states but the commands to the robot, a multiple of the period; 10 ms as on the real system"
+        default=10_000_000,
+        gt=0,
+        description=(
+            "of all states but the commands to the robot, a multiple of the period; 10 ms as on the real"
+            " system"
+        ),
     )

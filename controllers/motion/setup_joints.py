@@ -1,8 +1,9 @@
-"""The setup joints of the cart as clients see them: where they are, and an operating state. They are braked: nothing moves them.
+"""The setup joints of the cart as clients see them: where they are, and an operating state. They are braked:
+nothing moves them.
 
-On the real system (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp) one controller drives the brakes of all of them, so
-that they share their operating state, and its potentiometers know the positions from the start: they are homed. Only its simulation
-lets clients set positions.
+On the real system (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp) one controller drives
+the brakes of all of them, so that they share their operating state, and its potentiometers know the positions
+from the start: they are homed. Only its simulation lets clients set positions.
 """
 
 from __future__ import annotations
@@ -38,15 +39,22 @@ class SetupJoints:
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
         self._said = {arm: Messages(f"SUJ/{arm}", SETUP_JOINT_EVENTS) for arm in arms}
-        self._flags = np.array([State.ENABLED if params.initial_state == "homed" else State.DISABLED, 1.0, 0.0, 0.0])
+        self._flags = np.array(
+            [State.ENABLED if params.initial_state == "homed" else State.DISABLED, 1.0, 0.0, 0.0]
+        )
         self._state, self._homed, self._powering, self._told = np.split(self._flags, 4)
         self._repeats = Repeats()
-        self.state = (self._flags, self._repeats.state, *(said.state for said in self._said.values())) if arms else ()
+        self.state = (
+            (self._flags, self._repeats.state, *(said.state for said in self._said.values())) if arms else ()
+        )
         """All that changes."""
         self.outputs: dict[str, Any] = {}
         for arm in arms:
             positions = setup_positions(arm, params)
-            self.outputs |= {f"SUJ/{arm}/measured_js": positions, f"SUJ/{arm}/local/measured_cp": pose(setup_joints.base_pose(arm, positions))}
+            self.outputs |= {
+                f"SUJ/{arm}/measured_js": positions,
+                f"SUJ/{arm}/local/measured_cp": pose(setup_joints.base_pose(arm, positions)),
+            }
             self.outputs |= self._said[arm].outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:
@@ -64,14 +72,18 @@ class SetupJoints:
         if news | self._power(h * 1e-9):
             self._told[0] = 1.0
             for said in self._said.values():
-                said.operating_state(State(int(self._state[0])), homed=bool(self._homed[0]), busy=bool(self._powering[0]))
+                said.operating_state(
+                    State(int(self._state[0])), homed=bool(self._homed[0]), busy=bool(self._powering[0])
+                )
         for said in self._said.values():
             self.outputs |= said.outputs
 
     def _command(self, said: Messages, message: StringStamped) -> bool:
         """Heed a `state_command`; return whether it was."""
         state, command = State(int(self._state[0])), message.string
-        reason = refusal(state, command) or ("the setup joints do not pause" if command == "pause" else self._repeats.refusal(message))
+        reason = refusal(state, command) or (
+            "the setup joints do not pause" if command == "pause" else self._repeats.refusal(message)
+        )
         if reason:
             said.warning(reason)
             return False

@@ -15,10 +15,12 @@ _SINGULAR = 1e-6
 
 
 def body_to_spatial(tip: Vector) -> Vector:
-    """Return the adjoint, shape (6, 6), of the tip's pose: takes its body twist (linear part first) to the spatial one.
+    """Return the adjoint, shape (6, 6), of the tip's pose: takes its body twist (linear part first) to the
+    spatial one.
 
-    The spatial twist is that of the point at the base frame's origin, in the base frame (Murray, Li, Sastry, A Mathematical
-    Introduction to Robotic Manipulation, section 2.4), which is what the dVRK's `spatial/` ports are about.
+    The spatial twist is that of the point at the base frame's origin, in the base frame (Murray, Li, Sastry,
+    A Mathematical Introduction to Robotic Manipulation, section 2.4), which is what the dVRK's `spatial/`
+    ports are about.
     """
     rotation, (x, y, z) = tip[:3, :3], tip[:3, 3].tolist()
     adjoint = np.zeros((6, 6))
@@ -37,13 +39,22 @@ class Telemetry:
         sizes = {"measured_js": 3 * n, "setpoint_js": 3 * n, "body/measured_cf": 6, "spatial/measured_cf": 6}
         sizes |= {"body/jacobian": 6 * n, "spatial/jacobian": 6 * n, "gravity_compensation/setpoint_js": n}
         sizes |= {f"trajectory_j/{name}": 1 for name in ("ratio", "ratio_v", "ratio_a")}
-        sizes |= {f"{prefix}{kind}_{part}": size for prefix in ("", "local/") for kind in ("measured", "setpoint") for part, size in (("cp", 7), ("cv", 6))}
+        sizes |= {
+            f"{prefix}{kind}_{part}": size
+            for prefix in ("", "local/")
+            for kind in ("measured", "setpoint")
+            for part, size in (("cp", 7), ("cv", 6))
+        }
         self._values = {name: np.zeros(size) for name, size in sizes.items()}
         self._base = np.zeros(7)
-        self.outputs = {f"{arm}/{name}": value for name, value in self._values.items()} | {f"SUJ/{arm}/measured_cp": self._base}
+        self.outputs = {f"{arm}/{name}": value for name, value in self._values.items()} | {
+            f"SUJ/{arm}/measured_cp": self._base
+        }
 
     def tell_settings(self, ratio: Vector, borne: Vector) -> None:
-        """Tell the shares of velocity and acceleration that moves use, shape (2,), and the efforts that bear the known weight, shape (n,)."""
+        """Tell the shares of velocity and acceleration that moves use, shape (2,), and the efforts that bear
+        the known weight, shape (n,).
+        """
         values, (faster, harder) = self._values, ratio.tolist()
         values["trajectory_j/ratio_v"][0], values["trajectory_j/ratio_a"][0] = faster, harder
         values["trajectory_j/ratio"][0] = faster if faster == harder else 0.0

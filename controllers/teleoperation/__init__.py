@@ -1,4 +1,6 @@
-"""Teleoperation: a hand leads an instrument on a patient-side manipulator, and feels through a contact model what it touches."""
+"""Teleoperation: a hand leads an instrument on a patient-side manipulator, and feels through a contact model
+what it touches.
+"""
 
 from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.params import TeleoperationParams

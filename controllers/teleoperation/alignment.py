@@ -1,8 +1,9 @@
 """The alignment gate: the arm follows once the hand is turned as the tip is, and is seen to be held.
 
-For masters that cannot be turned by motors; after what mtsTeleOperationPSM.cpp of jhu-dvrk/sawIntuitiveResearchKit asks of one that can (RunAligningMTM,
-defaults in mtsIntuitiveResearchKit.h). The hand is seen to be held when its gripper or its roll has moved enough since it was first to be
-aligned; a clutch does not make it prove that again, but demands a closer match.
+For masters that cannot be turned by motors; after what mtsTeleOperationPSM.cpp of
+jhu-dvrk/sawIntuitiveResearchKit asks of one that can (RunAligningMTM, defaults in mtsIntuitiveResearchKit.h).
+The hand is seen to be held when its gripper or its roll has moved enough since it was first to be aligned; a
+clutch does not make it prove that again, but demands a closer match.
 """
 
 from __future__ import annotations
@@ -32,9 +33,16 @@ class AlignmentGate:
     def __init__(self) -> None:
         """Start closed."""
         self.state = np.zeros(13)
-        self._held, self._passed, self._watching, self._waited, self._first, self._roll, self._gripper, self._angle = np.split(
-            self.state, [1, 2, 3, 4, 8, 10, 12]
-        )
+        (
+            self._held,
+            self._passed,
+            self._watching,
+            self._waited,
+            self._first,
+            self._roll,
+            self._gripper,
+            self._angle,
+        ) = np.split(self.state, [1, 2, 3, 4, 8, 10, 12])
 
     def reset(self) -> None:
         """Forget the hand: it must be seen to be held again."""
@@ -69,8 +77,14 @@ class AlignmentGate:
         self._waited[0] = 0.0
         if self._angle[0] > self._tolerance:
             away, allowed = degrees(self._angle[0]), degrees(self._tolerance)
-            return f"the hand is turned {away:.1f} deg away from the instrument, allowed are {allowed:g}; turn it as the instrument is"
-        return f"nobody seems to hold the master; roll it by {degrees(_ROLL):g} deg, or move its gripper by {degrees(_GRIPPER):g}"
+            return (
+                f"the hand is turned {away:.1f} deg away from the instrument, allowed are {allowed:g}; turn"
+                " it as the instrument is"
+            )
+        return (
+            f"nobody seems to hold the master; roll it by {degrees(_ROLL):g} deg, or move its gripper by"
+            f" {degrees(_GRIPPER):g}"
+        )
 
     @property
     def _tolerance(self) -> float:

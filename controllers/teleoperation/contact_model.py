@@ -1,9 +1,10 @@
 """From contact at an instrument's tip to the planes that a haptic device renders.
 
-With the hand at x_h while the tip is commanded to x_t, a hand at x means the tip p(x) = x_t + s R (x - x_h). So the plane n . p = d of the
-arm's base frame is, for the hand, the plane R'n . x = R'n . x_h + (d - n . x_t) / s: depths are divided by the scale s. A force
-F at the tip is c F at the hand, and so a stiffness K is s c K there, and a damping B is s c B. Both ends of the pair (x_h, x_t) belong to the
-same sample of the hand, so nothing that delays the sample or the planes displaces a surface that stands still.
+With the hand at x_h while the tip is commanded to x_t, a hand at x means the tip p(x) = x_t + s R (x - x_h).
+So the plane n . p = d of the arm's base frame is, for the hand, the plane R'n . x = R'n . x_h + (d - n . x_t)
+/ s: depths are divided by the scale s. A force F at the tip is c F at the hand, and so a stiffness K is s c K
+there, and a damping B is s c B. Both ends of the pair (x_h, x_t) belong to the same sample of the hand, so
+nothing that delays the sample or the planes displaces a surface that stands still.
 """
 
 from __future__ import annotations
@@ -27,35 +28,59 @@ __all__ = ["ContactModelBuilder", "ForceParams", "PlaneParams", "PlanesParams"]
 def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
     length = float(np.linalg.norm(value))
     if not length > 0.0:
-        raise ValueError("a normal of length 0 has no direction; [0, 0, 1] points up in a base frame that stands upright")
+        raise ValueError(
+            "a normal of length 0 has no direction; [0, 0, 1] points up in a base frame that stands upright"
+        )
     x, y, z = value
     return x / length, y / length, z / length
 
 
 class PlaneParams(Params):
-    """A surface that only the hand feels, in the arm's base frame: it pushes the tip to where normal . tip is `distance`."""
+    """A surface that only the hand feels, in the arm's base frame: it pushes the tip to where normal . tip is
+    `distance`.
+    """
 
-    normal: Annotated[tuple[float, float, float], AfterValidator(_direction)] = Field(description="out of the surface, of any length")
+    normal: Annotated[tuple[float, float, float], AfterValidator(_direction)] = Field(
+        description="out of the surface, of any length"
+    )
     distance: Length = Field(description="of the surface from the remote centre of motion, along the normal")
     stiffness: Stiffness = Field(gt=0.0, description="force at the tip per metre of the tip")
-    damping: Damping = Field(default=0.0, ge=0.0, description="force at the tip per speed of the tip towards the surface")
+    damping: Damping = Field(
+        default=0.0, ge=0.0, description="force at the tip per speed of the tip towards the surface"
+    )
     friction: float = Field(default=0.0, ge=0.0, allow_inf_nan=False, description="Coulomb's coefficient")
 
 
-PlanesParams = Annotated[tuple[PlaneParams, ...], Field(max_length=2, description="surfaces that only the hand feels, in the arm's base frame")]
+PlanesParams = Annotated[
+    tuple[PlaneParams, ...],
+    Field(max_length=2, description="surfaces that only the hand feels, in the arm's base frame"),
+]
 """As many as a contact model holds beside a tissue's and a rigid thing's."""
 
 
 class ForceParams(Params):
     """What of the force at the tip the hand gets."""
 
-    scale: float = Field(default=1.0, ge=0.0, allow_inf_nan=False, description="newtons at the hand per newton at the tip; 0 gives no force")
-    max_stiffness: Stiffness = Field(default=400.0, gt=0.0, description="of a surface as the hand feels it; what is stiffer is felt softer")
-    damping: Damping = Field(default=1.0, ge=0.0, description="of a measured surface as the hand feels it, against what a delay builds up")
+    scale: float = Field(
+        default=1.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="newtons at the hand per newton at the tip; 0 gives no force",
+    )
+    max_stiffness: Stiffness = Field(
+        default=400.0, gt=0.0, description="of a surface as the hand feels it; what is stiffer is felt softer"
+    )
+    damping: Damping = Field(
+        default=1.0,
+        ge=0.0,
+        description="of a measured surface as the hand feels it, against what a delay builds up",
+    )
 
 
 class ContactModelBuilder:
-    """Makes the contact model of one hand and one arm: a plane per surface of the scenario, one for tissue and one for rigid things."""
+    """Makes the contact model of one hand and one arm: a plane per surface of the scenario, one for tissue
+    and one for rigid things.
+    """
 
     def __init__(self, force: ForceParams, planes: Sequence[PlaneParams]) -> None:
         """Take what the scenario says."""
@@ -66,7 +91,9 @@ class ContactModelBuilder:
 
     @property
     def state(self) -> Vector:
-        """All that is remembered; the same array at every call, so that a caller may save, hash and overwrite it."""
+        """All that is remembered; the same array at every call, so that a caller may save, hash and overwrite
+        it.
+        """
         return self._state
 
     def planes(
@@ -81,17 +108,20 @@ class ContactModelBuilder:
         rigid_wrench: Vector,
         elapsed: float,
     ) -> list[ContactPlane]:
-        """Return at most four planes in the device's base frame and metres of the hand; none while the arm does not follow.
+        """Return at most four planes in the device's base frame and metres of the hand; none while the arm
+        does not follow.
 
         Args:
-            hand: position (3,) of the hand in the device's base frame, m: the sample that the command was made from.
+            hand: position (3,) of the hand in the device's base frame, m: the sample that the command was
+            made from.
             tip: position (3,) of the tip at the command in the arm's base frame, m.
             to_base: rotation (3, 3) from the device's base frame to the arm's.
             scale: metres of the tip per metre of the hand.
             following: whether the tip follows the hand.
             tip_wrench: force and moment (6,) of tissue on the instrument in the arm's base frame, N and N m.
             rigid_wrench: the same of rigid things.
-            elapsed: simulated time since the last call, s. Call whether or not the arm follows: what was touched is remembered.
+            elapsed: simulated time since the last call, s. Call whether or not the arm follows: what was
+            touched is remembered.
         """
         self._tissue.update(tip, tip_wrench[:3], scale, elapsed)
         self._rigid.update(tip, rigid_wrench[:3], scale, elapsed)
@@ -99,18 +129,36 @@ class ContactModelBuilder:
         if not following or not gain:
             return []
         planes = [
-            self._plane(hand, to_base.T @ normal, (plane.distance - float(normal @ tip)) / scale, gain * plane.stiffness, gain * plane.damping, plane.friction)
+            self._plane(
+                hand,
+                to_base.T @ normal,
+                (plane.distance - float(normal @ tip)) / scale,
+                gain * plane.stiffness,
+                gain * plane.damping,
+                plane.friction,
+            )
             for plane, normal in zip(self._planes, self._normals, strict=True)
         ]
         felt = (estimate for estimate in (self._tissue, self._rigid) if estimate.known)
         planes += [
-            self._plane(hand, to_base.T @ surface.normal, surface.depth(tip) / scale, gain * surface.stiffness, self._force.damping, surface.friction)
+            self._plane(
+                hand,
+                to_base.T @ surface.normal,
+                surface.depth(tip) / scale,
+                gain * surface.stiffness,
+                self._force.damping,
+                surface.friction,
+            )
             for surface in felt
         ]
         return planes
 
-    def _plane(self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float, friction: float) -> ContactPlane:
-        """Return the plane with this `normal` (3,) at which the hand is `depth` below it, both as the hand has them."""
+    def _plane(
+        self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float, friction: float
+    ) -> ContactPlane:
+        """Return the plane with this `normal` (3,) at which the hand is `depth` below it, both as the hand
+        has them.
+        """
         x, y, z = normal.tolist()
         return ContactPlane(
             normal=Vector3(x=x, y=y, z=z),

@@ -31,7 +31,9 @@ _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 
 
 class Teleoperation(Stepped):
-    """The hand `master` leads the tip by the pose law or the velocity law while it is engaged; else the arm holds."""
+    """The hand `master` leads the tip by the pose law or the velocity law while it is engaged; else the arm
+    holds.
+    """
 
     params_model: ClassVar[type[Params]] = TeleoperationParams
     params: TeleoperationParams
@@ -40,13 +42,26 @@ class Teleoperation(Stepped):
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._chain, n = params.chain, len(params.chain.joints)
-        self._law = PoseLaw(params.chain, turns=params.orientation == "follow") if params.law == "pose" else None
+        self._law = (
+            PoseLaw(params.chain, turns=params.orientation == "follow") if params.law == "pose" else None
+        )
         self._view, self._engagement = View(params), Engagement(params)
         self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
         self._contact = ContactModelBuilder(params.force, params.planes)
         self._memory = np.zeros(n + 29)
         parts = np.split(self._memory, [n, n + 7, n + 14, n + 21, n + 23, n + 25, n + 26, n + 27, n + 28])
-        self._command, self._goal, self._tip, self._hand, self._locks, scales, self._started, self._told, self._shared, self._relocked = parts
+        (
+            self._command,
+            self._goal,
+            self._tip,
+            self._hand,
+            self._locks,
+            scales,
+            self._started,
+            self._told,
+            self._shared,
+            self._relocked,
+        ) = parts
         self._scale, self._heard = np.split(scales, 2)
         self._jaw = np.zeros(len(params.tool.jaw_joints))
         self._state = (
@@ -64,7 +79,9 @@ class Teleoperation(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The hand (`master...`, `buttons`, `gripper`), the arm (`measured_js`, ...) and the `scale` in; commands, `contact` and what happens out."""
+        """The hand (`master...`, `buttons`, `gripper`), the arm (`measured_js`, ...) and the `scale` in;
+        commands, `contact` and what happens out.
+        """
         return teleoperation_ports(self.params)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
@@ -72,17 +89,29 @@ class Teleoperation(Stepped):
         self._stand_at(np.array(self.params.start), np.array([self.params.jaw, 0.0]))
         self._scale[0] = self._heard[0] = self.params.scale
         self._told[0] = -1.0
-        self._outputs |= {"contact": ContactModel(header=Header()), "following": _HOLDS, "state": (), "warning": (), **dict.fromkeys(self._streams, ())}
+        self._outputs |= {
+            "contact": ContactModel(header=Header()),
+            "following": _HOLDS,
+            "state": (),
+            "warning": (),
+            **dict.fromkeys(self._streams, ()),
+        }
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Move the command after the hand if it leads; hold it if nobody does."""
         self._hear(inputs)
         if not self._holds_command:
-            self._stand_at(inputs["measured_js"], inputs["jaw/measured_js"] if self._ghost is not None else self._jaw)
+            self._stand_at(
+                inputs["measured_js"], inputs["jaw/measured_js"] if self._ghost is not None else self._jaw
+            )
             self._started[0] = 1.0
         warnings = self._heed_scale(float(inputs["scale"][0]))
-        to_base, gripper, seconds = self._view.hand_in_base(inputs["base_in_view"]), float(inputs["gripper"][0]), h * 1e-9
+        to_base, gripper, seconds = (
+            self._view.hand_in_base(inputs["base_in_view"]),
+            float(inputs["gripper"][0]),
+            h * 1e-9,
+        )
         turned = rotation.product(to_base, inputs["master"][3:])
         heard = not inputs.stale("master") and (self._law is not None or not inputs.stale("master_twist"))
         self._engagement.step(turned, self._tip[3:], gripper, seconds, heard=heard)
@@ -98,7 +127,10 @@ class Teleoperation(Stepped):
 
     @property
     def _holds_command(self) -> bool:
-        """Whether the command stays what it was; else it goes where the arm is. An arm with a controller of its own may be moved by others meanwhile."""
+        """Whether the command stays what it was; else it goes where the arm is.
+
+        An arm with a controller of its own may be moved by others meanwhile.
+        """
         follows = self._engagement.phase is Phase.ENABLED
         return bool(self._started[0]) and self._engagement.arm_is_ready and (follows or not self._shared[0])
 
@@ -116,7 +148,9 @@ class Teleoperation(Stepped):
                 self._ghost.press(pressed=joy.buttons[self.params.buttons.jaw] != 0)
 
     def _stand_at(self, positions: Vector, jaw: Vector) -> None:
-        """Let the command be where arm and jaw are, or as near to it as their ranges allow; the arrays begin with the positions."""
+        """Let the command be where arm and jaw are, or as near to it as their ranges allow; the arrays begin
+        with the positions.
+        """
         self._command[:] = np.clip(positions[: len(self._command)], self._chain.lower, self._chain.upper)
         self._find_tip()
         self._goal[:] = self._tip
@@ -136,7 +170,11 @@ class Teleoperation(Stepped):
         if 0.0 < scale <= 1.0:
             self._scale[0] = scale
             return []
-        return [f"scale {scale:g} is refused, allowed are over 0 to 1; it stays {self._scale[0]:g}"] if news else []
+        return (
+            [f"scale {scale:g} is refused, allowed are over 0 to 1; it stays {self._scale[0]:g}"]
+            if news
+            else []
+        )
 
     def _lead(self, inputs: Inputs, to_base: Vector, seconds: float) -> None:
         """Move the command after the hand."""
@@ -152,7 +190,9 @@ class Teleoperation(Stepped):
         for lock, part in zip(self._locks, (_ORIENTATION, _POSITION), strict=True):
             if not lock:
                 self._hand[part] = hand[part]
-        self._command[:] = self._law.step(self._command, self._hand, self._tip, to_base, scale, seconds * self._chain.velocity)
+        self._command[:] = self._law.step(
+            self._command, self._hand, self._tip, to_base, scale, seconds * self._chain.velocity
+        )
         self._find_tip()
 
     def _lead_jaw(self, gripper: float, seconds: float) -> None:
@@ -217,4 +257,10 @@ class Teleoperation(Stepped):
 def _positions(values: Vector, stamp: Time) -> JointState:
     """Return joint positions as a message, which needs no check: they are within the joints' ranges."""
     none = np.zeros(0)
-    return JointState.model_construct(header=Header.model_construct(stamp=stamp, frame_id=""), name=[], position=values.copy(), velocity=none, effort=none)
+    return JointState.model_construct(
+        header=Header.model_construct(stamp=stamp, frame_id=""),
+        name=[],
+        position=values.copy(),
+        velocity=none,
+        effort=none,
+    )

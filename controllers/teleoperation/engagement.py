@@ -1,7 +1,9 @@
-"""Who leads: from buttons, the arm's operating state and the age of the hand's pose to whether the arm follows.
+"""Who leads: from buttons, the arm's operating state and the age of the hand's pose to whether the arm
+follows.
 
-After the states of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): the arm must be ENABLED and homed and the hand be heard, then be aligned,
-then the arm follows; a clutch frees the hand, which is aligned anew when it takes over again. Whatever has gone, the arm holds.
+After the states of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): the arm must be ENABLED and
+homed and the hand be heard, then be aligned, then the arm follows; a clutch frees the hand, which is aligned
+anew when it takes over again. Whatever has gone, the arm holds.
 """
 
 from __future__ import annotations
@@ -63,7 +65,10 @@ class Engagement:
         self._not_ready[0] = message.state != "ENABLED" or not message.is_homed
 
     def hear_buttons(self, joy: Joy) -> None:
-        """Take the clutch. Pressed and released inside one step it still frees the hand; a Joy without its button says nothing."""
+        """Take the clutch.
+
+        Pressed and released inside one step it still frees the hand; a Joy without its button says nothing.
+        """
         if joy.buttons.size > self._clutch:
             self._pressed[0] = joy.buttons[self._clutch] != 0
             if self._is_free:
@@ -74,7 +79,10 @@ class Engagement:
         return bool(self._pressed[0]) is not self._must_hold
 
     def step(self, hand: Vector, tip: Vector, gripper: float, h: float, *, heard: bool) -> None:
-        """Decide on this step, of `h` seconds; `heard`: the hand's pose is fresh. The other arguments are those of `AlignmentGate.check`."""
+        """Decide on this step, of `h` seconds; `heard`: the hand's pose is fresh.
+
+        The other arguments are those of `AlignmentGate.check`.
+        """
         self.warnings = []
         before = self.phase
         if self._must_hold and not heard and not self._lost[0]:
@@ -82,9 +90,15 @@ class Engagement:
         self._lost[0] = not heard
         self._phase[0] = self._decide(hand, tip, gripper, h, heard=heard)
         if self.phase is Phase.DISABLED and before is not Phase.DISABLED:
-            reason = f"its master has been silent for more than {self._max_age / 1e6:g} ms" if self.arm_is_ready else "it is not ENABLED and homed"
+            reason = (
+                f"its master has been silent for more than {self._max_age / 1e6:g} ms"
+                if self.arm_is_ready
+                else "it is not ENABLED and homed"
+            )
             self.warnings.append(f"{self._arm} holds: {reason}")
-        self.takes_over = self.phase is Phase.ENABLED and (before is not Phase.ENABLED or bool(self._interrupted[0]))
+        self.takes_over = self.phase is Phase.ENABLED and (
+            before is not Phase.ENABLED or bool(self._interrupted[0])
+        )
         self._interrupted[0] = 0.0
 
     def _decide(self, hand: Vector, tip: Vector, gripper: float, h: float, *, heard: bool) -> Phase:
@@ -97,7 +111,11 @@ class Engagement:
             gate.clutch()
         if self._is_free:
             return Phase.CLUTCHED
-        if gate is None or (self.phase is Phase.ENABLED and not self._interrupted[0]) or gate.check(hand, tip, gripper, h):
+        if (
+            gate is None
+            or (self.phase is Phase.ENABLED and not self._interrupted[0])
+            or gate.check(hand, tip, gripper, h)
+        ):
             return Phase.ENABLED
         if complaint := gate.complaint():
             self.warnings.append(f"{self._arm} waits: {complaint}")

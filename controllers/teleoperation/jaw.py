@@ -1,7 +1,8 @@
 """The jaw, led by a gripper or a button through a ghost that keeps it from snapping.
 
-After jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp: the ghost starts where the jaw is and goes after the gripper, slowly until it has
-caught up once, quickly from then on; so a gripper that is closed when it takes over an open jaw drops nothing, and pinches nobody.
+After jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp: the ghost starts where the jaw is and goes
+after the gripper, slowly until it has caught up once, quickly from then on; so a gripper that is closed when
+it takes over an open jaw drops nothing, and pinches nobody.
 """
 
 from __future__ import annotations
@@ -51,9 +52,11 @@ class JawGhost:
         self._caught_up[0] = 0.0
 
     def follow(self, gripper: float, h: float) -> None:
-        """Go after the hand for `h` seconds: after the gripper, 0 closed .. 1 open, or the button if that is negative.
+        """Go after the hand for `h` seconds: after the gripper, 0 closed .. 1 open, or the button if that is
+        negative.
 
-        Closed is the lower end of the jaw's range, where the fingers press on what is between them. Until the button is pressed the jaw stays.
+        Closed is the lower end of the jaw's range, where the fingers press on what is between them. Until the
+        button is pressed the jaw stays.
         """
         if gripper >= 0.0:
             goal = self._lower + min(gripper, 1.0) * (self._upper - self._lower)

@@ -35,49 +35,96 @@ def _orientation(data: dict[str, Any]) -> str:
 class Buttons(Params):
     """Which button of the hand does what, counted from 0."""
 
-    clutch: int = Field(default=0, ge=0, description="frees the hand while it is pressed or, with `engage: held`, leads the arm only while it is pressed")
-    jaw: int = Field(default=1, ge=0, description="closes the jaw while it is pressed, unless a `gripper` is connected")
+    clutch: int = Field(
+        default=0,
+        ge=0,
+        description=(
+            "frees the hand while it is pressed or, with `engage: held`, leads the arm only while it is"
+            " pressed"
+        ),
+    )
+    jaw: int = Field(
+        default=1, ge=0, description="closes the jaw while it is pressed, unless a `gripper` is connected"
+    )
 
 
 class TeleoperationParams(Params):
     """How a hand leads an arm."""
 
     arm: ArmName = "PSM1"
-    instrument: InstrumentName = Field(default="palpation-probe", description="what the arm holds: name or number, such as 400006")
-    start: MountedPositions = Field(default_factory=home, description=f"the command until measured_js is there: {', '.join(psm.JOINT_NAMES)}")
+    instrument: InstrumentName = Field(
+        default="palpation-probe", description="what the arm holds: name or number, such as 400006"
+    )
+    start: MountedPositions = Field(
+        default_factory=home,
+        description=f"the command until measured_js is there: {', '.join(psm.JOINT_NAMES)}",
+    )
     jaw: Angle = Field(default=0.0, description="opening of the jaw until jaw/measured_js is there")
     law: Literal["pose", "velocity"] = Field(
-        default="pose", description="the tip goes the way of the hand, scaled; or the hand's twist in its own frame is the tip's in its own"
+        default="pose",
+        description=(
+            "the tip goes the way of the hand, scaled; or the hand's twist in its own frame is the tip's in"
+            " its own"
+        ),
     )
-    scale: float = Field(default=0.2, gt=0.0, le=1.0, description="metres of the tip per metre of the hand; also an input, to be changed while it runs")
+    scale: float = Field(
+        default=0.2,
+        gt=0.0,
+        le=1.0,
+        description="metres of the tip per metre of the hand; also an input, to be changed while it runs",
+    )
     orientation: Literal["hold", "follow"] = Field(
         default_factory=_orientation,  # pyright: ignore[reportArgumentType]  # validated like any value
-        description="whether the tip keeps its orientation or turns with the hand; default: hold with `law: pose`, follow with `law: velocity`",
+        description=(
+            "whether the tip keeps its orientation or turns with the hand; default: hold with `law: pose`,"
+            " follow with `law: velocity`"
+        ),
         validate_default=True,
     )
     view: Literal["base", "camera", "display"] = Field(
         default="base",
-        description="what the hand's frame is registered to: the arm's base frame; the picture of the camera in whose frame `base_in_view` is, so that"
-        " right, up and away on the desk (x away, y left, z up) are right, up and away in the picture; or the display, whose axes stand for those of the"
-        " camera's frame, as the masters of a dVRK tell their poses",
+        description=(
+            "what the hand's frame is registered to: the arm's base frame; the picture of the camera in whose"
+            " frame `base_in_view` is, so that right, up and away on the desk (x away, y left, z up) are"
+            " right, up and away in the picture; or the display, whose axes stand for those of the camera's"
+            " frame, as the masters of a dVRK tell their poses"
+        ),
     )
     registration: UnitQuaternion = Field(
         default=(0.0, 0.0, 0.0, 1.0),
-        description="orientation of the master's frame in the arm's base frame or, with `view: camera`, in the desk's, with `view: display` in the display's",
+        description=(
+            "orientation of the master's frame in the arm's base frame or, with `view: camera`, in the"
+            " desk's, with `view: display` in the display's"
+        ),
     )
     endoscope: ecm.Endoscope = Field(default="straight", description="with `view: camera`: as the ECM has it")
-    tip_frame: ecm.TipFrame = Field(default="kinematic", description="with `view: camera`: as the ECM in whose frame `base_in_view` is has it")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic",
+        description="with `view: camera`: as the ECM in whose frame `base_in_view` is has it",
+    )
     engage: Literal["released", "held"] = Field(
-        default="released", description="the arm follows unless the clutch button is pressed, or only while it is held: dead-man and clutch in one"
+        default="released",
+        description=(
+            "the arm follows unless the clutch button is pressed, or only while it is held: dead-man and"
+            " clutch in one"
+        ),
     )
     buttons: Buttons = Buttons()
     align: Literal["relative", "gate"] = Field(
-        default="relative", description="the tip turns from where it is, or follows only once the hand is turned as the tip is and is seen to be held"
+        default="relative",
+        description=(
+            "the tip turns from where it is, or follows only once the hand is turned as the tip is and is"
+            " seen to be held"
+        ),
     )
     force: ForceParams = Field(default=ForceParams(), description="what the hand feels, by `contact`")
     planes: PlanesParams = ()
-    contact_period: Duration = Field(default=0, ge=0, description="of `contact`, a multiple of the period; 0: at every step")
-    max_age: Duration = Field(default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer")
+    contact_period: Duration = Field(
+        default=0, ge=0, description="of `contact`, a multiple of the period; 0: at every step"
+    )
+    max_age: Duration = Field(
+        default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer"
+    )
 
     @cached_property
     def tool(self) -> Instrument:
@@ -93,11 +140,18 @@ class TeleoperationParams(Params):
     def _fits(self) -> Self:
         check_start(self.chain, self.start, self.tool, self.jaw, _FOLDED)
         if self.law == "velocity" and self.orientation == "hold":
-            raise ValueError("'law: velocity' turns the tip with the hand; leave out 'orientation: hold', or take 'law: pose'")
+            raise ValueError(
+                "'law: velocity' turns the tip with the hand; leave out 'orientation: hold', or take 'law:"
+                " pose'"
+            )
         if self.law == "velocity" and len(self.chain.joints) < 6:
             raise ValueError(
-                f"'law: velocity' inverts the Jacobian, but with '{self.instrument}' the arm has {len(self.chain.joints)} joints; take 'law: pose'"
+                f"'law: velocity' inverts the Jacobian, but with '{self.instrument}' the arm has"
+                f" {len(self.chain.joints)} joints; take 'law: pose'"
             )
         if self.align == "gate" and self.orientation == "hold":
-            raise ValueError("'align: gate' compares orientations, which 'orientation: hold' leaves apart; set 'orientation: follow'")
+            raise ValueError(
+                "'align: gate' compares orientations, which 'orientation: hold' leaves apart; set"
+                " 'orientation: follow'"
+            )
         return self

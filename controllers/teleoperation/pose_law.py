@@ -1,13 +1,16 @@
-"""The pose law: the tip goes the way of the hand, scaled, and turns as the hand does, from where both were when the reference was taken.
+"""The pose law: the tip goes the way of the hand, scaled, and turns as the hand does, from where both were
+when the reference was taken.
 
-As on the real dVRK (jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp, RunEnabled), with x and H position and orientation of the hand
-in its base frame, p and P those of the tip in the arm's, R the orientation of the one frame in the other, s the scale, and 0 for the reference:
+As on the real dVRK (jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp, RunEnabled), with x and H
+position and orientation of the hand in its base frame, p and P those of the tip in the arm's, R the
+orientation of the one frame in the other, s the scale, and 0 for the reference:
 
     p = p0 + s R (x - x0),    P = R H A0  with  A0 = (R H0)' P0.
 
-A reference is taken from where hand and command are whenever the hand takes over, and from the *last* hand and goal when scale or view
-change while it leads: so no change moves the tip, and no motion of the hand is lost. It is taken anew as well while the tip, at a limit of its joints, is
-turned too far away from the goal: past half a turn the nearest way there is the other way round.
+A reference is taken from where hand and command are whenever the hand takes over, and from the *last* hand
+and goal when scale or view change while it leads: so no change moves the tip, and no motion of the hand is
+lost. It is taken anew as well while the tip, at a limit of its joints, is turned too far away from the goal:
+past half a turn the nearest way there is the other way round.
 """
 
 from __future__ import annotations
@@ -34,7 +37,9 @@ class PoseLaw:
         """Take the arm's kinematics, and whether the tip turns with the hand or keeps its orientation."""
         self._chain, self._turns = chain, turns
         self.state = np.zeros(33)
-        self.goal, self._hand0, self._tip0, self._hand, self._to_base, self._scale = np.split(self.state, [7, 14, 21, 28, 32])
+        self.goal, self._hand0, self._tip0, self._hand, self._to_base, self._scale = np.split(
+            self.state, [7, 14, 21, 28, 32]
+        )
         self.goal[6] = self._to_base[3] = 1.0
 
     def engage(self, hand: Vector, tip: Vector, to_base: Vector, scale: float) -> None:
@@ -50,14 +55,22 @@ class PoseLaw:
         self._tip0[:] = self.goal[:] = tip
         self._to_base[:], self._scale[0] = to_base, scale
 
-    def step(self, command: Vector, hand: Vector, tip: Vector, to_base: Vector, scale: float, largest_move: Vector) -> Vector:
-        """Return the joint positions, shape (n,), after `command`, with the hand at `hand`; arguments as of `engage` and `pursue`."""
+    def step(
+        self, command: Vector, hand: Vector, tip: Vector, to_base: Vector, scale: float, largest_move: Vector
+    ) -> Vector:
+        """Return the joint positions, shape (n,), after `command`, with the hand at `hand`; arguments as of
+        `engage` and `pursue`.
+        """
         if scale != self._scale[0] or (to_base != self._to_base).any():
             self.engage(self._hand.copy(), self.goal.copy(), to_base, scale)
         self._hand[:] = hand
-        self.goal[:3] = self._tip0[:3] + scale * (rotation.matrix(self._to_base) @ (hand[:3] - self._hand0[:3]))
+        self.goal[:3] = self._tip0[:3] + scale * (
+            rotation.matrix(self._to_base) @ (hand[:3] - self._hand0[:3])
+        )
         if self._turns:
-            offset = rotation.product(rotation.conjugate(rotation.product(to_base, self._hand0[3:])), self._tip0[3:])
+            offset = rotation.product(
+                rotation.conjugate(rotation.product(to_base, self._hand0[3:])), self._tip0[3:]
+            )
             goal = rotation.product(rotation.product(to_base, hand[3:]), offset)
             self.goal[3:] = goal / np.linalg.norm(goal)
             lag = rotation.log(rotation.product(self.goal[3:], rotation.conjugate(tip[3:])))

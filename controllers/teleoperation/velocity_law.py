@@ -1,11 +1,13 @@
 """The velocity law: the twist of the hand, in its own frame, is that of the instrument's tip in its own.
 
-After Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", IEEE International Conference on Robotic Computing, 2019: with v_G the
-twist of the gripper in its own frame and J_G the Jacobian there, dq/dt = J_G^-1 v_G.
+After Ferro et al., "A Portable da Vinci Simulator in Virtual Reality", IEEE International Conference on
+Robotic Computing, 2019: with v_G the twist of the gripper in its own frame and J_G the Jacobian there, dq/dt
+= J_G^-1 v_G.
 
-Near a singularity the inverse is damped: dq = J' (J J' + l^2 I)^-1 v with l^2 = (1 - (sigma / epsilon)^2) l_max^2 where the
-smallest singular value sigma is below epsilon, and l = 0 elsewhere (Chiaverini, Siciliano and Egeland, "Review of the damped least-squares
-inverse kinematics with experiments on an industrial robot manipulator", IEEE Transactions on Control Systems Technology 2(2), 1994).
+Near a singularity the inverse is damped: dq = J' (J J' + l^2 I)^-1 v with l^2 = (1 - (sigma / epsilon)^2)
+l_max^2 where the smallest singular value sigma is below epsilon, and l = 0 elsewhere (Chiaverini, Siciliano
+and Egeland, "Review of the damped least-squares inverse kinematics with experiments on an industrial robot
+manipulator", IEEE Transactions on Control Systems Technology 2(2), 1994).
 """
 
 from __future__ import annotations
@@ -22,8 +24,10 @@ _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, as in `robots.inverse_kinematics`."""
 _WEIGHTS = np.array([1.0, 1.0, 1.0, _LENGTH, _LENGTH, _LENGTH])
 _EPSILON = _LARGEST_DAMPING = 0.004
-"""m, of the weighted Jacobian; ours: a tip that creeps at 6 mm/s in the worst direction takes pitch and yaw to their 90 degrees a second. In 9 % of
-configurations drawn from a PSM's ranges sigma is smaller, near the remote centre and at wrists bent by nearly right angles; at home it is 0.061."""
+"""m, of the weighted Jacobian; ours: a tip that creeps at 6 mm/s in the worst direction takes pitch and yaw
+to their 90 degrees a second. In 9 % of configurations drawn from a PSM's ranges sigma is smaller, near the
+remote centre and at wrists bent by nearly right angles; at home it is 0.061.
+"""
 
 
 def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
@@ -39,17 +43,20 @@ def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
 
 
 def joint_velocities(jacobian: Vector, twist: Vector) -> Vector:
-    """Return dq/dt, shape (n,), for the twist (6,) of the tip in its own frame, from the Jacobian (6, n) in that frame."""
+    """Return dq/dt, shape (n,), for the twist (6,) of the tip in its own frame, from the Jacobian (6, n) in
+    that frame.
+    """
     u, sigma, vt = np.linalg.svd(_WEIGHTS[:, None] * jacobian, full_matrices=False)
     damping = max(0.0, 1.0 - (float(sigma[-1]) / _EPSILON) ** 2) * _LARGEST_DAMPING**2
     return vt.T @ (sigma / (sigma**2 + damping) * (u.T @ (_WEIGHTS * twist)))
 
 
 def advance(chain: SerialChain, q: Vector, twist: Vector, h: float) -> Vector:
-    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its own frame.
+    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its own
+    frame.
 
-    Joints that would leave their range go to its end, and the others do what they can without them; all slow down together so that none is faster
-    than it may be. What is cut is not made up for later.
+    Joints that would leave their range go to its end, and the others do what they can without them; all slow
+    down together so that none is faster than it may be. What is cut is not made up for later.
     """
     jacobian = chain.jacobian(chain.frames(q), frame="tip")
     least, most = (chain.lower - q) / h, (chain.upper - q) / h
@@ -59,6 +66,8 @@ def advance(chain: SerialChain, q: Vector, twist: Vector, h: float) -> Vector:
         free &= ~outside
         velocities[outside] = np.where(velocities < least, least, most)[outside]
         if free.any():
-            velocities[free] = joint_velocities(jacobian[:, free], twist - jacobian[:, ~free] @ velocities[~free])
+            velocities[free] = joint_velocities(
+                jacobian[:, free], twist - jacobian[:, ~free] @ velocities[~free]
+            )
     velocities /= max(1.0, float(np.abs(velocities / chain.velocity).max()))
     return np.minimum(np.maximum(q + h * velocities, chain.lower), chain.upper)

@@ -1,14 +1,15 @@
 """The hand's frame in the arm's: what right, up and away on the desk are for the instrument.
 
-Three frames: the *desk*, in which a device tells where the hand is (REP 103 as the user sits before it: x away, y left, z up); the *camera*, the
-ECM's tip frame, in which `base_in_view` is told; and the *view*, the frame of the picture as the surgeon sees it: x left, y up, z ahead
-(docs/decisions/0013). With `view: camera`
+Three frames: the *desk*, in which a device tells where the hand is (REP 103 as the user sits before it: x
+away, y left, z up); the *camera*, the ECM's tip frame, in which `base_in_view` is told; and the *view*, the
+frame of the picture as the surgeon sees it: x left, y up, z ahead (docs/decisions/0013). With `view: camera`
 
     R_base<-hand = R_camera<-base^T  R_camera<-view  R_view<-desk  R_desk<-hand,
 
-so that a motion to the right on the desk is one to the right in the picture; on the real system both consoles' and arms' base frames are set to the
-same effect (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are told in the camera's frame). Its masters tell their
-poses in the display's frame, whose axes stand for those of the camera's: with `view: display`
+so that a motion to the right on the desk is one to the right in the picture; on the real system both
+consoles' and arms' base frames are set to the same effect (jhu-dvrk/sawIntuitiveResearchKit,
+mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are told in the camera's frame). Its masters tell their poses
+in the display's frame, whose axes stand for those of the camera's: with `view: display`
 
     R_base<-hand = R_camera<-base^T  R_display<-hand.
 """
@@ -36,14 +37,18 @@ class View:
         self._registration = np.array(params.registration)
         self._hand_in_camera: Vector | None = self._registration if params.view == "display" else None
         if params.view == "camera":
-            camera, view = (ecm.tip(params.endoscope, frame)[:3, :3] for frame in (params.tip_frame, "view"))  # both in the roll link
-            self._hand_in_camera = rotation.product(rotation.from_matrix(camera.T @ view @ _DESK_IN_VIEW), self._registration)
+            # both in the roll link
+            camera, view = (ecm.tip(params.endoscope, frame)[:3, :3] for frame in (params.tip_frame, "view"))
+            self._hand_in_camera = rotation.product(
+                rotation.from_matrix(camera.T @ view @ _DESK_IN_VIEW), self._registration
+            )
 
     def hand_in_base(self, base_in_view: Vector) -> Vector:
         """Return the orientation of the hand's frame in the arm's base frame, quaternion (x, y, z, w).
 
         Args:
-            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; not looked at with `view: base`.
+            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; not looked
+            at with `view: base`.
         """
         if self._hand_in_camera is None:
             return self._registration

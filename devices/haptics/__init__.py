@@ -1,1 +1,3 @@
-"""Force on a person's hand: contact rendered at the rate of the device, and the chain of limits that every force passes."""
+"""Force on a person's hand: contact rendered at the rate of the device, and the chain of limits that every
+force passes.
+"""

@@ -17,7 +17,9 @@ ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 _MOST_PLANES = 4
 _UNIT_TOLERANCE = 1e-3
-"""How far the length of a normal may be from 1: wide for rounding in transit, narrow for a vector that is none."""
+"""How far the length of a normal may be from 1: wide for rounding in transit, narrow for a vector that is
+none.
+"""
 
 
 class Plane(NamedTuple):
@@ -35,11 +37,16 @@ class Plane(NamedTuple):
 
 def planes_of(model: ContactModel) -> tuple[Plane, ...]:
     """Return the planes of a message."""
-    return tuple(Plane(p.normal.x, p.normal.y, p.normal.z, p.distance, p.velocity, p.stiffness, p.damping, p.friction) for p in model.planes)
+    return tuple(
+        Plane(p.normal.x, p.normal.y, p.normal.z, p.distance, p.velocity, p.stiffness, p.damping, p.friction)
+        for p in model.planes
+    )
 
 
 def checked(planes: Sequence[Plane]) -> tuple[Plane, ...] | None:
-    """Return `planes` with normals of length 1, or None if one is no plane: too many, not finite, a negative coefficient, a normal that is no direction."""
+    """Return `planes` with normals of length 1, or None if one is no plane: too many, not finite, a negative
+    coefficient, a normal that is no direction.
+    """
     if len(planes) > _MOST_PLANES:
         return None
     found: list[Plane] = []

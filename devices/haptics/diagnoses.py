@@ -12,8 +12,29 @@ __all__ = ["FORCE_DIAGNOSES"]
 FORCE_DIAGNOSES: Mapping[Condition, tuple[Level, str]] = {
     Condition.ON: (Level.OK, "force is on"),
     Condition.OFF: (Level.OK, "no force: the dead-man is not held"),
-    Condition.WAITING: (Level.WARN, "no force yet: the stylus is inside of something; move it out of the contact, and the force comes in slowly"),
-    Condition.SILENT: (Level.WARN, "no force: no contact model arrives; see whether the session runs, the link stands and the input 'contact' is connected"),
-    Condition.TOO_FAST: (Level.WARN, "no force: the hand was too fast; let go of the dead-man, then hold it again"),
-    Condition.INVALID: (Level.ERROR, "no force: a position, a velocity or a force is no number; see what the device and the contact model say"),
+    Condition.WAITING: (
+        Level.WARN,
+        (
+            "no force yet: the stylus is inside of something; move it out of the contact, and the force comes"
+            " in slowly"
+        ),
+    ),
+    Condition.SILENT: (
+        Level.WARN,
+        (
+            "no force: no contact model arrives; see whether the session runs, the link stands and the input"
+            " 'contact' is connected"
+        ),
+    ),
+    Condition.TOO_FAST: (
+        Level.WARN,
+        "no force: the hand was too fast; let go of the dead-man, then hold it again",
+    ),
+    Condition.INVALID: (
+        Level.ERROR,
+        (
+            "no force: a position, a velocity or a force is no number; see what the device and the contact"
+            " model say"
+        ),
+    ),
 }

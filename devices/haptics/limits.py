@@ -1,4 +1,6 @@
-"""The limits of a force on a hand, in SI units: what the chain in `devices.haptics.safety` holds, and what a device bears."""
+"""The limits of a force on a hand, in SI units: what the chain in `devices.haptics.safety` holds, and what a
+device bears.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +9,16 @@ from dataclasses import dataclass, replace
 __all__ = ["TOUCH", "DeviceLimits", "Limits"]
 
 _SHARE_OF_NOMINAL = 0.6
-"""Of a device's nominal maximum force that is used: the nominal force is a peak that the motors hold in the best posture only, and not for long."""
+"""Of a device's nominal maximum force that is used: the nominal force is a peak that the motors hold in the
+best posture only, and not for long.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceLimits:
-    """What a device bears, as its maker states it (HDAPI: HD_NOMINAL_MAX_FORCE, _STIFFNESS, _DAMPING in SI units)."""
+    """What a device bears, as its maker states it (HDAPI: HD_NOMINAL_MAX_FORCE, _STIFFNESS, _DAMPING in SI
+    units).
+    """
 
     force: float
     """N."""
@@ -33,10 +39,13 @@ TOUCH = DeviceLimits(force=3.3, stiffness=400.0, damping=4.0)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one stylus is held to. The defaults are the widest allowed, for a device that states no limits of its own.
+    """What one stylus is held to.
 
-    The defaults come from drivers in use: 2 N is the clamp of sawSensablePhantom, waiting for less than 0.2 N is CHAI3D's; 400 N/m never
-    oscillated in a simulated hand, 700 N/m did; the times are ours (docs/decisions/0022).
+    The defaults are the widest allowed, for a device that states no limits of its own.
+
+    The defaults come from drivers in use: 2 N is the clamp of sawSensablePhantom, waiting for less than 0.2 N
+    is CHAI3D's; 400 N/m never oscillated in a simulated hand, 700 N/m did; the times are ours
+    (docs/decisions/0022).
     """
 
     force: float = 2.0
@@ -54,7 +63,10 @@ class Limits:
     decay: float = 0.02
     """Time constant of the force's decay after that, s."""
     silence: float = 0.13
-    """Silence after which there is no force, s. A hub that dies has 150 ms until then, of which its last model and a busy device host may use up 20."""
+    """Silence after which there is no force, s.
+
+    A hub that dies has 150 ms until then, of which its last model and a busy device host may use up 20.
+    """
     ramp: float = 1.0
     """Time in which the force comes in after it was off, s."""
     calm_force: float = 0.2

@@ -1,4 +1,5 @@
-"""The haptic loop of one stylus: newest contact model in, a force that is safe out, at every tick of the device.
+"""The haptic loop of one stylus: newest contact model in, a force that is safe out, at every tick of the
+device.
 
 Plain floats and one clock, so that it fits into a servo callback: no numpy, no pydantic, no lock.
 """
@@ -18,14 +19,21 @@ from devices.vendor_axes import Vector3
 __all__ = ["HapticLoop"]
 
 _READ_BEFORE = 0.01
-"""A model may have arrived (s) after the tick's time was read, as another thread takes it; one from farther in the future has no true time."""
+"""A model may have arrived (s) after the tick's time was read, as another thread takes it; one from farther
+in the future has no true time.
+"""
 
 
 class HapticLoop:
-    """Renders the newest contact model and passes the force through the safety chain. All vectors in the device's base frame."""
+    """Renders the newest contact model and passes the force through the safety chain.
+
+    All vectors in the device's base frame.
+    """
 
     def __init__(self, limits: Limits, *, passivity: bool = False) -> None:
-        """Start without contact and without force; `passivity` adds the observer and controller of `devices.haptics.passivity`."""
+        """Start without contact and without force; `passivity` adds the observer and controller of
+        `devices.haptics.passivity`.
+        """
         self._limits = limits
         self._renderer = Renderer(limits.stiffness, limits.damping)
         self._chain = SafetyChain(limits)
@@ -47,10 +55,12 @@ class HapticLoop:
         return self._chain.condition
 
     def receive(self, planes: Sequence[Plane], stamp_ns: int, arrived: float) -> bool:
-        """Take a contact model with the stamp `stamp_ns` that arrived here at `arrived` (s, the clock of `tick`); say whether it is used.
+        """Take a contact model with the stamp `stamp_ns` that arrived here at `arrived` (s, the clock of
+        `tick`); say whether it is used.
 
-        Refused, as if it had never come: planes that are none, and a stamp not newer than the newest. After a silence in which the force went to zero any
-        stamp is a new beginning: another session starts at 0 again.
+        Refused, as if it had never come: planes that are none, and a stamp not newer than the newest. After a
+        silence in which the force went to zero any stamp is a new beginning: another session starts at 0
+        again.
         """
         if stamp_ns <= self._stamp_ns and arrived - self._arrived <= self._limits.silence:
             return False
@@ -61,10 +71,14 @@ class HapticLoop:
         self._planes, self._stamp_ns, self._arrived = valid, stamp_ns, arrived
         return True
 
-    def tick(self, now: float, position: Vector3, velocity: Vector3, *, permitted: bool, ready: bool = True) -> Vector3:
-        """Return the force (N) on the hand from now, in s of a clock that only goes forward, until the next tick.
+    def tick(
+        self, now: float, position: Vector3, velocity: Vector3, *, permitted: bool, ready: bool = True
+    ) -> Vector3:
+        """Return the force (N) on the hand from now, in s of a clock that only goes forward, until the next
+        tick.
 
-        `position` (m) and `velocity` (m/s) are the hand's. `permitted`: the dead-man is held. `ready`: the device is calibrated and well.
+        `position` (m) and `velocity` (m/s) are the hand's. `permitted`: the dead-man is held. `ready`: the
+        device is calibrated and well.
         """
         dt = now - self._now if self._now > -inf else 0.0
         self._now = now
@@ -85,7 +99,10 @@ class HapticLoop:
         return given
 
     def reset(self) -> None:
-        """Take the force away: what a device does in its last frame, and when it was lost. The contact model has to come anew."""
+        """Take the force away: what a device does in its last frame, and when it was lost.
+
+        The contact model has to come anew.
+        """
         self._chain.reset()
         self._renderer.reset()
         if self._passivity is not None:

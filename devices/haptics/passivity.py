@@ -1,8 +1,10 @@
-"""A passivity observer and controller: what is rendered may not give the hand more energy than the hand gave it.
+"""A passivity observer and controller: what is rendered may not give the hand more energy than the hand gave
+it.
 
-After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics and Automation 18(1), 2002. Between two ticks a
-device holds its force, so the work is exactly force times way. The book is closed whenever the hand is given no force: what was dissipated in one contact
-does not pay for the next.
+After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics and
+Automation 18(1), 2002. Between two ticks a device holds its force, so the work is exactly force times way.
+The book is closed whenever the hand is given no force: what was dissipated in one contact does not pay for
+the next.
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ class Passivity:
         self._position: Vector3 = ZERO
 
     def correct(self, wanted: Vector3, position: Vector3, velocity: Vector3, dt: float) -> Vector3:
-        """Return `wanted` (N), braked if the hand at `position` (m) with `velocity` (m/s) would get more energy within the next `dt` s than is in the book."""
+        """Return `wanted` (N), braked if the hand at `position` (m) with `velocity` (m/s) would get more
+        energy within the next `dt` s than is in the book.
+        """
         (gx, gy, gz), (x, y, z), (px, py, pz) = self._given, position, self._position
         work = gx * (x - px) + gy * (y - py) + gz * (z - pz)
         self.energy = self.energy - work if self._given != ZERO else 0.0

@@ -1,4 +1,6 @@
-"""The ports of one stylus, the same for every haptic device, so that one may stand for the other in a scenario."""
+"""The ports of one stylus, the same for every haptic device, so that one may stand for the other in a
+scenario.
+"""
 
 from __future__ import annotations
 
@@ -24,20 +26,51 @@ class StylusPorts(NamedTuple):
     contact: Port
 
 
-def stylus_ports(participant: str, stylus: str, *, clock: Literal["simulated", "wall"], max_age_ns: int) -> StylusPorts:
-    """Return the ports of a stylus; all vectors are along the axes of `<participant>_<stylus>_base` (x ahead, y left, z up)."""
+def stylus_ports(
+    participant: str, stylus: str, *, clock: Literal["simulated", "wall"], max_age_ns: int
+) -> StylusPorts:
+    """Return the ports of a stylus; all vectors are along the axes of `<participant>_<stylus>_base` (x ahead,
+    y left, z up).
+    """
     frame = f"{participant}_{stylus}_base"
 
-    def output(name: str, kind: str, description: str, max_age_ns: int = 0, variability: Literal["signal", "event"] = "signal") -> Port:
+    def output(
+        name: str,
+        kind: str,
+        description: str,
+        max_age_ns: int = 0,
+        variability: Literal["signal", "event"] = "signal",
+    ) -> Port:
         name = f"{stylus}/{name}"
-        return Port(name=name, causality="output", type=kind, variability=variability, frame=frame, max_age_ns=max_age_ns, clock=clock, description=description)
+        return Port(
+            name=name,
+            causality="output",
+            type=kind,
+            variability=variability,
+            frame=frame,
+            max_age_ns=max_age_ns,
+            clock=clock,
+            description=description,
+        )
 
     return StylusPorts(
-        output("pose", PoseStamped.ros_type, "of the tip; z out of the point, x to the right when it points away from the user", max_age_ns),
+        output(
+            "pose",
+            PoseStamped.ros_type,
+            "of the tip; z out of the point, x to the right when it points away from the user",
+            max_age_ns,
+        ),
         output("twist", TwistStamped.ros_type, "of the tip", max_age_ns),
         output("buttons", Joy.ros_type, "each press and release", variability="event"),
         output("force", WrenchStamped.ros_type, "that the hand is given"),
-        Port(name=f"{stylus}/contact", causality="input", type=ContactModel.ros_type, frame=frame, clock="simulated", description="what the hand is to feel"),
+        Port(
+            name=f"{stylus}/contact",
+            causality="input",
+            type=ContactModel.ros_type,
+            frame=frame,
+            clock="simulated",
+            description="what the hand is to feel",
+        ),
     )
 
 

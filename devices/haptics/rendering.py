@@ -1,8 +1,9 @@
 """From planes to a force: a spring-damper along each normal, and dry friction across it.
 
-Friction is a spring to an anchor on the surface (the tangential part of a god-object: Zilles and Salisbury, A constraint-based
-god-object method for haptic display, 1995). The anchor stays while the spring's force is within the friction cone, and is dragged along when it is not; so a
-hand at rest feels a constant force, where a law on the sign of the velocity would chatter.
+Friction is a spring to an anchor on the surface (the tangential part of a god-object: Zilles and Salisbury, A
+constraint-based god-object method for haptic display, 1995). The anchor stays while the spring's force is
+within the friction cone, and is dragged along when it is not; so a hand at rest feels a constant force, where
+a law on the sign of the velocity would chatter.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ from devices.vendor_axes import Vector3
 __all__ = ["DEAD_RECKONING", "Renderer"]
 
 DEAD_RECKONING = 0.05
-"""A surface goes on with its velocity for at most this time (s) after its model came: more would be a guess."""
+"""A surface goes on with its velocity for at most this time (s) after its model came: more would be a guess.
+"""
 
 
 class Renderer:
-    """Renders contact models; stiffness and damping are bounded in sum, so that four planes in one place are no stiffer than one."""
+    """Renders contact models; stiffness and damping are bounded in sum, so that four planes in one place are
+    no stiffer than one.
+    """
 
     def __init__(self, stiffness: float, damping: float) -> None:
         """Take the largest stiffness (N/m) and damping (N s/m) that may be rendered."""
@@ -32,7 +36,9 @@ class Renderer:
         self._anchor = None
 
     def force(self, planes: Sequence[Plane], age: float, position: Vector3, velocity: Vector3) -> Vector3:
-        """Return the force (N) on a hand at `position` (m) with `velocity` (m/s), all in the base frame, by planes that came `age` s ago."""
+        """Return the force (N) on a hand at `position` (m) with `velocity` (m/s), all in the base frame, by
+        planes that came `age` s ago.
+        """
         x, y, z = position
         ahead = min(age, DEAD_RECKONING)
         touched: list[tuple[Plane, float]] = []
@@ -45,7 +51,9 @@ class Renderer:
             return ZERO
         return self._pushed(touched, position, velocity, moving=age < DEAD_RECKONING)
 
-    def _pushed(self, touched: list[tuple[Plane, float]], position: Vector3, velocity: Vector3, *, moving: bool) -> Vector3:
+    def _pushed(
+        self, touched: list[tuple[Plane, float]], position: Vector3, velocity: Vector3, *, moving: bool
+    ) -> Vector3:
         vx, vy, vz = velocity
         stiff = _share([plane for plane, _ in touched], 5, self._stiffness)
         damp = _share([plane for plane, _ in touched], 6, self._damping)
@@ -67,13 +75,16 @@ class Renderer:
         return fx + rx, fy + ry, fz + rz
 
     def _rubbed(self, rubbing: list[_Rubbing], position: Vector3, velocity: Vector3) -> Vector3:
-        """Return the friction of all planes: each at most its cone's radius, against the way from their common anchor."""
+        """Return the friction of all planes: each at most its cone's radius, against the way from their
+        common anchor.
+        """
         x, y, z = position
         way = _difference(self._anchor or position, position)
         for nx, ny, nz, k, _, most in rubbing:
             across = _across(way, nx, ny, nz)
             shortened = _at_most(across, most / k)
-            along = ZERO if len(rubbing) == 1 else _difference(way, across)  # what is normal to one plane lies along another
+            # what is normal to one plane lies along another
+            along = ZERO if len(rubbing) == 1 else _difference(way, across)
             way = (along[0] + shortened[0], along[1] + shortened[1], along[2] + shortened[2])
         self._anchor = (x + way[0], y + way[1], z + way[2])
         fx = fy = fz = 0.0
@@ -106,10 +117,12 @@ def _at_most(v: Vector3, most: float) -> Vector3:
 
 
 def _share(planes: list[Plane], index: int, most: float) -> float:
-    """Return by which factor to weaken the coefficients number `index` (each at most `most`) that the sum does not exceed `most` in any direction.
+    """Return by which factor to weaken the coefficients number `index` (each at most `most`) that the sum
+    does not exceed `most` in any direction.
 
-    The sum of c n n^T over planes has no eigenvalue above the largest row sum of sqrt(c_i c_j) |n_i . n_j| (Gershgorin, on the Gram matrix); a plane with
-    friction acts in every direction, so its coefficient is added in full.
+    The sum of c n n^T over planes has no eigenvalue above the largest row sum of sqrt(c_i c_j) |n_i . n_j|
+    (Gershgorin, on the Gram matrix); a plane with friction acts in every direction, so its coefficient is
+    added in full.
     """
     if len(planes) == 1:
         return 1.0

@@ -1,8 +1,9 @@
 """The chain that every force passes before it reaches a hand, tick by tick.
 
-In this order: numbers that are none, silence of the simulation, dead-man and calibration, speed of the hand, waiting for a small force, norm, ramp, slew.
-(Stiffness and damping are bounded where planes are rendered.) Whatever is not allowed gives zero at once, and after zero for such a reason the force comes in
-slowly. The slew is last, so what it promises holds of the force that the hand feels.
+In this order: numbers that are none, silence of the simulation, dead-man and calibration, speed of the hand,
+waiting for a small force, norm, ramp, slew. (Stiffness and damping are bounded where planes are rendered.)
+Whatever is not allowed gives zero at once, and after zero for such a reason the force comes in slowly. The
+slew is last, so what it promises holds of the force that the hand feels.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ class Condition(Enum):
 class SafetyChain:
     """Holds the force of one stylus to its limits.
 
-    After every tick |F| <= limits.force, and F lies within `limits.slew` of the segment between zero and the force of the tick before: so |F| grows by `slew`
-    at most, nor does a turn add more in any new direction. It is zero in the same tick as anything forbids it.
+    After every tick |F| <= limits.force, and F lies within `limits.slew` of the segment between zero and the
+    force of the tick before: so |F| grows by `slew` at most, nor does a turn add more in any new direction.
+    It is zero in the same tick as anything forbids it.
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -42,21 +44,36 @@ class SafetyChain:
         self.reset()
 
     def reset(self) -> None:
-        """Take the force away; it comes in again as at the start. For a device that was lost, and for the last frame before it stops."""
+        """Take the force away; it comes in again as at the start.
+
+        For a device that was lost, and for the last frame before it stops.
+        """
         self._off(Condition.OFF)
 
     def soften(self, size: float) -> None:
-        """Take note of a contact that is there all at once and asks for the force `size` (N): what is not small comes in by the ramp."""
+        """Take note of a contact that is there all at once and asks for the force `size` (N): what is not
+        small comes in by the ramp.
+        """
         limits = self._limits
         if size > limits.calm_force:
             self._gain = min(self._gain, limits.calm_force / min(size, limits.force))
 
-    def tick(self, wanted: Vector3, velocity: Vector3, *, age: float, permitted: bool, dt: float, ready: bool = True) -> Vector3:
+    def tick(
+        self,
+        wanted: Vector3,
+        velocity: Vector3,
+        *,
+        age: float,
+        permitted: bool,
+        dt: float,
+        ready: bool = True,
+    ) -> Vector3:
         """Return the force (N) that the hand is given until the next tick.
 
-        `wanted` is the force that the contact asks for (N), `velocity` the hand's (m/s), `age` the time since a contact model arrived (s; infinite if none
-        did), `dt` the time since the last tick (s). `permitted`: the dead-man is held. `ready`: the device is calibrated and well; that it is not is no
-        letting go, which alone ends the lock of a hand that was too fast.
+        `wanted` is the force that the contact asks for (N), `velocity` the hand's (m/s), `age` the time since
+        a contact model arrived (s; infinite if none did), `dt` the time since the last tick (s). `permitted`:
+        the dead-man is held. `ready`: the device is calibrated and well; that it is not is no letting go,
+        which alone ends the lock of a hand that was too fast.
         """
         limits = self._limits
         size = hypot(*wanted)
@@ -67,14 +84,17 @@ class SafetyChain:
             return self._off(Condition.OFF)
         if not isfinite(size + speed + dt):
             return self._off(Condition.INVALID)
-        if not (age >= 0.0 and age + dt <= limits.silence):  # the force of this tick is felt until the next one
+        # the force of this tick is felt until the next one
+        if not (age >= 0.0 and age + dt <= limits.silence):
             return self._off(Condition.SILENT)
         if self._too_fast or speed > limits.speed:
             self._too_fast = True
             return self._off(Condition.TOO_FAST)
         self._fade(size, age, dt)
         scale = self._gain * min(1.0, limits.force / size) if size else 0.0
-        self.force = _slewed(self.force, (scale * wanted[0], scale * wanted[1], scale * wanted[2]), limits.slew)
+        self.force = _slewed(
+            self.force, (scale * wanted[0], scale * wanted[1], scale * wanted[2]), limits.slew
+        )
         return self.force
 
     def _fade(self, size: float, age: float, dt: float) -> None:
@@ -100,10 +120,12 @@ class SafetyChain:
 
 
 def _slewed(last: Vector3, wanted: Vector3, slew: float) -> Vector3:
-    """Return the force nearest to `wanted` that is no farther than `slew` from the segment between zero and `last`.
+    """Return the force nearest to `wanted` that is no farther than `slew` from the segment between zero and
+    `last`.
 
-    Let p be the segment's point nearest to `wanted`; the answer is p, moved towards `wanted` by at most `slew`: |answer| <= |p| + slew <= |last| + slew.
-    As p and `wanted` are no longer than the norm's limit, nor is anything between them.
+    Let p be the segment's point nearest to `wanted`; the answer is p, moved towards `wanted` by at most
+    `slew`: |answer| <= |p| + slew <= |last| + slew. As p and `wanted` are no longer than the norm's limit,
+    nor is anything between them.
     """
     lx, ly, lz = last
     wx, wy, wz = wanted

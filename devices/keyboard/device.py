@@ -1,4 +1,5 @@
-"""Keyboard or gamepad as a stylus or a head (kind `keyboard`), for people who have neither stylus nor headset.
+"""Keyboard or gamepad as a stylus or a head (kind `keyboard`), for people who have neither stylus nor
+headset.
 
 pygame-ce gives window, keys and gamepads on every desktop. The window is opened in the thread that reads.
 """
@@ -40,18 +41,25 @@ class KeyboardParams(Params):
     """What the keys move, and how fast."""
 
     stands_for: Annotated[
-        Literal["stylus", "head"], Field(description="whose axes the moved frame has: a stylus', z out of its point, or a head's, x ahead")
+        Literal["stylus", "head"],
+        Field(
+            description="whose axes the moved frame has: a stylus', z out of its point, or a head's, x ahead"
+        ),
     ] = "stylus"
     speed: Annotated[Speed, Field(gt=0.0, le=1.0, description="of the stylus' tip, at most")] = 0.1
     turn_speed: Annotated[float, Field(gt=0.0, le=10.0, description="of the stylus, at most, rad/s")] = 1.0
     rate: Annotated[float, Field(gt=0.0, le=1000.0, description="samples per second at most")] = 250.0
-    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = 100_000_000
+    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
+        100_000_000
+    )
 
 
 class Keyboard(Device):
-    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus; nothing but the last while its window is not in focus.
+    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus; nothing but the last
+    while its window is not in focus.
 
-    What is moved starts at the origin of `<participant>_base`, pointing level away from the user; devices.keyboard.keys has the keys.
+    What is moved starts at the origin of `<participant>_base`, pointing level away from the user;
+    devices.keyboard.keys has the keys.
     """
 
     params_model: ClassVar[type[Params]] = KeyboardParams
@@ -63,15 +71,37 @@ class Keyboard(Device):
         self._diagnosis = Diagnosis(name)
         frame = f"{name}_base"
         self._pose, self._twist = (
-            Port(name=port, causality="output", type=type_, frame=frame, max_age_ns=params.max_age, clock="wall", description=text)
+            Port(
+                name=port,
+                causality="output",
+                type=type_,
+                frame=frame,
+                max_age_ns=params.max_age,
+                clock="wall",
+                description=text,
+            )
             for port, type_, text in (
                 ("pose", "geometry_msgs/msg/PoseStamped", _FRAMES[params.stands_for]),
                 ("twist", "geometry_msgs/msg/TwistStamped", "of the same, along the axes of the base frame"),
             )
         )
         told = "each press and release: 0 the dead-man, 1 the jaw"
-        self._buttons = Port(name="buttons", causality="output", type="sensor_msgs/msg/Joy", variability="event", frame=frame, clock="wall", description=told)
-        self._gripper = Port(name="gripper", causality="output", type="std_msgs/msg/Float64", clock="wall", description="0 closed, 1 open")
+        self._buttons = Port(
+            name="buttons",
+            causality="output",
+            type="sensor_msgs/msg/Joy",
+            variability="event",
+            frame=frame,
+            clock="wall",
+            description=told,
+        )
+        self._gripper = Port(
+            name="gripper",
+            causality="output",
+            type="std_msgs/msg/Float64",
+            clock="wall",
+            description="0 closed, 1 open",
+        )
         self._window: Window | None = None
         self._begin()
 
@@ -86,11 +116,15 @@ class Keyboard(Device):
         return self._pose, self._twist, self._buttons, self._gripper, self._diagnosis.port
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
-        """Begin anew; the window is opened by the first `read`. Raises MissingExtraError where pygame is not installed."""
+        """Begin anew; the window is opened by the first `read`.
+
+        Raises MissingExtraError where pygame is not installed.
+        """
         if find_spec("pygame") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind keyboard)", "keyboard", "pygame-ce")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # which it would print
-        os.environ.setdefault("SDL_NO_SIGNAL_HANDLERS", "1")  # with its own a SIGTERM would no longer end this process
+        # with its own a SIGTERM would no longer end this process
+        os.environ.setdefault("SDL_NO_SIGNAL_HANDLERS", "1")
         self._diagnosis = Diagnosis(self.name)
         self._begin()
 
@@ -119,10 +153,15 @@ class Keyboard(Device):
             self._pressed = wish.dead_man, wish.jaw
             samples.append(button_sample(self._buttons, t, self._pressed))
         if not window.focused:
-            return samples + self._diagnosis.tell(Level.WARN, "keys are heard only while the window of this device is in focus; click into it")
+            return samples + self._diagnosis.tell(
+                Level.WARN, "keys are heard only while the window of this device is in focus; click into it"
+            )
         self._stylus.advance(wish, elapsed_ns * 1e-9)
         samples += self._diagnosis.tell(Level.OK, "keys are heard")
-        samples += [pose_sample(self._pose, t, *self._stylus.pose), twist_sample(self._twist, t, *self._stylus.twist)]
+        samples += [
+            pose_sample(self._pose, t, *self._stylus.pose),
+            twist_sample(self._twist, t, *self._stylus.twist),
+        ]
         return [*samples, Sample(self._gripper.name, Float64Message(data=self._stylus.gripper))]
 
     def close(self) -> None:

@@ -9,7 +9,11 @@ from devices.keyboard.virtual_stylus import NOTHING, Wish
 
 __all__ = ["LAYOUT", "Gamepad"]
 
-LAYOUT = ("Gamepad: left stick moves, right stick points,", "d-pad goes up and down and rolls,", "left shoulder is button 0, triggers move the gripper")
+LAYOUT = (
+    "Gamepad: left stick moves, right stick points,",
+    "d-pad goes up and down and rolls,",
+    "left shoulder is button 0, triggers move the gripper",
+)
 _FULL = 32767
 _DEAD_ZONE = 7849 / _FULL
 """Of a stick that nobody touches (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE of Microsoft's XInput)."""

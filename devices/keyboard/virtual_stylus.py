@@ -1,4 +1,6 @@
-"""A stylus that exists in numbers only: it moves as fast as keys and sticks ask, and stays where they left it."""
+"""A stylus that exists in numbers only: it moves as fast as keys and sticks ask, and stays where they left
+it.
+"""
 
 from __future__ import annotations
 
@@ -59,8 +61,12 @@ def _limited(share: Vector3, speed: float) -> Vector:
 class VirtualStylus:
     """Pose and twist in its base frame (x ahead, y left, z up), and how far its gripper is open."""
 
-    def __init__(self, speed: float, turn_speed: float, stands_for: Literal["stylus", "head"] = "stylus") -> None:
-        """Take the largest velocity (m/s) and angular velocity (rad/s), and whose axes its own frame is to have: a head's are x ahead, y left, z up."""
+    def __init__(
+        self, speed: float, turn_speed: float, stands_for: Literal["stylus", "head"] = "stylus"
+    ) -> None:
+        """Take the largest velocity (m/s) and angular velocity (rad/s), and whose axes its own frame is to
+        have: a head's are x ahead, y left, z up.
+        """
         self._speed, self._turn_speed = speed, turn_speed
         self._axes = np.array([0.0, 0.0, 0.0, 1.0]) if stands_for == "stylus" else rotation.conjugate(_LEVEL)
         self._position, self._orientation = np.zeros(3), _LEVEL
@@ -71,11 +77,16 @@ class VirtualStylus:
     def advance(self, wish: Wish, dt: float) -> None:
         """Move for `dt` seconds as `wish` says."""
         own = _limited(wish.angular, self._turn_speed)
-        self._linear, self._angular = _limited(wish.linear, self._speed), rotation.matrix(self._orientation) @ own
+        self._linear, self._angular = (
+            _limited(wish.linear, self._speed),
+            rotation.matrix(self._orientation) @ own,
+        )
         self._position = self._position + dt * self._linear
         turned = rotation.product(self._orientation, rotation.exp(dt * own))
         self._orientation = turned / np.linalg.norm(turned)
-        self.gripper = min(max(self.gripper + dt * _GRIPPER_SPEED * min(max(wish.gripper, -1.0), 1.0), 0.0), 1.0)
+        self.gripper = min(
+            max(self.gripper + dt * _GRIPPER_SPEED * min(max(wish.gripper, -1.0), 1.0), 0.0), 1.0
+        )
 
     @property
     def pose(self) -> tuple[Vector3, Quaternion]:

@@ -23,20 +23,29 @@ class Window:
     """Opened, asked and closed in one thread, as some systems demand."""
 
     def __init__(self, title: str) -> None:
-        """Open it. Raises DeviceError where there is no screen, or where another device of this process has it."""
+        """Open it.
+
+        Raises DeviceError where there is no screen, or where another device of this process has it.
+        """
         if pygame.display.get_init():
-            raise DeviceError("this process has a window for keys already; put the other keyboard into a host of its own")
+            raise DeviceError(
+                "this process has a window for keys already; put the other keyboard into a host of its own"
+            )
         try:
             pygame.display.init()
             self._check_seen()
             pygame.font.init()
-            self._surface = pygame.display.set_mode((_WIDTH, 2 * _MARGIN + _LINE * (len(KEYS) + 3 + len(LAYOUT))))
+            self._surface = pygame.display.set_mode(
+                (_WIDTH, 2 * _MARGIN + _LINE * (len(KEYS) + 3 + len(LAYOUT)))
+            )
             pygame.display.set_caption(f"Trocar: {title}")
             self._font = pygame.font.Font(None, _LINE)
             self._gamepad = Gamepad()
         except pygame.error as error:
             pygame.display.quit()
-            raise DeviceError(f"there is no screen to open a window on ({error}); log in to a desktop on this machine") from error
+            raise DeviceError(
+                f"there is no screen to open a window on ({error}); log in to a desktop on this machine"
+            ) from error
         except DeviceError:
             pygame.display.quit()
             raise
@@ -61,7 +70,10 @@ class Window:
         return wish_of(self._pressed) + self._gamepad.wish() if self.focused else Wish()
 
     def _heed(self, event: pygame.Event) -> None:
-        """Follow one event. A wish to close the window is not among them: the session decides how long it lives."""
+        """Follow one event.
+
+        A wish to close the window is not among them: the session decides how long it lives.
+        """
         if event.type == pygame.KEYDOWN:
             self._pressed.add(pygame.key.name(event.key))
         elif event.type == pygame.KEYUP:
@@ -74,7 +86,12 @@ class Window:
 
     def _draw(self) -> None:
         self._surface.fill(_PAPER)
-        self._write(0, 0, "Keys are heard" if self.focused else "Keys are not heard: click into this window", _INK if self.focused else _MARK)
+        self._write(
+            0,
+            0,
+            "Keys are heard" if self.focused else "Keys are not heard: click into this window",
+            _INK if self.focused else _MARK,
+        )
         for row, (key, (meaning, _)) in enumerate(KEYS.items(), start=2):
             colour = _MARK if key in self._pressed else _INK
             self._write(row, 0, key, colour)

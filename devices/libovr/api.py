@@ -1,8 +1,10 @@
-"""The C interface of LibOVR 1.32, as far as a head is concerned: layouts, functions and values of its public header, OVR_CAPI.h.
+"""The C interface of LibOVR 1.32, as far as a head is concerned: layouts, functions and values of its public
+header, OVR_CAPI.h.
 
-The library is part of the Oculus (Meta Quest Link) application of Windows, is loaded from where that has put it, and is 64-bit. What the SDK's own loader
-adds is done here: the flag RequestVersion and the minor version, by which the library chooses the layouts. Those whose size a compiler has
-shown are asserted below, with 8-byte alignment on every platform. Convention cdecl.
+The library is part of the Oculus (Meta Quest Link) application of Windows, is loaded from where that has put
+it, and is 64-bit. What the SDK's own loader adds is done here: the flag RequestVersion and the minor version,
+by which the library chooses the layouts. Those whose size a compiler has shown are asserted below, with
+8-byte alignment on every platform. Convention cdecl.
 """
 
 from __future__ import annotations
@@ -157,7 +159,10 @@ class ErrorInfo(Structure):
 
 _SIZES = {PoseState: 88, TrackingState: 312, InitParams: 32, HmdDesc: 264, SessionStatus: 9, ErrorInfo: 516}
 for _layout, _size in _SIZES.items():
-    assert ctypes.sizeof(_layout) == _size, f"{_layout.__name__} has {ctypes.sizeof(_layout)} bytes, LibOVR's has {_size}: LibOVR needs a 64-bit Python"
+    assert ctypes.sizeof(_layout) == _size, (
+        f"{_layout.__name__} has {ctypes.sizeof(_layout)} bytes, LibOVR's has {_size}: LibOVR needs a 64-bit"
+        " Python"
+    )
 
 _SESSION = c_void_p
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -185,7 +190,8 @@ def default_library() -> str:
 
 @cache
 def load(library: str) -> Api:
-    """Return the library at this path, or of this name where the system looks for libraries; a process loads it once.
+    """Return the library at this path, or of this name where the system looks for libraries; a process loads
+    it once.
 
     Raises DeviceError if it cannot be loaded or is another one.
     """
@@ -200,9 +206,15 @@ def load(library: str) -> Api:
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has the library, which, and what mends it where it has not: for `trocar doctor`. Starts nothing."""
+    """Return whether this machine has the library, which, and what mends it where it has not: for `trocar
+    doctor`. Starts nothing.
+    """
     remedy = "install the Oculus (Meta Quest Link) application (Windows)"
     try:
-        return True, f"{load(default_library()).ovr_GetVersionString().decode(errors='replace')}: headsets of Oculus", remedy
+        return (
+            True,
+            f"{load(default_library()).ovr_GetVersionString().decode(errors='replace')}: headsets of Oculus",
+            remedy,
+        )
     except DeviceError as error:
         return False, str(error), remedy

@@ -21,12 +21,28 @@ __all__ = ["LibOvr", "LibOvrParams"]
 class LibOvrParams(HeadsetParams):
     """Where the library is, and what it is asked for."""
 
-    library: Annotated[Path | None, Field(description="the LibOVR runtime, LibOVRRT64_1.dll; default: where the Oculus application has put it")] = None
-    origin: Annotated[Literal["eye", "floor"], Field(description="where height 0 is: at the eyes, or on the floor")] = "eye"
-    recenter: Annotated[bool, Field(description="once, when the head is first tracked, make its place and heading the origin")] = False
+    library: Annotated[
+        Path | None,
+        Field(
+            description=(
+                "the LibOVR runtime, LibOVRRT64_1.dll; default: where the Oculus application has put it"
+            )
+        ),
+    ] = None
+    origin: Annotated[
+        Literal["eye", "floor"], Field(description="where height 0 is: at the eyes, or on the floor")
+    ] = "eye"
+    recenter: Annotated[
+        bool, Field(description="once, when the head is first tracked, make its place and heading the origin")
+    ] = False
     angular_velocity: Annotated[
         Literal["base", "head"],
-        Field(description="the axes along which the runtime gives the angular velocity; its header does not say, see docs/decisions/0023"),
+        Field(
+            description=(
+                "the axes along which the runtime gives the angular velocity; its header does not say, see"
+                " docs/decisions/0023"
+            )
+        ),
     ] = "base"
 
 
@@ -48,7 +64,10 @@ class LibOvr(Headset):
         try:
             library = ovr.load(self._library)
         except DeviceError as error:
-            raise DeviceError(f"{error}: install the Oculus (Meta Quest Link) application, or say where the library is (`library`)") from error
+            raise DeviceError(
+                f"{error}: install the Oculus (Meta Quest Link) application, or say where the library is"
+                " (`library`)"
+            ) from error
         return _Session(library, self.params)
 
 
@@ -59,12 +78,26 @@ class _Session:
         self._api, self._params = api, params
         self._handle = c_void_p()
         self._recenter = params.recenter
-        asked = ovr.InitParams(Flags=ovr.REQUEST_VERSION | ovr.INVISIBLE, RequestedMinorVersion=ovr.MINOR_VERSION)
-        self._check(api.ovr_Initialize(byref(asked)), "LibOVR does not start", "start the Oculus (Meta Quest Link) application")
+        asked = ovr.InitParams(
+            Flags=ovr.REQUEST_VERSION | ovr.INVISIBLE, RequestedMinorVersion=ovr.MINOR_VERSION
+        )
+        self._check(
+            api.ovr_Initialize(byref(asked)),
+            "LibOVR does not start",
+            "start the Oculus (Meta Quest Link) application",
+        )
         try:
             luid = create_string_buffer(8)
-            self._check(api.ovr_Create(byref(self._handle), luid), "there is no headset", "plug it in and switch it on")
-            self._check(api.ovr_SetTrackingOriginType(self._handle, ovr.ORIGINS[params.origin]), "the origin cannot be set", "look at the Oculus application")
+            self._check(
+                api.ovr_Create(byref(self._handle), luid),
+                "there is no headset",
+                "plug it in and switch it on",
+            )
+            self._check(
+                api.ovr_SetTrackingOriginType(self._handle, ovr.ORIGINS[params.origin]),
+                "the origin cannot be set",
+                "look at the Oculus application",
+            )
         except DeviceError:
             self.close()
             raise
@@ -73,7 +106,11 @@ class _Session:
 
     def locate(self) -> HeadState | NoHead:
         status = ovr.SessionStatus()
-        self._check(self._api.ovr_GetSessionStatus(self._handle, byref(status)), "the headset is gone", "plug it in again")
+        self._check(
+            self._api.ovr_GetSessionStatus(self._handle, byref(status)),
+            "the headset is gone",
+            "plug it in again",
+        )
         if status.DisplayLost or status.ShouldQuit:
             raise DeviceError("the Oculus application has ended the session")
         if not status.HmdPresent:
@@ -83,8 +120,12 @@ class _Session:
         state = self._api.ovr_GetTrackingState(self._handle, 0.0, 0)  # time 0: the newest
         needed = ovr.ORIENTATION_TRACKED | ovr.POSITION_TRACKED
         if state.StatusFlags & needed != needed:
-            return NoHead(Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light")
-        if (self._recenter or status.ShouldRecenter) and self._api.ovr_RecenterTrackingOrigin(self._handle) < 0:
+            return NoHead(
+                Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light"
+            )
+        if (self._recenter or status.ShouldRecenter) and self._api.ovr_RecenterTrackingOrigin(
+            self._handle
+        ) < 0:
             return NoHead(Level.WARN, "the origin cannot be taken; hold the head level for a moment")
         if self._recenter or status.ShouldRecenter:
             self._recenter = False
@@ -92,7 +133,12 @@ class _Session:
         return self._head(state.HeadPose)
 
     def _head(self, head: ovr.PoseState) -> HeadState:
-        q, p, v, w = head.ThePose.Orientation, head.ThePose.Position, head.LinearVelocity, head.AngularVelocity
+        q, p, v, w = (
+            head.ThePose.Orientation,
+            head.ThePose.Position,
+            head.LinearVelocity,
+            head.AngularVelocity,
+        )
         orientation, angular = (q.x, q.y, q.z, q.w), (w.x, w.y, w.z)
         if self._params.angular_velocity == "head":
             x, y, z = (rotation.matrix(np.array(orientation)) @ angular).tolist()
@@ -104,7 +150,10 @@ class _Session:
         if result < 0:
             info = ovr.ErrorInfo()
             self._api.ovr_GetLastErrorInfo(byref(info))
-            raise DeviceError(f"{what}; {remedy} (LibOVR: {info.ErrorString.decode(errors='replace') or 'no reason given'}, {result})")
+            raise DeviceError(
+                f"{what}; {remedy} (LibOVR: {info.ErrorString.decode(errors='replace') or 'no reason given'},"
+                f" {result})"
+            )
 
     def close(self) -> None:
         """End the session."""

@@ -25,7 +25,9 @@ _LAST_FRAME_S = 0.1
 
 
 class Servo:
-    """All styluses of this host behind one callback: HDAPI has one scheduler thread, and a frame makes its device the current one."""
+    """All styluses of this host behind one callback: HDAPI has one scheduler thread, and a frame makes its
+    device the current one.
+    """
 
     def __init__(self, hd: Hdapi, styluses: list[Stylus]) -> None:
         """Take the styluses that were opened."""
@@ -56,7 +58,8 @@ class Servo:
         for stylus in self._styluses:
             hd.hdMakeCurrentDevice(stylus.handle)
             hd.hdDisable(FORCE_OUTPUT)
-            hd.hdDisableDevice(stylus.handle)  # crashes with FireWire devices (sawSensablePhantom): so it is the last that this process does
+            # crashes with FireWire devices (sawSensablePhantom): so it is the last that this process does
+            hd.hdDisableDevice(stylus.handle)
 
     def tick(self, now: float) -> int:
         """Do the frames of all devices at `now` (s); return what HDAPI wants to know: whether to go on."""
@@ -82,12 +85,14 @@ class Servo:
 
     def _call(self, _: object) -> int:
         if not self._known:
-            ctypes.pythonapi.PyGILState_Ensure()  # never released: else Python makes and unmakes its state of this thread at every tick
+            # never released: else Python makes and unmakes its state of this thread at every tick
+            ctypes.pythonapi.PyGILState_Ensure()
             self._known = True
         return self.tick(perf_counter())
 
     def _release(self, now: float) -> None:
         for stylus in self._styluses:
-            with contextlib.suppress(Exception):  # one that fails here must not keep the others from their last frame
+            # one that fails here must not keep the others from their last frame
+            with contextlib.suppress(Exception):
                 stylus.release()
                 stylus.tell(now)

@@ -38,7 +38,8 @@ _SETTLING = 1.0
 class Touch(Device):
     """The styluses of this machine.
 
-    A stylus that is absent, busy, not calibrated or faulty gives no pose, twist or force; its diagnosis says what to do, and it comes back by itself.
+    A stylus that is absent, busy, not calibrated or faulty gives no pose, twist or force; its diagnosis says
+    what to do, and it comes back by itself.
     """
 
     params_model: ClassVar[type[Params]] = TouchParams
@@ -58,34 +59,54 @@ class Touch(Device):
         return tuple(port for stylus in self._styluses.values() for port in stylus.ports)
 
     def open(self, directory: Path) -> None:
-        """Start the servo process. Raises DeviceError if there is no library, or it cannot be loaded; a stylus that is not there is looked for."""
+        """Start the servo process.
+
+        Raises DeviceError if there is no library, or it cannot be loaded; a stylus that is not there is
+        looked for.
+        """
         library = find(None if self.params.library is None else directory / self.params.library)
         self._styluses = self._new()
         self._offset_ns = -(2**63)
-        self._watch = Watch(library, {name: params.spec(name) for name, params in self.params.styluses.items()}, self._opened)
+        self._watch = Watch(
+            library, {name: params.spec(name) for name, params in self.params.styluses.items()}, self._opened
+        )
         self._watch.start(perf_counter())
 
     def read(self, t: int) -> list[Sample]:
-        """Return what the styluses did since the last call: every button, the newest pose, twist and force, and what changed about them."""
+        """Return what the styluses did since the last call: every button, the newest pose, twist and force,
+        and what changed about them.
+        """
         watch = self._watch
         if watch is None:
             return []
         now = perf_counter()
-        # Both clocks go alike, and `t` was read first: the largest difference is the true one, and stamps never go back.
+        # Both clocks go alike, and `t` was read first: the largest difference is the true one, and stamps
+        # never go back.
         self._offset_ns = max(self._offset_ns, t - round(now * 1e9))
         states = watch.poll(now)
-        return [s for name, stylus in self._styluses.items() for s in stylus.read(states.get(name, []), watch.lost.get(name), self._offset_ns)]
+        return [
+            s
+            for name, stylus in self._styluses.items()
+            for s in stylus.read(states.get(name, []), watch.lost.get(name), self._offset_ns)
+        ]
 
     def write(self, port: str, value: Value) -> None:
-        """Take a contact model, which is rendered from the next tick on. Raises MessageError for another port or type."""
+        """Take a contact model, which is rendered from the next tick on.
+
+        Raises MessageError for another port or type.
+        """
         name, _, what = port.partition("/")
         if what != "contact" or name not in self._styluses or not isinstance(value, ContactModel):
             takes = ", ".join(f"{stylus}/contact" for stylus in self._styluses)
-            raise MessageError(f"'{self.name}' takes a ContactModel on {takes}, not {type(value).__name__} on '{port}'")
+            raise MessageError(
+                f"'{self.name}' takes a ContactModel on {takes}, not {type(value).__name__} on '{port}'"
+            )
         process = None if self._watch is None else self._watch.process
         if process is not None and name in process.models:
             with self._writing:
-                process.models[name].write(model_doubles(planes_of(value), value.header.stamp.ns, perf_counter()))
+                process.models[name].write(
+                    model_doubles(planes_of(value), value.header.stamp.ns, perf_counter())
+                )
 
     def close(self) -> None:
         """Give the hands a last frame without force, and the devices back."""
@@ -94,7 +115,10 @@ class Touch(Device):
         self._watch = None
 
     def _new(self) -> dict[str, _Stylus]:
-        return {stylus: _Stylus(self.name, stylus, params, self.params.max_age) for stylus, params in self.params.styluses.items()}
+        return {
+            stylus: _Stylus(self.name, stylus, params, self.params.max_age)
+            for stylus, params in self.params.styluses.items()
+        }
 
     def _opened(self, process: ServoProcess, message: dict[str, Any]) -> None:
         self._styluses[message["stylus"]].opened(process, message["hardware"], message["limits"])
@@ -115,18 +139,32 @@ class _Stylus:
         self._settling: float | None = None
 
     def opened(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
-        """Let `process` give force within the scenario's limits, if the device bears them. What it does not state is that of a Touch."""
+        """Let `process` give force within the scenario's limits, if the device bears them.
+
+        What it does not state is that of a Touch.
+        """
         self._hardware, self._refusal = hardware, ""
-        bears = DeviceLimits(*(stated[name] if stated[name] > 0.0 else getattr(TOUCH, name) for name in ("force", "stiffness", "damping")))
+        bears = DeviceLimits(
+            *(
+                stated[name] if stated[name] > 0.0 else getattr(TOUCH, name)
+                for name in ("force", "stiffness", "damping")
+            )
+        )
         try:
-            process.allow(self._name, self._params.safety.within(bears), passivity=self._params.safety.passivity)
+            process.allow(
+                self._name, self._params.safety.within(bears), passivity=self._params.safety.passivity
+            )
         except ScenarioError as error:
             self._refusal = str(error)
 
     def read(self, states: list[State], lost: Lost | None, offset_ns: int) -> list[Sample]:
         """Return the samples of these states, in the clock that is `offset_ns` ahead of time.perf_counter."""
         if lost is not None:
-            diagnosis = diagnoses.FOUND if lost.found else diagnoses.lost(lost.phase, lost.code, lost.cause, self._params.device)
+            diagnosis = (
+                diagnoses.FOUND
+                if lost.found
+                else diagnoses.lost(lost.phase, lost.code, lost.cause, self._params.device)
+            )
             return [*self._gone(), *self._diagnosis.tell(*diagnosis, self._hardware)]
         samples: list[Sample] = []
         for state in states:

@@ -28,15 +28,27 @@ def lost(phase: Phase, code: int, cause: str, device: str | None) -> tuple[Level
     """Return the diagnosis of a stylus that cannot be had; `cause` is what is known beside the error's code."""
     why = cause or (Code.text(code) if code else "no cause is known")
     if phase is Phase.ABSENT:
-        known = f"that the vendor's setup program knows it as '{device}'" if device else "that the vendor's setup program has it as the default device"
-        return Level.ERROR, f"it cannot be opened ({why}): see that it is plugged in and switched on, and {known}; {_AGAIN}"
+        known = (
+            f"that the vendor's setup program knows it as '{device}'"
+            if device
+            else "that the vendor's setup program has it as the default device"
+        )
+        return (
+            Level.ERROR,
+            f"it cannot be opened ({why}): see that it is plugged in and switched on, and {known}; {_AGAIN}",
+        )
     if phase is Phase.BUSY:
-        return Level.ERROR, f"another program uses it{f' ({why})' if code else ''}: end that program; {_AGAIN}"
+        return (
+            Level.ERROR,
+            f"another program uses it{f' ({why})' if code else ''}: end that program; {_AGAIN}",
+        )
     return Level.ERROR, f"it has failed ({why}){': see to its cable and power' if code else ''}; {_AGAIN}"
 
 
 def present(state: State, refusal: str) -> tuple[Level, str]:
-    """Return the diagnosis of a stylus that is open; `refusal` says why its limits were refused, if they were."""
+    """Return the diagnosis of a stylus that is open; `refusal` says why its limits were refused, if they
+    were.
+    """
     phase = Phase(state.phase)
     if phase is Phase.SETTLING:
         return Level.STALE, "it gives no valid frames; if that lasts, switch it off and on"

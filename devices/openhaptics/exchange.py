@@ -1,8 +1,10 @@
-"""What a servo process and the device that started it tell each other: records of doubles in shared memory that no process can hold up.
+"""What a servo process and the device that started it tell each other: records of doubles in shared memory
+that no process can hold up.
 
-Each way is a ring with one writer and one reader. A slot carries its number and a checksum over number and content, so a record that is being overwritten is
-recognised, on any processor, and a writer that dies half-way leaves the slots before intact: neither side ever waits. The memory has no name that could
-outlive its users: on Linux the reading process inherits the file, on Windows it goes with the last handle.
+Each way is a ring with one writer and one reader. A slot carries its number and a checksum over number and
+content, so a record that is being overwritten is recognised, on any processor, and a writer that dies
+half-way leaves the slots before intact: neither side ever waits. The memory has no name that could outlive
+its users: on Linux the reading process inherits the file, on Windows it goes with the last handle.
 """
 
 from __future__ import annotations
@@ -19,13 +21,29 @@ from zlib import crc32
 from devices.haptics.contact import Plane
 from devices.vendor_axes import Vector3
 
-__all__ = ["STYLUS_BYTES", "RingReader", "RingWriter", "State", "attach", "create", "device_ends", "model_doubles", "planes_in", "ring_size", "servo_ends"]
+__all__ = [
+    "STYLUS_BYTES",
+    "RingReader",
+    "RingWriter",
+    "State",
+    "attach",
+    "create",
+    "device_ends",
+    "model_doubles",
+    "planes_in",
+    "ring_size",
+    "servo_ends",
+]
 
 _HEAD = struct.Struct("<QI4x")
 _COUNTER = 8
 
 MODEL_SLOTS, STATE_SLOTS = 2, 64
-"""Of models the newest counts. Of states none should be missed by a reader that stands still for some hundredths of a second: buttons are in them."""
+"""Of models the newest counts.
+
+Of states none should be missed by a reader that stands still for some hundredths of a second: buttons are in
+them.
+"""
 MOST_PLANES = 4
 MODEL_DOUBLES = 3 + MOST_PLANES * len(Plane._fields)
 """Of a contact model: arrival (s of time.perf_counter), stamp (ns), number of planes, and their numbers."""
@@ -54,7 +72,9 @@ class State(NamedTuple):
     phase: int
     """A `devices.openhaptics.stylus.Phase`."""
     code: int
-    """Of HDAPI: the error that goes with the phase, the calibration style while that is what is missing, or 0."""
+    """Of HDAPI: the error that goes with the phase, the calibration style while that is what is missing, or
+    0.
+    """
     buttons: int
     """Bit 0 is the first."""
     permitted: int
@@ -76,8 +96,12 @@ class State(NamedTuple):
     def of(cls, record: tuple[float, ...]) -> State:
         """Return the state in a record of the ring: its fields one after the other."""
         phase, code, buttons, permitted, cause = map(int, record[1:6])
-        position, linear, angular, force = ((record[i], record[i + 1], record[i + 2]) for i in (6, 18, 21, 24))
-        return cls(record[0], phase, code, buttons, permitted, cause, position, record[9:18], linear, angular, force)
+        position, linear, angular, force = (
+            (record[i], record[i + 1], record[i + 2]) for i in (6, 18, 21, 24)
+        )
+        return cls(
+            record[0], phase, code, buttons, permitted, cause, position, record[9:18], linear, angular, force
+        )
 
 
 def ring_size(slots: int, doubles: int) -> int:
@@ -113,12 +137,16 @@ class RingReader(_Ring):
     _seen = 0
 
     def read(self) -> list[tuple[float, ...]]:
-        """Return the records that were written since the last call, oldest first, without those that are overwritten by now."""
+        """Return the records that were written since the last call, oldest first, without those that are
+        overwritten by now.
+        """
         newest = self._newest[0]
         if newest == self._seen:
             return []
         first = max(self._seen + 1, newest - self._slots + 1)
-        found = [record for number in range(first, newest + 1) if (record := self._intact(number)) is not None]
+        found = [
+            record for number in range(first, newest + 1) if (record := self._intact(number)) is not None
+        ]
         self._seen = newest
         return found
 
@@ -136,7 +164,9 @@ STYLUS_BYTES = ring_size(MODEL_SLOTS, MODEL_DOUBLES) + ring_size(STATE_SLOTS, ST
 
 
 def servo_ends(memory: memoryview, index: int) -> tuple[RingReader, RingWriter]:
-    """Return where the servo process reads the contact models of stylus `index`, and where it writes its states."""
+    """Return where the servo process reads the contact models of stylus `index`, and where it writes its
+    states.
+    """
     models, states = _parts(memory, index)
     return RingReader(models, MODEL_SLOTS, MODEL_DOUBLES), RingWriter(states, STATE_SLOTS, STATE_DOUBLES)
 
@@ -154,7 +184,9 @@ def _parts(memory: memoryview, index: int) -> tuple[memoryview, memoryview]:
 
 
 def create(size: int) -> tuple[mmap.mmap, int | str]:
-    """Return new shared memory, and what `attach` needs in a process that inherits it: a file descriptor, which is to be closed, or on Windows a name."""
+    """Return new shared memory, and what `attach` needs in a process that inherits it: a file descriptor,
+    which is to be closed, or on Windows a name.
+    """
     if sys.platform == "win32":
         name = f"trocar-{uuid.uuid4()}"
         return mmap.mmap(-1, size, tagname=name), name

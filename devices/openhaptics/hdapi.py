@@ -1,7 +1,9 @@
-"""HDAPI, the C interface of 3D Systems' OpenHaptics 3, as far as a stylus is concerned: functions, values and errors of its public reference.
+"""HDAPI, the C interface of 3D Systems' OpenHaptics 3, as far as a stylus is concerned: functions, values and
+errors of its public reference.
 
-The library is proprietary, comes with the driver or the SDK, and is loaded from where these have put it. It takes a program of its own word size: the driver's
-hd.dll is 64-bit. A library that was unloaded does not load again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and a new process is how to recover.
+The library is proprietary, comes with the driver or the SDK, and is loaded from where these have put it. It
+takes a program of its own word size: the driver's hd.dll is 64-bit. A library that was unloaded does not load
+again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and a new process is how to recover.
 """
 
 from __future__ import annotations
@@ -45,11 +47,16 @@ PRIORITY_MAX = 65535
 SCHEDULER_HERTZ = 1000
 
 PLACEHOLDER_MM = (0.0, -110.0, -35.0)
-"""Position, with joint angles of exactly 0, that a Touch gives to a process that does not own it (hopezzzz/3dtouch, README)."""
+"""Position, with joint angles of exactly 0, that a Touch gives to a process that does not own it
+(hopezzzz/3dtouch, README).
+"""
 
 
 class Get:
-    """Parameters of hdGet...v and hdSet...v (HD/hdDefines.h). Plain numbers: members of an enumeration cost a servo callback a microsecond each."""
+    """Parameters of hdGet...v and hdSet...v (HD/hdDefines.h).
+
+    Plain numbers: members of an enumeration cost a servo callback a microsecond each.
+    """
 
     BUTTONS = 0x2000
     SAFETY_SWITCH = 0x2001
@@ -78,7 +85,9 @@ class Calibration(IntEnum):
 
 
 class Style(IntEnum):
-    """Bits of HD_CALIBRATION_STYLE, those to be preferred first: a Premium that offers two refuses the encoder reset."""
+    """Bits of HD_CALIBRATION_STYLE, those to be preferred first: a Premium that offers two refuses the
+    encoder reset.
+    """
 
     AUTO = 2
     INKWELL = 4
@@ -136,7 +145,9 @@ class ErrorInfo(Structure):
 
 assert ctypes.sizeof(ErrorInfo) == 12
 
-_library, _function = (ctypes.WinDLL, ctypes.WINFUNCTYPE) if sys.platform == "win32" else (ctypes.CDLL, ctypes.CFUNCTYPE)
+_library, _function = (
+    (ctypes.WinDLL, ctypes.WINFUNCTYPE) if sys.platform == "win32" else (ctypes.CDLL, ctypes.CFUNCTYPE)
+)
 SERVO_CALLBACK = _function(c_uint, c_void_p)
 """HDSchedulerCallback: returns CALLBACK_CONTINUE or CALLBACK_DONE. The object must outlive the schedule."""
 
@@ -162,7 +173,9 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "hdScheduleAsynchronous": (c_ulong, (SERVO_CALLBACK, c_void_p, c_ushort)),
     "hdUnschedule": (None, (c_ulong,)),
 }
-"""Result and arguments; HDulong and HDSchedulerHandle are the platform's long: 4 bytes on Windows, 8 on Linux."""
+"""Result and arguments; HDulong and HDSchedulerHandle are the platform's long: 4 bytes on Windows, 8 on
+Linux.
+"""
 
 _SWITCHES = "hdGetBooleanv"
 """Only a dead-man that is a switch needs it."""
@@ -175,17 +188,25 @@ Hdapi = Any
 
 
 def find(library: Path | None) -> Path:
-    """Return the path of the library: `library`, or where the installers of 3D Systems put it. Raises DeviceError naming the places looked at."""
+    """Return the path of the library: `library`, or where the installers of 3D Systems put it.
+
+    Raises DeviceError naming the places looked at.
+    """
     places = [library] if library is not None else list(_places())
     for place in places:
         if place.is_file():
             return place.resolve()
     looked = ", ".join(f"'{place}'" for place in places)
-    raise DeviceError(f"no library of OpenHaptics at {looked}. Install the Touch device driver and OpenHaptics of 3D Systems, or say 'library: PATH'")
+    raise DeviceError(
+        f"no library of OpenHaptics at {looked}. Install the Touch device driver and OpenHaptics of 3D"
+        " Systems, or say 'library: PATH'"
+    )
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has the library, where, and what mends it where it has not: for `trocar doctor`. Loads nothing."""
+    """Return whether this machine has the library, where, and what mends it where it has not: for `trocar
+    doctor`. Loads nothing.
+    """
     remedy = "install the Touch device driver and OpenHaptics of 3D Systems"
     try:
         return True, f"{find(None)}: haptic styluses of 3D Systems", remedy
@@ -196,14 +217,26 @@ def check() -> tuple[bool, str, str]:
 def _places() -> Iterator[Path]:
     if sys.platform == "win32":
         vendor = Path(os.environ.get("PROGRAMW6432", r"C:\Program Files")) / "3D Systems"
-        yield from (vendor / driver / "hd.dll" for driver in ("Touch Device Driver", "Phantom Device Drivers"))
-        for base in (os.environ.get("OH_SDK_BASE"), r"C:\OpenHaptics\Developer\3.5.0"):  # the variable may be stale
+        yield from (
+            vendor / driver / "hd.dll" for driver in ("Touch Device Driver", "Phantom Device Drivers")
+        )
+        # the variable may be stale
+        for base in (os.environ.get("OH_SDK_BASE"), r"C:\OpenHaptics\Developer\3.5.0"):
             if base:
                 yield Path(base) / "lib" / "x64" / "Release" / "hd.dll"
         yield Path(os.environ.get("SYSTEMROOT", r"C:\Windows")) / "System32" / "hd.dll"
     else:
         named = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
-        yield from (Path(folder) / "libHD.so" for folder in (*filter(None, named), "/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/local/lib"))
+        yield from (
+            Path(folder) / "libHD.so"
+            for folder in (
+                *filter(None, named),
+                "/usr/lib",
+                "/usr/lib64",
+                "/usr/lib/x86_64-linux-gnu",
+                "/usr/local/lib",
+            )
+        )
 
 
 def load(path: Path) -> Hdapi:
@@ -218,7 +251,10 @@ def load(path: Path) -> Hdapi:
                 function.restype, function.argtypes = result, arguments
     except (OSError, AttributeError) as error:
         word = ctypes.sizeof(c_void_p) * 8
-        raise DeviceError(f"OpenHaptics cannot be loaded from '{path}' ({error}); this Python has {word} bits, and so must the library") from error
+        raise DeviceError(
+            f"OpenHaptics cannot be loaded from '{path}' ({error}); this Python has {word} bits, and so must"
+            " the library"
+        ) from error
     return hd
 
 

@@ -11,13 +11,20 @@ from devices.vendor_axes import Vector3, vector
 __all__ = ["Tip"]
 
 _SMOOTHING = 0.01
-"""Time constant with which the angular velocity is smoothed, s: a Touch's gimbal has potentiometers, and a hand turns no faster than some Hz."""
+"""Time constant with which the angular velocity is smoothed, s: a Touch's gimbal has potentiometers, and a
+hand turns no faster than some Hz.
+"""
 _UNIT = 0.1
-"""How far the length of an axis may be from 1, squared: HDAPI's rotations have small errors, what is no rotation has great ones."""
+"""How far the length of an axis may be from 1, squared: HDAPI's rotations have small errors, what is no
+rotation has great ones.
+"""
 
 
 class Tip:
-    """Where the tip of a stylus is. Its own frame has z out of the point, x to the right and y down when it points level away from the user."""
+    """Where the tip of a stylus is.
+
+    Its own frame has z out of the point, x to the right and y down when it points level away from the user.
+    """
 
     def __init__(self, offset: float) -> None:
         """Take the way (m) from the centre of the gimbal, of which HDAPI speaks, to the tip."""
@@ -33,8 +40,11 @@ class Tip:
         """rad/s."""
 
     def move(self, t: Sequence[float], velocity: Sequence[float], now: float) -> bool:
-        """Take transform (16 numbers, column after column, mm) and velocity (mm/s) of HDAPI at `now` (s); return False if they are no pose."""
-        axes = vector(t[0], t[1], t[2]), vector(-t[4], -t[5], -t[6]), vector(-t[8], -t[9], -t[10])  # HDAPI's z is towards the user: out of the blunt end
+        """Take transform (16 numbers, column after column, mm) and velocity (mm/s) of HDAPI at `now` (s);
+        return False if they are no pose.
+        """
+        # HDAPI's z is towards the user: out of the blunt end
+        axes = vector(t[0], t[1], t[2]), vector(-t[4], -t[5], -t[6]), vector(-t[8], -t[9], -t[10])
         x, y, z = vector(t[12] * 1e-3, t[13] * 1e-3, t[14] * 1e-3)
         vx, vy, vz = vector(velocity[0] * 1e-3, velocity[1] * 1e-3, velocity[2] * 1e-3)
         for a, b, c in axes:
@@ -51,9 +61,11 @@ class Tip:
         return True
 
     def _turn(self, axes: tuple[Vector3, Vector3, Vector3], now: float) -> Vector3:
-        """Return the smoothed angular velocity: the sum of axis x axis' over the three axes of a turning frame is 2 sin(angle) along the axis of the turn.
+        """Return the smoothed angular velocity: the sum of axis x axis' over the three axes of a turning
+        frame is 2 sin(angle) along the axis of the turn.
 
-        HDAPI has one, but in which frame is not said, and a driver in use (Touch, ROS) notes that it does not work well.
+        HDAPI has one, but in which frame is not said, and a driver in use (Touch, ROS) notes that it does not
+        work well.
         """
         dt, self._time = now - self._time, now
         if not 0.0 < dt < inf:
@@ -66,5 +78,6 @@ class Tip:
             sy += bz * ax - bx * az
             sz += bx * ay - by * ax
         wx, wy, wz = self.angular
-        keep, take = _SMOOTHING / (_SMOOTHING + dt), 0.5 / (_SMOOTHING + dt)  # a first-order low-pass of sum / (2 dt)
+        # a first-order low-pass of sum / (2 dt)
+        keep, take = _SMOOTHING / (_SMOOTHING + dt), 0.5 / (_SMOOTHING + dt)
         return keep * wx + take * sx, keep * wy + take * sy, keep * wz + take * sz

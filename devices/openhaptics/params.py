@@ -20,9 +20,18 @@ _DEAD_MAN = "what is to be held for force: the index of a button, or the safety 
 class StylusParams(Params):
     """One stylus."""
 
-    device: Annotated[str | None, Field(min_length=1, description="its name in the vendor's setup program; default: the default device")] = None
-    dead_man: Annotated[Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch"], Field(description=_DEAD_MAN)] = 0
-    tip_offset: Annotated[Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")] = 0.039
+    device: Annotated[
+        str | None,
+        Field(
+            min_length=1, description="its name in the vendor's setup program; default: the default device"
+        ),
+    ] = None
+    dead_man: Annotated[
+        Annotated[int, Field(ge=0, le=3)] | Literal["safety-switch"], Field(description=_DEAD_MAN)
+    ] = 0
+    tip_offset: Annotated[
+        Length, Field(ge=0.0, le=0.2, description="from the centre of the gimbal to the tip")
+    ] = 0.039
     """The default is that of sawSensablePhantom (mtsSensableHD.cpp)."""
     safety: SafetyParams = SafetyParams()
 
@@ -34,11 +43,21 @@ class StylusParams(Params):
 class TouchParams(Params):
     """The styluses of one host: one process of one host may use OpenHaptics."""
 
-    library: Annotated[Path | None, Field(description="libHD.so or hd.dll, relative to the scenario; default: where the vendor's installers put it")] = None
+    library: Annotated[
+        Path | None,
+        Field(
+            description=(
+                "libHD.so or hd.dll, relative to the scenario; default: where the vendor's installers put it"
+            )
+        ),
+    ] = None
     styluses: Annotated[
-        dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], StylusParams], Field(min_length=1, description="by name: right, left")
+        dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], StylusParams],
+        Field(min_length=1, description="by name: right, left"),
     ]
-    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = 100_000_000
+    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
+        100_000_000
+    )
 
     @model_validator(mode="after")
     def _each_has_its_own(self) -> Self:
@@ -47,5 +66,8 @@ class TouchParams(Params):
             other = owners.setdefault(stylus.device, name)
             if other != name:
                 what = "the default device" if stylus.device is None else f"'{stylus.device}'"
-                raise ValueError(f"'{other}' and '{name}' are both {what}; give each a 'device', the name that the vendor's setup program has for it")
+                raise ValueError(
+                    f"'{other}' and '{name}' are both {what}; give each a 'device', the name that the"
+                    " vendor's setup program has for it"
+                )
         return self

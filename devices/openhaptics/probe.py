@@ -1,4 +1,7 @@
-"""A second servo process, which finds out whether styluses that were lost can be had again. It gives no force."""
+"""A second servo process, which finds out whether styluses that were lost can be had again.
+
+It gives no force.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,9 @@ class Probe:
         self._found: dict[str, Finding] = {}
 
     def poll(self, now: float) -> dict[str, Finding | None] | None:
-        """Return what was found of each stylus, once all is known, or time is up, and the process has let go of them; before that None."""
+        """Return what was found of each stylus, once all is known, or time is up, and the process has let go
+        of them; before that None.
+        """
         process = self._process
         for message in process.said():
             if "absent" in message:

@@ -1,4 +1,7 @@
-"""A servo process as the device sees it: started, told, listened to, ended. Nothing here waits for it but `close`."""
+"""A servo process as the device sees it: started, told, listened to, ended.
+
+Nothing here waits for it but `close`.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,9 @@ from devices.openhaptics.stylus import Spec
 __all__ = ["ServoProcess"]
 
 _ENVIRONMENT: dict[str, str] = {} if sys.platform == "win32" else {"GTDD_HOME": "/usr/share/3DSystems"}
-"""The Linux driver wants to be told where it keeps configuration and calibration of its devices (TouchDriver 2019.2.15)."""
+"""The Linux driver wants to be told where it keeps configuration and calibration of its devices (TouchDriver
+2019.2.15).
+"""
 _PATIENCE_S = 1.0
 
 
@@ -34,8 +39,12 @@ class ServoProcess:
         size = STYLUS_BYTES * len(specs)
         shared, handle = create(size)
         ends = [device_ends(memoryview(shared), index) for index in range(len(specs))]
-        self.models: dict[str, RingWriter] = {name: models for name, (models, _) in zip(self.names, ends, strict=True)}
-        self.states: dict[str, RingReader] = {name: states for name, (_, states) in zip(self.names, ends, strict=True)}
+        self.models: dict[str, RingWriter] = {
+            name: models for name, (models, _) in zip(self.names, ends, strict=True)
+        }
+        self.states: dict[str, RingReader] = {
+            name: states for name, (_, states) in zip(self.names, ends, strict=True)
+        }
         inherited = (handle,) if isinstance(handle, int) else ()
         try:
             self._process = subprocess.Popen(

@@ -1,7 +1,9 @@
-"""The servo process: it holds HDAPI and the servo callback, and nothing else. `devices.openhaptics.process` starts it.
+"""The servo process: it holds HDAPI and the servo callback, and nothing else. `devices.openhaptics.process`
+starts it.
 
-One line of JSON on its standard input says what to open; a second one, per stylus, within which limits force may be given. The end of
-the input is the end of the process: it comes when the device closes it, and when the device dies. Then the hand is given one last frame, without force.
+One line of JSON on its standard input says what to open; a second one, per stylus, within which limits force
+may be given. The end of the input is the end of the process: it comes when the device closes it, and when the
+device dies. Then the hand is given one last frame, without force.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ _HIGH_PRIORITY_CLASS = 0x80
 Say = Callable[[Mapping[str, Any]], None]
 
 
-def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say) -> Iterator[tuple[str, Stylus]]:
+def _opened(
+    hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say
+) -> Iterator[tuple[str, Stylus]]:
     """Open the devices; tell of each what it is and bears, or why it cannot be had."""
     for index, values in enumerate(config["styluses"]):
         spec = Spec(**values)
@@ -45,8 +49,14 @@ def _opened(hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say) 
             say({"stylus": spec.name, "absent": code})
             continue
         stylus = Stylus(hd, handle, spec, models, states)
-        model, serial = ((hd.hdGetString(what) or b"").decode(errors="replace") for what in (Get.MODEL, Get.SERIAL_NUMBER))
-        limits = {"force": _number(hd, Get.MAX_FORCE), "stiffness": 1e3 * _number(hd, Get.MAX_STIFFNESS), "damping": 1e3 * _number(hd, Get.MAX_DAMPING)}
+        model, serial = (
+            (hd.hdGetString(what) or b"").decode(errors="replace") for what in (Get.MODEL, Get.SERIAL_NUMBER)
+        )
+        limits = {
+            "force": _number(hd, Get.MAX_FORCE),
+            "stiffness": 1e3 * _number(hd, Get.MAX_STIFFNESS),
+            "damping": 1e3 * _number(hd, Get.MAX_DAMPING),
+        }
         errors(hd)
         say({"stylus": spec.name, "hardware": f"{model} {serial}".strip(), "limits": limits})
         yield spec.name, stylus
@@ -64,7 +74,9 @@ def _raise_priority() -> str:
         kernel = ctypes.windll.kernel32
         kernel.GetCurrentProcess.restype = ctypes.c_void_p
         kernel.SetPriorityClass.argtypes = (ctypes.c_void_p, ctypes.c_uint)
-        return "high" if kernel.SetPriorityClass(kernel.GetCurrentProcess(), _HIGH_PRIORITY_CLASS) else "normal"
+        return (
+            "high" if kernel.SetPriorityClass(kernel.GetCurrentProcess(), _HIGH_PRIORITY_CLASS) else "normal"
+        )
     with contextlib.suppress(PermissionError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY))
         return "real-time"
@@ -72,7 +84,9 @@ def _raise_priority() -> str:
 
 
 def _voice() -> Say:
-    """Return what writes a message to the device; the standard output is a library's to write to, and goes where errors go."""
+    """Return what writes a message to the device; the standard output is a library's to write to, and goes
+    where errors go.
+    """
     stream = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
 

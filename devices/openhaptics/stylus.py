@@ -1,4 +1,6 @@
-"""One stylus inside the servo callback: its frames, calibration, errors and force. Runs a thousand times a second: plain floats, one clock."""
+"""One stylus inside the servo callback: its frames, calibration, errors and force. Runs a thousand times a
+second: plain floats, one clock.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +76,10 @@ class Spec:
     device: str | None
     """Name of the device in the vendor's configuration; None: the default device."""
     dead_man: int | str
-    """Index of a button, or `safety-switch`. Not the inkwell's switch: a stylus that was dropped is out of it, too."""
+    """Index of a button, or `safety-switch`.
+
+    Not the inkwell's switch: a stylus that was dropped is out of it, too.
+    """
     tip_offset: float
     """From the centre of the gimbal to the tip, m."""
 
@@ -103,7 +108,9 @@ class Stylus:
         self._loop = HapticLoop(limits, passivity=passivity)
 
     def frame(self, now: float) -> list[tuple[int, int]]:
-        """Do one frame, which begins at `now` (s of time.perf_counter); return those errors (code, handle) of this tick that HDAPI no longer has."""
+        """Do one frame, which begins at `now` (s of time.perf_counter); return those errors (code, handle) of
+        this tick that HDAPI no longer has.
+        """
         hd = self._hd
         hd.hdBeginFrame(self.handle)
         hd.hdGetDoublev(Get.TRANSFORM, self._transform)
@@ -119,8 +126,9 @@ class Stylus:
     def note(self, code: int, now: float) -> None:
         """Take note of an error that HDAPI has on its stack after the frame at `now`.
 
-        Only a fault of the device (0x3xx) ends its use. Any other takes the force away, and lets it come back: a warning is meant so (0x2xx), and after a
-        complaint about the frame nobody knows what force was sent. A stylus that is not calibrated has none to take away.
+        Only a fault of the device (0x3xx) ends its use. Any other takes the force away, and lets it come
+        back: a warning is meant so (0x2xx), and after a complaint about the frame nobody knows what force was
+        sent. A stylus that is not calibrated has none to take away.
         """
         if Code.is_busy(code):
             self.phase, self._code = Phase.BUSY, code
@@ -151,7 +159,9 @@ class Stylus:
         return bool(self._switch.value)
 
     def _look(self) -> list[tuple[int, int]]:
-        """Look at the calibration, and update it where that can be done; return what HDAPI complained of before. Force output is on only while it stands."""
+        """Look at the calibration, and update it where that can be done; return what HDAPI complained of
+        before. Force output is on only while it stands.
+        """
         hd = self._hd
         calibration = hd.hdCheckCalibration()
         if (calibration == _CALIBRATED) is not self._calibrated:
@@ -160,12 +170,14 @@ class Stylus:
         if self._calibrated:
             return []
         self._style = self._style or self._best_style()
-        in_place = self._style != Style.ENCODER_RESET or self._buttons.value  # where a person has to put it, the person says so
+        # where a person has to put it, the person says so
+        in_place = self._style != Style.ENCODER_RESET or self._buttons.value
         if not (calibration == Calibration.NEEDS_UPDATE and in_place):
             return []
         complaints = errors(hd)  # also of the styluses whose frames came before
         hd.hdUpdateCalibration(self._style)
-        return complaints + [error for error in errors(hd) if Code.is_fault(error[0])]  # the others say that the device does not want it now
+        # the others say that the device does not want it now
+        return complaints + [error for error in errors(hd) if Code.is_fault(error[0])]
 
     def _best_style(self) -> int:
         self._hd.hdGetIntegerv(Get.CALIBRATION_STYLE, self._styles)
@@ -203,7 +215,9 @@ class Stylus:
             return ZERO
         for record in self._models.read():
             loop.receive(planes_in(record), int(record[1]), record[0])
-        return loop.tick(now, self._tip.position, self._tip.linear, permitted=self._permitted, ready=self.phase is _READY)
+        return loop.tick(
+            now, self._tip.position, self._tip.linear, permitted=self._permitted, ready=self.phase is _READY
+        )
 
     def _send(self, force: Vector3) -> None:
         """Set the force (N, base frame) and end the frame."""

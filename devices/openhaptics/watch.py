@@ -1,8 +1,9 @@
 """Keeps a servo process running with every stylus that can be had, and looks for those that cannot.
 
-All styluses of a host are in one process. When one of them is lost, the process is replaced by one with the others: HDAPI recovers in a new process only.
-Whether a lost one is back is found out by a second process beside the first, so that nobody who works loses force for it; it is
-taken in when no other hand holds its dead-man.
+All styluses of a host are in one process. When one of them is lost, the process is replaced by one with the
+others: HDAPI recovers in a new process only. Whether a lost one is back is found out by a second process
+beside the first, so that nobody who works loses force for it; it is taken in when no other hand holds its
+dead-man.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ _LOADING, _OPENING, _SILENCE = 20.0, 10.0, 1.0
 _ENDING = 1.0
 
 _NO_PRIORITY = (
-    "the servo process has no real-time priority, so the force may falter while the machine is busy: allow it with the line "
-    "'@users - rtprio 20' in /etc/security/limits.conf, and log in again"
+    "the servo process has no real-time priority, so the force may falter while the machine is busy: allow it"
+    " with the line '@users - rtprio 20' in /etc/security/limits.conf, and log in again"
 )
 
 
@@ -53,7 +54,9 @@ class Lost:
 class Watch:
     """The servo processes of one device. All methods are for one thread."""
 
-    def __init__(self, library: Path, specs: Mapping[str, Spec], opened: Callable[[ServoProcess, dict[str, Any]], None]) -> None:
+    def __init__(
+        self, library: Path, specs: Mapping[str, Spec], opened: Callable[[ServoProcess, dict[str, Any]], None]
+    ) -> None:
         """`opened` is told of every stylus that was opened: by which process, and what that said of it."""
         self._library, self._specs, self._opened = library, dict(specs), opened
         self.lost: dict[str, Lost] = {}
@@ -78,7 +81,10 @@ class Watch:
         said = self._process.said(_LOADING)
         if not said or "loaded" not in said[0]:
             self.close()
-            silent = f"the servo process ends or hangs when it loads '{self._library}': is that the library of OpenHaptics?"
+            silent = (
+                f"the servo process ends or hangs when it loads '{self._library}': is that the library of"
+                " OpenHaptics?"
+            )
             raise DeviceError(said[0].get("failed", silent) if said else silent)
         for message in said[1:]:
             self._hear(self._process, message, now)
@@ -172,7 +178,11 @@ class Watch:
 
     def _retry(self, now: float) -> None:
         """Start what can be started."""
-        due = [name for name in self._specs if name in self.lost and (self.lost[name].found or now >= self.lost[name].retry)]
+        due = [
+            name
+            for name in self._specs
+            if name in self.lost and (self.lost[name].found or now >= self.lost[name].retry)
+        ]
         if self._process is None and self._probe is None:
             names = [name for name in self._specs if name not in self.lost or name in due]
             if names:

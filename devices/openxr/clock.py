@@ -1,4 +1,6 @@
-"""The runtime's time: OpenXR tells it only by converting a clock of the operating system, by an extension of its own for each."""
+"""The runtime's time: OpenXR tells it only by converting a clock of the operating system, by an extension of
+its own for each.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,10 @@ from schemas.errors import DeviceError
 __all__ = ["EXTENSION", "runtime_clock"]
 
 if sys.platform == "win32":
-    EXTENSION, _FUNCTION = "XR_KHR_win32_convert_performance_counter_time", "xrConvertWin32PerformanceCounterToTimeKHR"
+    EXTENSION, _FUNCTION = (
+        "XR_KHR_win32_convert_performance_counter_time",
+        "xrConvertWin32PerformanceCounterToTimeKHR",
+    )
 else:
     EXTENSION, _FUNCTION = "XR_KHR_convert_timespec_time", "xrConvertTimespecTimeToTimeKHR"
 
@@ -29,7 +34,9 @@ class _Timespec(ctypes.Structure):
 
 
 def _now() -> Any:
-    """Return what the system's function gives: a count of the performance counter, or a timespec of the monotonic clock."""
+    """Return what the system's function gives: a count of the performance counter, or a timespec of the
+    monotonic clock.
+    """
     if sys.platform == "win32":
         count = c_int64()
         ctypes.windll.kernel32.QueryPerformanceCounter(byref(count))
@@ -38,9 +45,12 @@ def _now() -> Any:
 
 
 def runtime_clock(instance: xr.Instance) -> Callable[[], int]:
-    """Return a function that tells the time now as an XrTime, ns. The instance must have been made with `EXTENSION`.
+    """Return a function that tells the time now as an XrTime, ns.
 
-    The function raises TimeInvalidError where the runtime does not know the time yet, and DeviceError where it fails.
+    The instance must have been made with `EXTENSION`.
+
+    The function raises TimeInvalidError where the runtime does not know the time yet, and DeviceError where
+    it fails.
     """
     prototype = CFUNCTYPE(c_int32, c_void_p, c_void_p, POINTER(c_int64))
     convert = prototype(cast(xr.get_instance_proc_addr(instance, _FUNCTION), c_void_p).value or 0)
@@ -52,7 +62,9 @@ def runtime_clock(instance: xr.Instance) -> Callable[[], int]:
         if result == _TIME_INVALID or (not result and found.value <= 0):
             raise xr.TimeInvalidError
         if result:
-            raise DeviceError(f"the OpenXR runtime does not tell the time ({_FUNCTION} returned {result}); restart it")
+            raise DeviceError(
+                f"the OpenXR runtime does not tell the time ({_FUNCTION} returned {result}); restart it"
+            )
         return found.value
 
     return now

@@ -18,7 +18,10 @@ __all__ = ["OpenXr", "OpenXrParams", "check"]
 class OpenXrParams(HeadsetParams):
     """What the runtime is asked for; which runtime it is, the system says (on Linux also XR_RUNTIME_JSON)."""
 
-    origin: Annotated[Literal["eye", "floor"], Field(description="where height 0 is: at the eyes (space LOCAL), or on the floor (space STAGE)")] = "eye"
+    origin: Annotated[
+        Literal["eye", "floor"],
+        Field(description="where height 0 is: at the eyes (space LOCAL), or on the floor (space STAGE)"),
+    ] = "eye"
 
 
 class OpenXr(Headset):
@@ -47,7 +50,9 @@ def _hush() -> None:
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has a runtime that can be used, what was found, and what mends it: for `trocar doctor`. Starts nothing."""
+    """Return whether this machine has a runtime that can be used, what was found, and what mends it: for
+    `trocar doctor`. Starts nothing.
+    """
     if find_spec("xr") is None:
         return False, "pyopenxr is not installed", "pip install 'trocar[openxr]'"
     from devices.openxr.runtime import lacking, offered
@@ -58,4 +63,8 @@ def check() -> tuple[bool, str, str]:
         problem = lacking(offered())
     except DeviceError as error:
         return False, str(error), remedy
-    return not problem, problem or "the active runtime gives poses without pictures: head-mounted displays", remedy
+    return (
+        not problem,
+        problem or "the active runtime gives poses without pictures: head-mounted displays",
+        remedy,
+    )

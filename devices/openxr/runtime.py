@@ -1,4 +1,6 @@
-"""One session with an OpenXR runtime, without pictures: its states, the user's presence, and where the head is."""
+"""One session with an OpenXR runtime, without pictures: its states, the user's presence, and where the head
+is.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +19,26 @@ from schemas.errors import DeviceError
 __all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
 
 HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
-"""A session without graphics, which is needed; being told whether somebody wears the headset, which is welcome."""
+"""A session without graphics, which is needed; being told whether somebody wears the headset, which is
+welcome.
+"""
 ORIGINS = {"eye": xr.ReferenceSpaceType.LOCAL, "floor": xr.ReferenceSpaceType.STAGE}
 _VALID = xr.SpaceLocationFlags.ORIENTATION_VALID_BIT | xr.SpaceLocationFlags.POSITION_VALID_BIT
-"""Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the position."""
+"""Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the
+position.
+"""
 _Event = TypeVar("_Event", bound=Structure)
 
 
 def offered() -> set[str]:
-    """Return the names of the extensions of the system's active runtime, which this loads and does not start. Raises DeviceError where there is none."""
+    """Return the names of the extensions of the system's active runtime, which this loads and does not start.
+
+    Raises DeviceError where there is none.
+    """
     try:
-        return {extension.extension_name.decode() for extension in xr.enumerate_instance_extension_properties()}
+        return {
+            extension.extension_name.decode() for extension in xr.enumerate_instance_extension_properties()
+        }
     except xr.exception.XrException as error:
         raise _unanswered(error) from error
 
@@ -36,8 +47,8 @@ def lacking(found: set[str]) -> str:
     """Return what is wrong with a runtime that offers `found`; nothing if it can be asked for a head."""
     missing = [name for name in (HEADLESS, clock.EXTENSION) if name not in found]
     return (
-        f"this OpenXR runtime does not offer {' and '.join(missing)}, without which a head cannot be asked for; take one that does, such as"
-        " SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
+        f"this OpenXR runtime does not offer {' and '.join(missing)}, without which a head cannot be asked"
+        " for; take one that does, such as SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
         if missing
         else ""
     )
@@ -47,23 +58,34 @@ class OpenXrRuntime:
     """An instance, its session and two spaces: the origin and the head."""
 
     def __init__(self, origin: str) -> None:
-        """Connect to the runtime that the system has chosen. Raises DeviceError where there is none, or no headset."""
+        """Connect to the runtime that the system has chosen.
+
+        Raises DeviceError where there is none, or no headset.
+        """
         self._session: xr.Session | None = None
         self._instance = self._make_instance()
         self._running, self._present = False, True
         try:
             self._now = clock.runtime_clock(self._instance)
             system = xr.get_system(self._instance)
-            names = xr.get_instance_properties(self._instance).runtime_name, xr.get_system_properties(self._instance, system).system_name
+            names = (
+                xr.get_instance_properties(self._instance).runtime_name,
+                xr.get_system_properties(self._instance, system).system_name,
+            )
             self.hardware = ", ".join(name.decode(errors="replace") for name in names)
             self._session = xr.create_session(self._instance, xr.SessionCreateInfo(system_id=system))
             self._base, self._head = (
-                xr.create_reference_space(self._session, xr.ReferenceSpaceCreateInfo(reference_space_type=kind))
+                xr.create_reference_space(
+                    self._session, xr.ReferenceSpaceCreateInfo(reference_space_type=kind)
+                )
                 for kind in (ORIGINS[origin], xr.ReferenceSpaceType.VIEW)
             )
         except xr.exception.XrException as error:
             self.close()
-            raise DeviceError(f"there is no headset, or the OpenXR runtime refuses a session ({_said(error)}); plug it in and look at the runtime") from error
+            raise DeviceError(
+                f"there is no headset, or the OpenXR runtime refuses a session ({_said(error)}); plug it in"
+                " and look at the runtime"
+            ) from error
         except DeviceError:
             self.close()
             raise
@@ -72,10 +94,18 @@ class OpenXrRuntime:
     def _make_instance() -> xr.Instance:
         found = offered()
         version = xr.Version(1, 0, 0)
-        about = xr.ApplicationInfo(application_name="trocar", application_version=1, engine_name="trocar", engine_version=1, api_version=version)
+        about = xr.ApplicationInfo(
+            application_name="trocar",
+            application_version=1,
+            engine_name="trocar",
+            engine_version=1,
+            api_version=version,
+        )
         enabled = [HEADLESS, clock.EXTENSION, *({PRESENCE} & found)]
         try:
-            return xr.create_instance(xr.InstanceCreateInfo(application_info=about, enabled_extension_names=enabled))
+            return xr.create_instance(
+                xr.InstanceCreateInfo(application_info=about, enabled_extension_names=enabled)
+            )
         except xr.exception.XrException as error:  # also if it lacks something: only a failure makes the loader look for the active runtime anew
             raise DeviceError(lacking(found)) if lacking(found) else _unanswered(error) from error
 
@@ -84,14 +114,18 @@ class OpenXrRuntime:
         try:
             self._heed_events()
             if not self._running:
-                return NoHead(Level.WARN, "the OpenXR runtime has put the session to sleep; put the headset on")
+                return NoHead(
+                    Level.WARN, "the OpenXR runtime has put the session to sleep; put the headset on"
+                )
             if not self._present:
                 return NoHead(Level.WARN, "nobody wears the headset; put it on")
             return self._located(self._now())
         except xr.TimeInvalidError:  # SteamVR, at the start (cmbruns/pyopenxr_examples, issue 12)
             return NoHead(Level.WARN, "the OpenXR runtime does not tell the time yet; wait, or restart it")
         except xr.exception.XrException as error:
-            raise DeviceError(f"the OpenXR runtime or the headset is gone ({_said(error)}); start it, plug it in") from error
+            raise DeviceError(
+                f"the OpenXR runtime or the headset is gone ({_said(error)}); start it, plug it in"
+            ) from error
 
     def _located(self, now: int) -> HeadState | NoHead:
         velocity = xr.SpaceVelocity()
@@ -100,10 +134,20 @@ class OpenXrRuntime:
         if result.is_exception():
             raise result
         if location.location_flags & _VALID != _VALID:
-            return NoHead(Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light")
+            return NoHead(
+                Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light"
+            )
         p, q = location.pose.position, location.pose.orientation
-        linear = _vector(velocity.linear_velocity) if velocity.velocity_flags & xr.SpaceVelocityFlags.LINEAR_VALID_BIT else None
-        angular = _vector(velocity.angular_velocity) if velocity.velocity_flags & xr.SpaceVelocityFlags.ANGULAR_VALID_BIT else None
+        linear = (
+            _vector(velocity.linear_velocity)
+            if velocity.velocity_flags & xr.SpaceVelocityFlags.LINEAR_VALID_BIT
+            else None
+        )
+        angular = (
+            _vector(velocity.angular_velocity)
+            if velocity.velocity_flags & xr.SpaceVelocityFlags.ANGULAR_VALID_BIT
+            else None
+        )
         return HeadState(now * 1e-9, (p.x, p.y, p.z), (q.x, q.y, q.z, q.w), linear, angular)
 
     def _heed_events(self) -> None:
@@ -129,7 +173,9 @@ class OpenXrRuntime:
             xr.end_session(self._session)
             self._running = False
         elif state in (xr.SessionState.LOSS_PENDING, xr.SessionState.EXITING):
-            raise DeviceError("the OpenXR runtime has ended the session; plug the headset in and look at the runtime")
+            raise DeviceError(
+                "the OpenXR runtime has ended the session; plug the headset in and look at the runtime"
+            )
 
     def close(self) -> None:
         """Destroy session and instance; what is gone already is left."""
@@ -149,7 +195,9 @@ def _vector(v: xr.Vector3f) -> Vector3:
 
 
 def _unanswered(error: xr.exception.XrException) -> DeviceError:
-    return DeviceError(f"no OpenXR runtime answers ({_said(error)}); start one, and make it the system's active one")
+    return DeviceError(
+        f"no OpenXR runtime answers ({_said(error)}); start one, and make it the system's active one"
+    )
 
 
 def _said(error: Exception) -> str:

@@ -1,4 +1,6 @@
-"""The commands `trocar ros`: which gateways run, who is connected to them, and what goes through; and `trocar ros bag`."""
+"""The commands `trocar ros`: which gateways run, who is connected to them, and what goes through; and `trocar
+ros bag`.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,17 @@ app = typer.Typer()
 def ros(
     context: typer.Context,
     *,
-    connect: Annotated[list[str] | None, typer.Option(metavar="ENDPOINT", help="Where a hub of this machine listens; by default all are asked.")] = None,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Where a hub of this machine listens; by default all are asked."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Show which gateways to ROS run in which session, which programs are connected to them, and the rates of all topics."""
+    """Show which gateways to ROS run in which session, which programs are connected to them, and the rates of
+    all topics.
+    """
     if context.invoked_subcommand is not None:
         return
     from devices.ros.watch import running_gateways
@@ -37,11 +46,22 @@ def ros(
 
     gateways = running_gateways(connect or listening_endpoints())
     if as_json:
-        typer.echo(json.dumps([{"session": session, "gateway": name} | status.model_dump() for (session, name), status in gateways.items()], indent=2))
+        typer.echo(
+            json.dumps(
+                [
+                    {"session": session, "gateway": name} | status.model_dump()
+                    for (session, name), status in gateways.items()
+                ],
+                indent=2,
+            )
+        )
         return
     out = Console(highlight=False)
     if not gateways:
-        out.print("no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`: trocar run ros", soft_wrap=True)
+        out.print(
+            "no gateway to ROS is running; a scenario has one with `kind: ros2-zenoh`: trocar run ros",
+            soft_wrap=True,
+        )
     for (session, name), status in gateways.items():
         _print(out, session, name, status)
 
@@ -50,27 +70,52 @@ def ros(
 def bag(
     recording: RecordingPath,
     *,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The directory to write; by default <recording>-ros beside it.")] = None,
-    gateway: Annotated[str | None, typer.Option(help="Whose topics, where a session has several gateways.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The directory to write; by default <recording>-ros beside it."),
+    ] = None,
+    gateway: Annotated[
+        str | None, typer.Option(help="Whose topics, where a session has several gateways.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write what a recorded session has told ROS programs, and heard from them, as a bag with ROS names, for `ros2 bag play`."""
+    """Write what a recorded session has told ROS programs, and heard from them, as a bag with ROS names, for
+    `ros2 bag play`.
+    """
     from devices.ros.bags.export import export
     from hub.recording.recording import Recording
 
     stem = recording.parent if recording.is_file() else recording
-    show(asdict(export(Recording(recording), output or stem.with_name(f"{stem.resolve().name}-ros"), gateway)), as_json=as_json)
+    show(
+        asdict(export(Recording(recording), output or stem.with_name(f"{stem.resolve().name}-ros"), gateway)),
+        as_json=as_json,
+    )
 
 
 def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None:
-    clients = ", ".join(f"{client.name}{f' ({client.address})' if client.address else ''}" for client in status.clients)
-    out.print(f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'nobody'}", soft_wrap=True)
-    shown = table(_rows(status), "topic", "direction", "per second", "messages", "refused", "why the last one")
-    shown.columns[0].min_width = max((len(topic.topic) for topic in status.topics), default=0)  # nobody can read half a name
+    clients = ", ".join(
+        f"{client.name}{f' ({client.address})' if client.address else ''}" for client in status.clients
+    )
+    out.print(
+        f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'nobody'}",
+        soft_wrap=True,
+    )
+    shown = table(
+        _rows(status), "topic", "direction", "per second", "messages", "refused", "why the last one"
+    )
+    # nobody can read half a name
+    shown.columns[0].min_width = max((len(topic.topic) for topic in status.topics), default=0)
     out.print(shown)
 
 
 def _rows(status: GatewayStatus) -> Iterable[tuple[Any, ...]]:
     words = {"publish": "told", "subscribe": "heard", "serve": "answered"}
     for topic in sorted(status.topics, key=lambda topic: topic.topic):
-        yield topic.topic, words[topic.way], f"{topic.rate:.1f}", topic.messages, topic.refused or "", escape(topic.reason)
+        yield (
+            topic.topic,
+            words[topic.way],
+            f"{topic.rate:.1f}",
+            topic.messages,
+            topic.refused or "",
+            escape(topic.reason),
+        )

@@ -1,7 +1,7 @@
 """A gateway to ROS, whatever the middleware: the base of kinds such as `ros2-zenoh`.
 
-It makes publishers, subscribers, services and ports from one table (`devices.ros.topics.face`), and knows no physics. A gateway for another middleware is
-a `connect` that returns another transport.
+It makes publishers, subscribers, services and ports from one table (`devices.ros.topics.face`), and knows no
+physics. A gateway for another middleware is a `connect` that returns another transport.
 """
 
 from __future__ import annotations
@@ -56,9 +56,18 @@ class Gateway(Device):
         self.rows = self.table()
         """All topics and services."""
         told = "once a second: who is connected, and what goes through"
-        self._status = Port(name="gateway", causality="output", type=GatewayStatus.ros_type, variability="event", clock="wall", description=told)
+        self._status = Port(
+            name="gateway",
+            causality="output",
+            type=GatewayStatus.ros_type,
+            variability="event",
+            clock="wall",
+            description=told,
+        )
         self._ports = (*(row.port for row in self.rows if row.port is not None), self._status)
-        self._inputs = {row.port.name: row for row in self.rows if row.port is not None and row.way == "publish"}
+        self._inputs = {
+            row.port.name: row for row in self.rows if row.port is not None and row.way == "publish"
+        }
         self._early: dict[str, Value] = {}
         """The last message on each latched topic from before the gateway was open."""
         self._transport: Transport | None = None
@@ -82,7 +91,10 @@ class Gateway(Device):
 
     @abstractmethod
     def connect(self, directory: Path) -> Transport:
-        """Join the ROS graph. Raises MissingExtraError or DeviceError where that cannot be; relative paths start at `directory`."""
+        """Join the ROS graph.
+
+        Raises MissingExtraError or DeviceError where that cannot be; relative paths start at `directory`.
+        """
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -101,15 +113,23 @@ class Gateway(Device):
         for row in self.rows:
             if row.way == "subscribe":
                 commander = self._commanders[row.owner] if row.leads else None
-                transport.subscribe(row, Incoming(row, commander, self._traffic[row], self._hand_on, self._refusals.tell).take)
+                transport.subscribe(
+                    row, Incoming(row, commander, self._traffic[row], self._hand_on, self._refusals.tell).take
+                )
             elif row.way == "serve":
                 transport.serve(row, self._handler(row))
 
     def _advertised(self, transport: Transport) -> list[Periodic]:
         """Advertise all that is published; return what is published all the time."""
-        rows = [(row, transport.advertise(row), self._traffic[row]) for row in self.rows if row.way == "publish"]
-        self._states = {row.port.name: State(row.port) for row, _, _ in rows if row.port is not None and row.periodic}
-        whole: Mapping[str, Source] = scenery(self.params, self._states) if self.params.profile == "dvrk" else {}
+        rows = [
+            (row, transport.advertise(row), self._traffic[row]) for row in self.rows if row.way == "publish"
+        ]
+        self._states = {
+            row.port.name: State(row.port) for row, _, _ in rows if row.port is not None and row.periodic
+        }
+        whole: Mapping[str, Source] = (
+            scenery(self.params, self._states) if self.params.profile == "dvrk" else {}
+        )
         periodic: list[Periodic] = []
         for row, publish, count in rows:
             if row.port is not None and row.periodic:
@@ -117,7 +137,9 @@ class Gateway(Device):
             elif row.port is not None:
                 self._events[row.port.name] = Event(publish, count)
             elif row.name in whole:
-                periodic.append(Periodic(whole[row.name], publish, count, stride(row.name, self.params.publish_period)))
+                periodic.append(
+                    Periodic(whole[row.name], publish, count, stride(row.name, self.params.publish_period))
+                )
             elif self.params.robot_description is not None:
                 Event(publish, count).write(StringMessage(data=description(self.params.robot_description)))
         return periodic
@@ -157,7 +179,9 @@ class Gateway(Device):
         """Take the newest value of a state, or publish a message. Never blocks."""
         row = self._inputs.get(port)
         if row is None:
-            raise MessageError(f"device '{self.name}' has no input '{port}'.{did_you_mean(port, self._inputs)}")
+            raise MessageError(
+                f"device '{self.name}' has no input '{port}'.{did_you_mean(port, self._inputs)}"
+            )
         if row.name == "operating_state" and isinstance(value, OperatingState):
             self._commanders[row.owner].busy = value.is_busy
         if port in self._states:

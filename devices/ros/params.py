@@ -29,7 +29,12 @@ class Arms(Params):
     @property
     def shown(self) -> Mapping[CartArm, MountedPsm | MountedEcm]:
         """Those that are there, by name."""
-        named: dict[CartArm, MountedPsm | MountedEcm | None] = {"PSM1": self.PSM1, "PSM2": self.PSM2, "PSM3": self.PSM3, "ECM": self.ECM}
+        named: dict[CartArm, MountedPsm | MountedEcm | None] = {
+            "PSM1": self.PSM1,
+            "PSM2": self.PSM2,
+            "PSM3": self.PSM3,
+            "ECM": self.ECM,
+        }
         return {name: arm for name, arm in named.items() if arm is not None}
 
 
@@ -37,35 +42,65 @@ class HeardParams(Params):
     """Whose commands are heard, and which real arms."""
 
     profile: Literal["dvrk", "paper"] = Field(
-        default="dvrk", description="topics of the real system, or of the authors' simulator, behind which a participant of kind `paper` stands"
+        default="dvrk",
+        description=(
+            "topics of the real system, or of the authors' simulator, behind which a participant of kind"
+            " `paper` stands"
+        ),
     )
-    arms: Arms = Field(default=Arms(), description="the simulated arms, as the motion controller is told them")
+    arms: Arms = Field(
+        default=Arms(), description="the simulated arms, as the motion controller is told them"
+    )
     listen: tuple[Real, ...] = Field(
-        default=(), description="real arms: their states come in, and commands to them go out; `footpedals`: what is pressed comes in, instead of going out"
+        default=(),
+        description=(
+            "real arms: their states come in, and commands to them go out; `footpedals`: what is pressed"
+            " comes in, instead of going out"
+        ),
     )
     teleoperations: tuple[Annotated[str, Field(pattern=r"^MTM[LR]_(PSM[123]|ECM)$")], ...] = Field(
         default=(), description="teleoperation components of the console, such as MTMR_PSM1"
     )
     namespace: Annotated[str, Field(pattern=r"^([A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*)?$")] = Field(
-        default="", description="put before every topic that is not of a real arm, so that simulation and real system share one graph"
+        default="",
+        description=(
+            "put before every topic that is not of a real arm, so that simulation and real system share one"
+            " graph"
+        ),
     )
 
     @model_validator(mode="after")
     def _shown_or_listened_to(self) -> Self:
         both = sorted(set(self.arms.shown) & set(self.listen))
         if both:
-            raise ValueError(f"{', '.join(both)}: an arm is either simulated (`arms`) or real (`listen`); for both take two gateways, one with a `namespace`")
+            raise ValueError(
+                f"{', '.join(both)}: an arm is either simulated (`arms`) or real (`listen`); for both take"
+                " two gateways, one with a `namespace`"
+            )
         return self
 
 
 class GatewayParams(HeardParams):
     """Which part of the dVRK is shown, and which real one is listened to."""
 
-    mounting: Literal["free", "cart"] = Field(default="free", description="as the motion controller is told it")
-    reference: Literal["camera", "base", "world"] = Field(default="camera", description="as the motion controller is told it")
-    cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(default=("endoscope",), description="names of stereo cameras")
-    publish_period: Duration = Field(default=10_000_000, ge=500_000, description="of all states in wall time, whatever the step; 10 ms as on the dVRK")
-    robot_description: Path | None = Field(default=None, description="URDF file that is published as robot_description, as `trocar model export` writes it")
+    mounting: Literal["free", "cart"] = Field(
+        default="free", description="as the motion controller is told it"
+    )
+    reference: Literal["camera", "base", "world"] = Field(
+        default="camera", description="as the motion controller is told it"
+    )
+    cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(
+        default=("endoscope",), description="names of stereo cameras"
+    )
+    publish_period: Duration = Field(
+        default=10_000_000,
+        ge=500_000,
+        description="of all states in wall time, whatever the step; 10 ms as on the dVRK",
+    )
+    robot_description: Path | None = Field(
+        default=None,
+        description="URDF file that is published as robot_description, as `trocar model export` writes it",
+    )
 
     @field_validator("robot_description")
     @classmethod

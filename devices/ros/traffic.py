@@ -46,5 +46,18 @@ class Traffic:
             if not count.messages:
                 continue
             rate, self._before[row] = (count.messages - self._before[row]) / seconds, count.messages
-            topics.append(GatewayTopic(topic=row.topic, way=row.way, rate=rate, messages=count.messages, refused=count.refused, reason=count.reason))
-        return GatewayStatus(kind=self._kind, clients=[GatewayClient(name=c.name, address=c.address) for c in clients], topics=topics)
+            topics.append(
+                GatewayTopic(
+                    topic=row.topic,
+                    way=row.way,
+                    rate=rate,
+                    messages=count.messages,
+                    refused=count.refused,
+                    reason=count.reason,
+                )
+            )
+        return GatewayStatus(
+            kind=self._kind,
+            clients=[GatewayClient(name=c.name, address=c.address) for c in clients],
+            topics=topics,
+        )

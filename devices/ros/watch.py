@@ -23,7 +23,9 @@ _WATCH_S = 1.5
 
 
 def running_gateways(endpoints: Iterable[str]) -> Mapping[tuple[str, str], GatewayStatus]:
-    """Return the status of every gateway, by session and name, of the hubs that listen on `endpoints`; whoever else listens there is passed over."""
+    """Return the status of every gateway, by session and name, of the hubs that listen on `endpoints`;
+    whoever else listens there is passed over.
+    """
     found: dict[tuple[str, str], GatewayStatus] = {}
     lock = Lock()
 
@@ -36,7 +38,9 @@ def running_gateways(endpoints: Iterable[str]) -> Mapping[tuple[str, str], Gatew
     for endpoint in endpoints:
         with suppress(ConnectError, zenoh.ZError):
             client = open_session("client", connect=[endpoint])
-            client.declare_subscriber(Keys("*").output("device", "*", "gateway"), Callback(take, indirect=True))
+            client.declare_subscriber(
+                Keys("*").output("device", "*", "gateway"), Callback(take, indirect=True)
+            )
             clients.append(client)
     if clients:
         sleep(_WATCH_S)

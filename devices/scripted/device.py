@@ -1,7 +1,7 @@
 """Plays a recording of device samples as if somebody held the device.
 
-Time 0 is the first message of the recording, and log times give the pace (as in `ros2 bag play`). The stamps in the
-headers become the times at which the samples are played, in the port's clock.
+Time 0 is the first message of the recording, and log times give the pace (as in `ros2 bag play`). The stamps
+in the headers become the times at which the samples are played, in the port's clock.
 """
 
 from __future__ import annotations
@@ -29,11 +29,25 @@ __all__ = ["ScriptedDevice", "ScriptedParams"]
 class ScriptedParams(Params):
     """What is played, and how."""
 
-    samples: Annotated[Path, Field(description="recording of device samples: an .mcap file or a rosbag2 directory, relative to the scenario")]
-    time: Annotated[Literal["simulated", "wall"], Field(description="the clock by which the samples are played")] = "simulated"
-    rate: Annotated[float, Field(gt=0, allow_inf_nan=False, description="speed of playing; 2 is twice as fast as recorded")] = 1.0
+    samples: Annotated[
+        Path,
+        Field(
+            description=(
+                "recording of device samples: an .mcap file or a rosbag2 directory, relative to the scenario"
+            )
+        ),
+    ]
+    time: Annotated[
+        Literal["simulated", "wall"], Field(description="the clock by which the samples are played")
+    ] = "simulated"
+    rate: Annotated[
+        float,
+        Field(gt=0, allow_inf_nan=False, description="speed of playing; 2 is twice as fast as recorded"),
+    ] = 1.0
     loop: Annotated[bool, Field(description="start again at the end")] = False
-    max_age: Annotated[Duration | None, Field(gt=0, description="a signal that is older is marked stale; default: never")] = None
+    max_age: Annotated[
+        Duration | None, Field(gt=0, description="a signal that is older is marked stale; default: never")
+    ] = None
 
     @field_validator("samples")
     @classmethod
@@ -88,7 +102,8 @@ class ScriptedDevice(Device):
     def _play(self, played: list[BagMessage], messages: list[Message]) -> Iterator[tuple[int, Sample]]:
         """Yield (time in ns, sample) in order, for ever if `loop` is set."""
         start, end = played[0].time_ns, played[-1].time_ns
-        lap = end - start + max(1, (end - start) // max(1, len(played) - 1))  # one mean interval between last and first
+        # one mean interval between last and first
+        lap = end - start + max(1, (end - start) // max(1, len(played) - 1))
         offset = 0
         while True:
             for source, message in zip(played, messages, strict=True):
@@ -106,8 +121,16 @@ def _ports(bag: Bag, clock: Literal["simulated", "wall"], max_age_ns: int) -> tu
     for topic, count in bag.counts.items():
         if count:
             first[topic] = next(bag.messages(topic))
-    ports = (output_port(_port_name(topic), message.type, message.payload) for topic, message in sorted(first.items()))
-    return tuple(port.model_copy(update={"clock": clock, "max_age_ns": max_age_ns if port.variability == "signal" else 0}) for port in ports)
+    ports = (
+        output_port(_port_name(topic), message.type, message.payload)
+        for topic, message in sorted(first.items())
+    )
+    return tuple(
+        port.model_copy(
+            update={"clock": clock, "max_age_ns": max_age_ns if port.variability == "signal" else 0}
+        )
+        for port in ports
+    )
 
 
 def _port_name(topic: str) -> str:

@@ -1,4 +1,6 @@
-"""Kind `simulated-touch`: the ports of a haptic stylus, the same renderer and safety chain at 1 kHz, and a simulated hand in simulated time."""
+"""Kind `simulated-touch`: the ports of a haptic stylus, the same renderer and safety chain at 1 kHz, and a
+simulated hand in simulated time.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,10 @@ _TICK_NS = 1_000_000
 
 
 class SimulatedTouch(Device):
-    """Styluses in simulated hands, each with the limits of a Touch. A scenario may have the kind `touch` in its place."""
+    """Styluses in simulated hands, each with the limits of a Touch.
+
+    A scenario may have the kind `touch` in its place.
+    """
 
     params_model: ClassVar[type[Params]] = SimulatedTouchParams
     params: SimulatedTouchParams
@@ -36,28 +41,43 @@ class SimulatedTouch(Device):
     def __init__(self, name: str, params: SimulatedTouchParams) -> None:
         """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._ports = {stylus: stylus_ports(name, stylus, clock="simulated", max_age_ns=params.max_age) for stylus in params.styluses}
+        self._ports = {
+            stylus: stylus_ports(name, stylus, clock="simulated", max_age_ns=params.max_age)
+            for stylus in params.styluses
+        }
         self._styluses: dict[str, _Stylus] = {}
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Of each stylus: `pose`, `twist`, `buttons`, `force` and `diagnostics` out, `contact` in."""
-        return tuple(port for stylus, ports in self._ports.items() for port in (*ports, _diagnosis(self.name, stylus).port))
+        return tuple(
+            port
+            for stylus, ports in self._ports.items()
+            for port in (*ports, _diagnosis(self.name, stylus).port)
+        )
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
         """Put the hands where their paths begin. Raises RecordingError if a path is a recording without one."""
-        self._styluses = {stylus: _Stylus(self.name, stylus, self.params.styluses[stylus], ports) for stylus, ports in self._ports.items()}
+        self._styluses = {
+            stylus: _Stylus(self.name, stylus, self.params.styluses[stylus], ports)
+            for stylus, ports in self._ports.items()
+        }
 
     def read(self, t: int) -> list[Sample]:
         """Let the hands move up to `t` (ns), and return what is new."""
         return [sample for stylus in self._styluses.values() for sample in stylus.read(t)]
 
     def write(self, port: str, value: Value) -> None:
-        """Take a contact model. It is felt from the next `read` on. Raises MessageError for another port or type."""
+        """Take a contact model. It is felt from the next `read` on.
+
+        Raises MessageError for another port or type.
+        """
         name, _, what = port.partition("/")
         if what != "contact" or name not in self._ports or not isinstance(value, ContactModel):
             known = ", ".join(f"'{stylus}/contact'" for stylus in self._ports)
-            raise MessageError(f"'{self.name}' takes a ContactModel on {known}; this is a {type(value).__name__} on '{port}'")
+            raise MessageError(
+                f"'{self.name}' takes a ContactModel on {known}; this is a {type(value).__name__} on '{port}'"
+            )
         if name in self._styluses:
             self._styluses[name].take(value)
 
@@ -73,14 +93,22 @@ def _diagnosis(participant: str, stylus: str) -> Diagnosis:
 class _Stylus:
     """One stylus: at every tick the force follows from where the hand is, and then both go on together."""
 
-    def __init__(self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts) -> None:
+    def __init__(
+        self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts
+    ) -> None:
         self._ports = ports
         self._diagnosis = _diagnosis(participant, stylus)
-        self._path = recorded(params.path, stylus, params.dead_man) if isinstance(params.path, Path) else scripted(params.path)
+        self._path = (
+            recorded(params.path, stylus, params.dead_man)
+            if isinstance(params.path, Path)
+            else scripted(params.path)
+        )
         self._loop = HapticLoop(params.safety.within(TOUCH), passivity=params.safety.passivity)
         self._dead_man = params.dead_man
         hand = params.hand
-        self._hand = Hand(hand.mass, hand.stiffness, hand.damping, _TICK_NS * 1e-9, self._path.position(0.0)[0])
+        self._hand = Hand(
+            hand.mass, hand.stiffness, hand.damping, _TICK_NS * 1e-9, self._path.position(0.0)[0]
+        )
         self._ticks = 0
         self._written: tuple[tuple[Plane, ...], int] | None = None
         self._written_ns: int | None = None
@@ -88,11 +116,15 @@ class _Stylus:
         self._condition: Condition | None = None
 
     def take(self, model: ContactModel) -> None:
-        """Keep a contact model until `read` has come to the time at which it was written, which is the one that `read` is called with."""
+        """Keep a contact model until `read` has come to the time at which it was written, which is the one
+        that `read` is called with.
+        """
         self._written, self._written_ns = (planes_of(model), model.header.stamp.ns), None
 
     def read(self, t: int) -> list[Sample]:
-        """Go on to the last tick up to `t`, and return the samples: events of every tick, the state of the last one."""
+        """Go on to the last tick up to `t`, and return the samples: events of every tick, the state of the
+        last one.
+        """
         if self._written_ns is None:
             self._written_ns = t
         due = t // _TICK_NS + 1 - self._ticks

@@ -13,25 +13,37 @@ __all__ = ["Hand"]
 class Hand:
     """Moves exactly as the differential equation says while force and target are held for a tick.
 
-    The exact motion matters: a force that is held while the hand goes on is what makes sampled walls active, and a step of
-    semi-implicit Euler would hide just that.
+    The exact motion matters: a force that is held while the hand goes on is what makes sampled walls active,
+    and a step of semi-implicit Euler would hide just that.
     """
 
     def __init__(self, mass: float, stiffness: float, damping: float, tick: float, position: Vector3) -> None:
         """Start at rest at `position` (m). Mass (kg), grip (N/m, N s/m), and the time (s) of one `move`."""
         self.position, self.velocity = position, ZERO
         self._stiffness, self._damping = stiffness, damping
-        # m e'' + c e' + k e = 0 from e, v over one tick: e^(-a t) [[C + a S, S], [-(k/m) S, C - a S]], a = c/2m, w^2 = k/m - a^2, C = cos w t, S = sin(w t)/w
+        # m e'' + c e' + k e = 0 from e, v over one tick: e^(-a t) [[C + a S, S], [-(k/m) S, C - a S]], a =
+        # c/2m, w^2 = k/m - a^2, C = cos w t, S = sin(w t)/w
         a = damping / (2.0 * mass)
         square = stiffness / mass - a * a
         w = sqrt(abs(square))
-        c, s = (cos(w * tick), sin(w * tick) / w) if square > 0.0 else (cosh(w * tick), sinh(w * tick) / w) if square < 0.0 else (1.0, tick)
+        c, s = (
+            (cos(w * tick), sin(w * tick) / w)
+            if square > 0.0
+            else (cosh(w * tick), sinh(w * tick) / w)
+            if square < 0.0
+            else (1.0, tick)
+        )
         e = exp(-a * tick)
         self._step = e * (c + a * s), e * s, -e * s * stiffness / mass, e * (c - a * s)
 
     def move(self, force: Vector3, target: Vector3, velocity: Vector3) -> None:
-        """Go on for a tick under `force` (N), with the grip's spring to `target` (m) and its damper to `velocity` (m/s)."""
-        one = [self._axis(*axis) for axis in zip(self.position, self.velocity, force, target, velocity, strict=True)]
+        """Go on for a tick under `force` (N), with the grip's spring to `target` (m) and its damper to
+        `velocity` (m/s).
+        """
+        one = [
+            self._axis(*axis)
+            for axis in zip(self.position, self.velocity, force, target, velocity, strict=True)
+        ]
         (x, vx), (y, vy), (z, vz) = one
         self.position, self.velocity = (x, y, z), (vx, vy, vz)
 

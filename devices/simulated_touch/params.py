@@ -19,16 +19,24 @@ from schemas.quantity import Damping, Duration, Length, Mass, Stiffness
 __all__ = ["LEVEL", "HandParams", "SimulatedStylusParams", "SimulatedTouchParams", "Waypoint"]
 
 LEVEL = (-0.5, 0.5, -0.5, 0.5)
-"""Orientation (x, y, z, w) of a stylus that points level away from the user: its z along x of the base frame, its x along -y, its y along -z."""
+"""Orientation (x, y, z, w) of a stylus that points level away from the user: its z along x of the base frame,
+its x along -y, its y along -z.
+"""
 
 
 class Waypoint(Params):
     """Where the hand wants to be at a time, and at rest. What is left out is as before."""
 
     at: Duration = Field(ge=0, description="time since the start")
-    position: tuple[Length, Length, Length] | None = Field(default=None, description="of the tip in the stylus' base frame: x ahead, y left, z up")
-    orientation: UnitQuaternion | None = Field(default=None, description="of the stylus in its base frame: quaternion x, y, z, w")
-    buttons: Annotated[tuple[int, ...], Field(max_length=2)] | None = Field(default=None, description="the buttons that are held from here on: 0, 1")
+    position: tuple[Length, Length, Length] | None = Field(
+        default=None, description="of the tip in the stylus' base frame: x ahead, y left, z up"
+    )
+    orientation: UnitQuaternion | None = Field(
+        default=None, description="of the stylus in its base frame: quaternion x, y, z, w"
+    )
+    buttons: Annotated[tuple[int, ...], Field(max_length=2)] | None = Field(
+        default=None, description="the buttons that are held from here on: 0, 1"
+    )
 
     @field_validator("buttons")
     @classmethod
@@ -56,8 +64,11 @@ class SimulatedStylusParams(Params):
         Annotated[tuple[Waypoint, ...], Tag("waypoints")] | Annotated[Path, Tag("recording")],
         Discriminator(lambda path: "recording" if isinstance(path, str | Path) else "waypoints"),
     ] = Field(
-        description="where the hand wants to be: waypoints, with least jerk from one to the next; or a recording of poses and buttons, an .mcap file or a"
-        " rosbag2 directory relative to the scenario, in which a hand without buttons holds the dead-man"
+        description=(
+            "where the hand wants to be: waypoints, with least jerk from one to the next; or a recording of"
+            " poses and buttons, an .mcap file or a rosbag2 directory relative to the scenario, in which a"
+            " hand without buttons holds the dead-man"
+        )
     )
     dead_man: Annotated[int, Field(ge=0, le=1, description="the button that is to be held for force")] = 0
     hand: HandParams = HandParams()
@@ -79,7 +90,9 @@ class SimulatedStylusParams(Params):
             raise ValueError("a path has at least one waypoint")
         for before, after in pairwise(path):
             if after.at <= before.at:
-                raise ValueError(f"the path's times go forward, but {after.at / 1e9:g} s comes after {before.at / 1e9:g} s")
+                raise ValueError(
+                    f"the path's times go forward, but {after.at / 1e9:g} s comes after {before.at / 1e9:g} s"
+                )
         return path
 
     @field_validator("safety")
@@ -96,6 +109,9 @@ class SimulatedTouchParams(Params):
     """The styluses of one simulated device."""
 
     styluses: Annotated[
-        dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], SimulatedStylusParams], Field(min_length=1, description="by name: right, left")
+        dict[Annotated[str, StringConstraints(pattern=r"^[A-Za-z]\w*$")], SimulatedStylusParams],
+        Field(min_length=1, description="by name: right, left"),
     ]
-    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = 100_000_000
+    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
+        100_000_000
+    )

@@ -1,7 +1,8 @@
 """Where a simulated hand wants to be: on a path of waypoints, or where a recorded hand was.
 
-Between two waypoints it moves as people reach: along a straight line, with the least jerk and at rest at both ends (Flash and Hogan, The coordination of arm
-movements, Journal of Neuroscience 5(7), 1985). Between two recorded poses it moves evenly. It turns about one axis, with the same course in time.
+Between two waypoints it moves as people reach: along a straight line, with the least jerk and at rest at both
+ends (Flash and Hogan, The coordination of arm movements, Journal of Neuroscience 5(7), 1985). Between two
+recorded poses it moves evenly. It turns about one axis, with the same course in time.
 """
 
 from __future__ import annotations
@@ -40,10 +41,20 @@ class _Press(NamedTuple):
 
 
 class HandPath:
-    """A path in the stylus' base frame, m and rad, over time in s. Before its first stop the hand is there already, without a button."""
+    """A path in the stylus' base frame, m and rad, over time in s.
 
-    def __init__(self, stops: Sequence[_Stop], presses: Sequence[_Press], course: Callable[[float], tuple[float, float]]) -> None:
-        """`course` gives the share of the way between two stops that is done at a share of the time, and its derivative."""
+    Before its first stop the hand is there already, without a button.
+    """
+
+    def __init__(
+        self,
+        stops: Sequence[_Stop],
+        presses: Sequence[_Press],
+        course: Callable[[float], tuple[float, float]],
+    ) -> None:
+        """`course` gives the share of the way between two stops that is done at a share of the time, and its
+        derivative.
+        """
         self._stops, self._presses, self._course = stops, presses, course
         self._times = [stop.time for stop in stops]
         self._pressed_at = [press.time for press in presses]
@@ -95,14 +106,22 @@ def scripted(waypoints: Sequence[Waypoint]) -> HandPath:
 
 
 def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
-    """Return the path of the hand in a recording, from its first pose on; without recorded buttons it holds the dead-man.
+    """Return the path of the hand in a recording, from its first pose on; without recorded buttons it holds
+    the dead-man.
 
-    Of several topics with poses (and of those with buttons) the one of this stylus counts: `.../<stylus>/pose`. Raises RecordingError if there is none.
+    Of several topics with poses (and of those with buttons) the one of this stylus counts:
+    `.../<stylus>/pose`. Raises RecordingError if there is none.
     """
     bag = Bag(file)
-    poses, joys = _topic(bag, PoseStamped.ros_type, f"{stylus}/pose"), _topic(bag, Joy.ros_type, f"{stylus}/buttons")
+    poses, joys = (
+        _topic(bag, PoseStamped.ros_type, f"{stylus}/pose"),
+        _topic(bag, Joy.ros_type, f"{stylus}/buttons"),
+    )
     if poses is None:
-        raise RecordingError(f"'{bag.file}' has not one topic of poses, nor one that ends in '{stylus}/pose', for the hand to follow")
+        raise RecordingError(
+            f"'{bag.file}' has not one topic of poses, nor one that ends in '{stylus}/pose', for the hand to"
+            " follow"
+        )
     moves = [(m.time_ns, decode(PoseStamped, m.payload).pose) for m in bag.messages(poses)]
     if not moves:
         raise RecordingError(f"'{bag.file}' has no pose on '{poses}', so the hand has no place to be")
@@ -113,8 +132,13 @@ def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
         stops.append(_Stop((time_ns - start_ns) * 1e-9, (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
     presses = [_Press(0.0, (dead_man == 0, dead_man == 1))]
     if joys is not None:
-        events = sorted(((m.time_ns, decode(Joy, m.payload).buttons.tolist()) for m in bag.messages(joys)), key=lambda event: event[0])
-        presses = [_Press((time_ns - start_ns) * 1e-9, (any(held[:1]), any(held[1:2]))) for time_ns, held in events]
+        events = sorted(
+            ((m.time_ns, decode(Joy, m.payload).buttons.tolist()) for m in bag.messages(joys)),
+            key=lambda event: event[0],
+        )
+        presses = [
+            _Press((time_ns - start_ns) * 1e-9, (any(held[:1]), any(held[1:2]))) for time_ns, held in events
+        ]
     return HandPath(stops, presses, lambda share: (share, 1.0))
 
 

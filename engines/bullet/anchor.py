@@ -1,4 +1,6 @@
-"""What holds an organ in its place: surfaces tied to the world, or to rigid parts of the tissue engine's scene."""
+"""What holds an organ in its place: surfaces tied to the world, or to rigid parts of the tissue engine's
+scene.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +41,13 @@ class AnchorParams(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    surface: str | None = Field(default=None, description="`trocar organs` lists them; every organ has left, right, front, back, bottom, top")
-    box: Box | None = Field(default=None, description="instead: the part of the surface inside a box in the organ's own frame")
+    surface: str | None = Field(
+        default=None,
+        description="`trocar organs` lists them; every organ has left, right, front, back, bottom, top",
+    )
+    box: Box | None = Field(
+        default=None, description="instead: the part of the surface inside a box in the organ's own frame"
+    )
     to: Name = Field(default=WORLD, description="`world`, or the name of a rigid part")
 
     @model_validator(mode="after")
@@ -57,7 +64,9 @@ class RigidParams(BaseModel):
 
     box: Edges = Field(description="edge lengths along x, y, z of its own frame")
     position: _Point = Field(default=(0.0, 0.0, 0.0), description="of its middle in `world`")
-    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of its frame in `world`: quaternion x, y, z, w")
+    orientation: UnitQuaternion = Field(
+        default=(0.0, 0.0, 0.0, 1.0), description="of its frame in `world`: quaternion x, y, z, w"
+    )
     friction: float = Field(default=0.5, ge=0, le=2, description="Coulomb coefficient against tissue")
 
 
@@ -65,7 +74,11 @@ def add_rigid(params: RigidParams, client: int) -> int:
     """Add a rigid part to the world of `client`, and return its number there."""
     import pybullet as bullet
 
-    shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[0.5 * edge for edge in params.box], physicsClientId=client)
-    body = bullet.createMultiBody(0.0, shape, basePosition=params.position, baseOrientation=params.orientation, physicsClientId=client)
+    shape = bullet.createCollisionShape(
+        bullet.GEOM_BOX, halfExtents=[0.5 * edge for edge in params.box], physicsClientId=client
+    )
+    body = bullet.createMultiBody(
+        0.0, shape, basePosition=params.position, baseOrientation=params.orientation, physicsClientId=client
+    )
     bullet.changeDynamics(body, -1, lateralFriction=params.friction, physicsClientId=client)
     return body

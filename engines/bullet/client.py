@@ -15,7 +15,8 @@ __all__ = ["connect", "disconnect", "quiet"]
 
 @contextmanager
 def quiet(descriptor: int = 1) -> Generator[None]:
-    """Keep what Bullet prints while it connects and loads off a file descriptor: stdout, which may carry JSON, or stderr (2).
+    """Keep what Bullet prints while it connects and loads off a file descriptor: stdout, which may carry
+    JSON, or stderr (2).
 
     Bullet prints through C's buffers, which therefore are flushed before the descriptor is put back.
     """
@@ -46,7 +47,10 @@ def connect(part: str, timestep: float, gravity: float) -> int:
     with quiet():
         client = bullet.connect(bullet.DIRECT)
         if client < 0:
-            raise SessionError(f"{part}: Bullet gave no physics client; it allows a limited number in one process, so spread the engines over hosts")
+            raise SessionError(
+                f"{part}: Bullet gave no physics client; it allows a limited number in one process, so spread"
+                " the engines over hosts"
+            )
         bullet.resetSimulation(bullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
     bullet.setTimeStep(timestep, physicsClientId=client)
     # With split impulses, spheres sink twice as deep into faces of soft bodies.

@@ -1,4 +1,6 @@
-"""The command `trocar organs`: shapes and materials that a scenario may name, with where their numbers come from."""
+"""The command `trocar organs`: shapes and materials that a scenario may name, with where their numbers come
+from.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,14 @@ _WIDTH = 120
 @app.command()
 def organs(
     *,
-    nodes: Annotated[int, typer.Option(min=18, max=5000, help="About how many nodes the meshes shall have.")] = 250,
+    nodes: Annotated[
+        int, typer.Option(min=18, max=5000, help="About how many nodes the meshes shall have.")
+    ] = 250,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")] = False,
 ) -> None:
-    """Print the organs that a scenario may name, their surfaces and meshes, and the materials with their sources; SI units."""
+    """Print the organs that a scenario may name, their surfaces and meshes, and the materials with their
+    sources; SI units.
+    """
     found = {"shapes": _shapes(nodes), "materials": _materials()}
     typer.echo(json.dumps(found, indent=2) if as_json else _text(found))
 
@@ -62,12 +68,31 @@ def _text(found: dict[str, Any]) -> str:
     for name, shape in found["shapes"].items():
         low, high = shape["dihedral_angles_deg"]
         lines += ["", f"  {name}", _wrapped(shape["description"])]
-        lines += [_wrapped(f"surfaces {', '.join(shape['surfaces'])}; anchored {', '.join(shape['anchored'])}; material {shape['material']}")]
-        lines += [_wrapped(f"mesh {shape['nodes']} nodes, {shape['tetrahedra']} tetrahedra, dihedral angles {low:.0f} to {high:.0f} deg")]
+        lines += [
+            _wrapped(
+                f"surfaces {', '.join(shape['surfaces'])}; anchored {', '.join(shape['anchored'])}; material"
+                f" {shape['material']}"
+            )
+        ]
+        lines += [
+            _wrapped(
+                f"mesh {shape['nodes']} nodes, {shape['tetrahedra']} tetrahedra, dihedral angles {low:.0f} to"
+                f" {high:.0f} deg"
+            )
+        ]
     lines += ["", "Materials (material: ...)"]
     for name, preset in found["materials"].items():
-        numbers = f"E {preset['young_modulus']:g} Pa, Poisson ratio {preset['poisson_ratio']:g}, density {preset['density']:g} kg/m^3"
-        lines += ["", f"  {name}", _wrapped(numbers), _wrapped(f"loading: {preset['loading']}"), _wrapped(f"source: {preset['source']}")]
+        numbers = (
+            f"E {preset['young_modulus']:g} Pa, Poisson ratio {preset['poisson_ratio']:g}, density"
+            f" {preset['density']:g} kg/m^3"
+        )
+        lines += [
+            "",
+            f"  {name}",
+            _wrapped(numbers),
+            _wrapped(f"loading: {preset['loading']}"),
+            _wrapped(f"source: {preset['source']}"),
+        ]
     return "\n".join(lines)
 
 

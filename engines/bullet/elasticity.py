@@ -15,15 +15,17 @@ __all__ = ["Elasticity"]
 class Elasticity:
     """What the tetrahedra around a node exert on it.
 
-    Energy density of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph. 37, 2018), equation 14: with
-    a = 1 + 3 mu / (4 lambda), the stress is P = mu (1 - 1 / (tr F^T F + 1)) F + lambda (J - a) cof F.
+    Energy density of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph. 37, 2018),
+    equation 14: with a = 1 + 3 mu / (4 lambda), the stress is P = mu (1 - 1 / (tr F^T F + 1)) F + lambda (J -
+    a) cof F.
     """
 
     def __init__(self, mesh: TetMesh, material: Material) -> None:
         """Take the mesh at rest."""
         corners = mesh.nodes[mesh.tetrahedra]
         inverse = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))  # (m, 3, 3)
-        self._gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)  # (m, 4, 3), of the shape functions
+        # (m, 4, 3), of the shape functions
+        self._gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
         self._weighted = self._gradients / (6.0 * np.linalg.det(inverse))[:, None, None]  # times the volume
         self._tetrahedra = mesh.tetrahedra
         self._mu, self._lambda = material.bullet_lame
@@ -42,5 +44,7 @@ class Elasticity:
         stretch = self._mu * (1.0 - 1.0 / (np.einsum("mij,mij->m", F, F) + 1.0))
         stress = stretch[:, None, None] * F + (self._lambda * (J - self._alpha))[:, None, None] * cofactor
         forces = np.einsum("mij,maj->mai", stress, self._weighted[around])
-        total = np.stack([np.bincount(tetrahedra.ravel(), -forces[..., i].ravel(), len(nodes)) for i in range(3)], axis=1)
+        total = np.stack(
+            [np.bincount(tetrahedra.ravel(), -forces[..., i].ravel(), len(nodes)) for i in range(3)], axis=1
+        )
         return np.where(at[:, None], total, 0.0)

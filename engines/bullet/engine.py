@@ -26,7 +26,9 @@ from schemas.trocar_msgs import SoftBodyState
 __all__ = ["BulletEngine", "BulletParams"]
 
 _RAMP_S = 0.2
-"""Gravity grows over this time before time 0, or over two periods of the slowest organ if they are longer; half as long again the organs rest."""
+"""Gravity grows over this time before time 0, or over two periods of the slowest organ if they are longer;
+half as long again the organs rest.
+"""
 
 _GRAVITY_DIGITS = 6
 """Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
@@ -38,26 +40,38 @@ class BulletParams(Params):
     """Organs, the probes that may touch them, and the numerics."""
 
     organs: dict[Name, OrganParams] = Field(min_length=1)
-    rigid: dict[Name, RigidParams] = Field(default_factory=dict[Name, RigidParams], description="parts that do not move, and to which organs may be anchored")
+    rigid: dict[Name, RigidParams] = Field(
+        default_factory=dict[Name, RigidParams],
+        description="parts that do not move, and to which organs may be anchored",
+    )
     probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
-    timestep: Duration = Field(default=1_000_000, gt=0, description="sub-step; the period is a multiple of it")
-    node_period: Duration = Field(default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period")
-    gravity: Acceleration = Field(default=9.80665, ge=0, description="along -z of `world`; default: standard gravity")
+    timestep: Duration = Field(
+        default=1_000_000, gt=0, description="sub-step; the period is a multiple of it"
+    )
+    node_period: Duration = Field(
+        default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period"
+    )
+    gravity: Acceleration = Field(
+        default=9.80665, ge=0, description="along -z of `world`; default: standard gravity"
+    )
 
     @model_validator(mode="after")
     def _known_parts(self) -> Self:
         for name, organ in self.organs.items():
             for part in organ.anchored_nodes:
                 if part != WORLD and part not in self.rigid:
-                    raise ValueError(f"organ '{name}' is anchored to '{part}', which is no rigid part.{did_you_mean(part, [WORLD, *self.rigid])}")
+                    raise ValueError(
+                        f"organ '{name}' is anchored to '{part}', which is no rigid"
+                        f" part.{did_you_mean(part, [WORLD, *self.rigid])}"
+                    )
         return self
 
 
 class BulletEngine(Stepped):
     """Soft organs in PyBullet; every probe is the force side of a bond.
 
-    The state hash covers the probes and their bonds at every step, and the nodes as they were last read, every 8 ms and whenever
-    they are output: reading them at every step would cost a quarter of its time.
+    The state hash covers the probes and their bonds at every step, and the nodes as they were last read,
+    every 8 ms and whenever they are output: reading them at every step would cost a quarter of its time.
     """
 
     params_model: ClassVar[type[Params]] = BulletParams
@@ -87,7 +101,9 @@ class BulletEngine(Stepped):
             )
             for organ in self.params.organs
         )
-        return nodes + tuple(port for name, probe in self.params.probes.items() if probe.grasp for port in grasp_ports(name))
+        return nodes + tuple(
+            port for name, probe in self.params.probes.items() if probe.grasp for port in grasp_ports(name)
+        )
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
@@ -95,7 +111,10 @@ class BulletEngine(Stepped):
         return tuple(self._bond(name, probe) for name, probe in self.params.probes.items())
 
     def configure(self, setup: Setup) -> Outputs:
-        """Load the organs, let them settle, and add a proxy for every bond. Raises ScenarioError where a step is too long."""
+        """Load the organs, let them settle, and add a proxy for every bond.
+
+        Raises ScenarioError where a step is too long.
+        """
         self._check_steps(setup.period_ns)
         dt = self.params.timestep * 1e-9
         self._dt = dt
@@ -111,12 +130,29 @@ class BulletEngine(Stepped):
         for bond in self.bonds:
             if bond.name in setup.bonds:
                 probe = self.params.probes[bond.name]
-                self._probes.append(Probe(probe, self._coupling(probe), bond, setup.bonds[bond.name], self.params.gravity, client))
+                self._probes.append(
+                    Probe(
+                        probe,
+                        self._coupling(probe),
+                        bond,
+                        setup.bonds[bond.name],
+                        self.params.gravity,
+                        client,
+                    )
+                )
         self._read_nodes(0)
-        self._contacts = Contacts([Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity) for organ in self._organs])
+        self._contacts = Contacts(
+            [
+                Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
+                for organ in self._organs
+            ]
+        )
         outputs = self._nodes(0)
         self._unused = {
-            port: value for name, probe in self.params.probes.items() if probe.grasp and name not in setup.bonds for port, value in nothing_held(name).items()
+            port: value
+            for name, probe in self.params.probes.items()
+            if probe.grasp and name not in setup.bonds
+            for port, value in nothing_held(name).items()
         }
         outputs.update(self._unused)
         for probe in self._probes:
@@ -127,7 +163,9 @@ class BulletEngine(Stepped):
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Press the probes along their predicted motion; return their reactions, and the nodes where they are due."""
+        """Press the probes along their predicted motion; return their reactions, and the nodes where they are
+        due.
+        """
         seconds, dt, probes = h * 1e-9, self._dt, self._probes
         for probe in probes:
             probe.begin(inputs, seconds)
@@ -154,7 +192,9 @@ class BulletEngine(Stepped):
     def state_hash(self) -> int:
         """Return 64 bits of the probes' positions, velocities and bonds, and of the nodes as last read."""
         keepers = (*self._probes, *self._grasps)
-        return state_hash(*(part for keeper in keepers for part in keeper.state), *(organ.nodes for organ in self._organs))
+        return state_hash(
+            *(part for keeper in keepers for part in keeper.state), *(organ.nodes for organ in self._organs)
+        )
 
     def save(self) -> bytes:
         """Raise StateError: Bullet cannot."""
@@ -175,11 +215,18 @@ class BulletEngine(Stepped):
 
     @property
     def _no_state(self) -> str:
-        return f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies. Re-simulate from the recorded grants instead"
+        return (
+            f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies."
+            " Re-simulate from the recorded grants instead"
+        )
 
     def _contact_stiffness(self, probe: ProbeParams) -> float:
         """Return the largest stiffness (N/m) that one of the spheres may meet."""
-        return max(organ.contact_stiffness(radius) for organ in self.params.organs.values() for radius in probe.radii.tolist())
+        return max(
+            organ.contact_stiffness(radius)
+            for organ in self.params.organs.values()
+            for radius in probe.radii.tolist()
+        )
 
     def _coupling(self, probe: ProbeParams) -> Coupling:
         damping = min(organ.elastic.damping for organ in self.params.organs.values())
@@ -205,7 +252,12 @@ class BulletEngine(Stepped):
         outputs: dict[str, Value] = {}
         for organ in self._organs:
             triangles = organ.mesh.triangles.astype(np.uint32).ravel() if t == 0 else np.zeros(0, np.uint32)
-            outputs[f"{organ.name}/nodes"] = SoftBodyState(header=header, body=organ.name, nodes_m=organ.nodes.astype(np.float32).ravel(), triangles=triangles)
+            outputs[f"{organ.name}/nodes"] = SoftBodyState(
+                header=header,
+                body=organ.name,
+                nodes_m=organ.nodes.astype(np.float32).ravel(),
+                triangles=triangles,
+            )
         return outputs
 
     def _read_nodes(self, t: int) -> None:
@@ -215,7 +267,8 @@ class BulletEngine(Stepped):
     def _settle(self) -> None:
         """Let gravity grow as slowly as the organs can follow: seized at once, they would swing for long.
 
-        It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window on.
+        It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window
+        on.
         """
         import pybullet as bullet
 
@@ -230,15 +283,20 @@ class BulletEngine(Stepped):
     def _check_steps(self, period_ns: int) -> None:
         params, where = self.params, f"participant '{self.name}'"
         if period_ns % params.timestep:
-            raise ScenarioError(f"{where}: timestep {params.timestep} ns does not divide the period {period_ns} ns")
+            raise ScenarioError(
+                f"{where}: timestep {params.timestep} ns does not divide the period {period_ns} ns"
+            )
         if params.node_period % period_ns:
-            raise ScenarioError(f"{where}: node_period {params.node_period} ns is no multiple of the period {period_ns} ns")
+            raise ScenarioError(
+                f"{where}: node_period {params.node_period} ns is no multiple of the period {period_ns} ns"
+            )
         for name, probe in params.probes.items():
             longest = self._coupling(probe).longest_step * 1e9
             if params.timestep > longest * (1.0 + 1e-9):
                 raise ScenarioError(
-                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass / stiffness) = {longest:.0f} ns, "
-                    f"up to which the virtual coupling is stable. Shorten it, or take a heavier or softer probe"
+                    f"{where}, probe '{name}': timestep {params.timestep} ns is above 0.5 sqrt(mass /"
+                    f" stiffness) = {longest:.0f} ns, up to which the virtual coupling is stable. Shorten it,"
+                    " or take a heavier or softer probe"
                 )
 
     def _check_tissue(self) -> None:
@@ -246,6 +304,8 @@ class BulletEngine(Stepped):
             limit = longest_step(organ.frequency, self.params.organs[organ.name].damping * 1e-9)
             if self._dt > limit:
                 raise ScenarioError(
-                    f"participant '{self.name}', organ '{organ.name}': timestep {self.params.timestep} ns is above {limit * 1e9:.0f} ns, up to which tissue "
-                    f"with a highest natural frequency of {organ.frequency:.0f} rad/s is stable. Shorten it, raise the damping, or take fewer nodes"
+                    f"participant '{self.name}', organ '{organ.name}': timestep {self.params.timestep} ns is"
+                    f" above {limit * 1e9:.0f} ns, up to which tissue with a highest natural frequency of"
+                    f" {organ.frequency:.0f} rad/s is stable. Shorten it, raise the damping, or take fewer"
+                    " nodes"
                 )

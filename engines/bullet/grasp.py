@@ -1,7 +1,8 @@
-"""Grasp of tissue: fingers that close on an organ take hold of its nodes, opening lets go, too strong a pull tears loose.
+"""Grasp of tissue: fingers that close on an organ take hold of its nodes, opening lets go, too strong a pull
+tears loose.
 
-Friction of spheres on Bullet's tissue creeps, so what is held is tied: nodes are anchored to the proxies, and an anchor passes a force on
-whole. Rules and figures: docs/decisions/0016-tissue-grasp.md.
+Friction of spheres on Bullet's tissue creeps, so what is held is tied: nodes are anchored to the proxies, and
+an anchor passes a force on whole. Rules and figures: docs/decisions/0016-tissue-grasp.md.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["Grasp", "GraspParams", "grasp_ports", "nothing_held"]
 
 _CLOSING_M = 0.5e-3
-"""By how much the fingers must have closed on tissue to take hold, and opened from there to let go: half of what two jaws come nearer."""
+"""By how much the fingers must have closed on tissue to take hold, and opened from there to let go: half of
+what two jaws come nearer.
+"""
 
 _SHUT_M = 0.5e-3
 """Gap between fingers that have closed as far as they go."""
@@ -42,30 +45,71 @@ class GraspParams(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    fingers: int = Field(default=2, ge=2, description="how many; each has the same number of the probe's spheres, finger after finger")
+    fingers: int = Field(
+        default=2,
+        ge=2,
+        description="how many; each has the same number of the probe's spheres, finger after finger",
+    )
     hold: Force = Field(
         default=5.0,
         gt=0,
-        description="pull at which the tissue tears loose; default: that for which the jaws of laparoscopic graspers are compared (Heijnsdijk et al. 2004)",
+        description=(
+            "pull at which the tissue tears loose; default: that for which the jaws of laparoscopic graspers"
+            " are compared (Heijnsdijk et al. 2004)"
+        ),
     )
     reach: Length | None = Field(
-        default=None, ge=0, description="from a sphere to the nodes it takes; default: of an organ's mean edge 1 / sqrt(3), within which every point has a node"
+        default=None,
+        ge=0,
+        description=(
+            "from a sphere to the nodes it takes; default: of an organ's mean edge 1 / sqrt(3), within which"
+            " every point has a node"
+        ),
     )
 
 
 def grasp_ports(probe: str) -> tuple[Port, ...]:
     """Return the ports of a probe that may grasp."""
     return (
-        Port(name=f"{probe}/held", causality="output", type="std_msgs/msg/Float64", description="1 while tissue is held, else 0"),
-        Port(name=f"{probe}/pull", causality="output", size=3, unit="N", frame="world", description="force on the tissue that is held"),
-        Port(name=f"{probe}/lift", causality="output", type="std_msgs/msg/Float64", unit="m", description="mean rise of the nodes held, since time 0"),
-        Port(name=f"{probe}/events", causality="output", type=TissueGrasp.ros_type, variability="event", description="grasped, released, torn"),
+        Port(
+            name=f"{probe}/held",
+            causality="output",
+            type="std_msgs/msg/Float64",
+            description="1 while tissue is held, else 0",
+        ),
+        Port(
+            name=f"{probe}/pull",
+            causality="output",
+            size=3,
+            unit="N",
+            frame="world",
+            description="force on the tissue that is held",
+        ),
+        Port(
+            name=f"{probe}/lift",
+            causality="output",
+            type="std_msgs/msg/Float64",
+            unit="m",
+            description="mean rise of the nodes held, since time 0",
+        ),
+        Port(
+            name=f"{probe}/events",
+            causality="output",
+            type=TissueGrasp.ros_type,
+            variability="event",
+            description="grasped, released, torn",
+        ),
     )
 
 
 def nothing_held(probe: str) -> dict[str, Value]:
     """Return what the ports say of a probe that touches nothing."""
-    return {f"{probe}/held": np.zeros(1), f"{probe}/pull": np.zeros(3), f"{probe}/lift": np.zeros(1), f"{probe}/events": ()}
+    return {
+        f"{probe}/held": np.zeros(1),
+        f"{probe}/pull": np.zeros(3),
+        f"{probe}/lift": np.zeros(1),
+        f"{probe}/events": (),
+    }
 
 
 @dataclass(frozen=True)
@@ -89,12 +133,16 @@ class Grasp:
         self._rest = [organ.nodes[:, 2].copy() for organ in organs]
         self._holds: list[_Hold] = []
         self._widest = 0.0
-        """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when they took hold, m."""
+        """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when
+        they took hold, m.
+        """
         self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
         self.outputs = nothing_held(probe.name)
 
     def update(self, t: int, *, looked: bool) -> None:
-        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches them, are those of now."""
+        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches
+        them, are those of now.
+        """
         events: tuple[TissueGrasp, ...] = ()
         if self._holds:
             self._pull[:] = self._probe.forces[self._probe.held].sum(axis=0)
@@ -109,7 +157,12 @@ class Grasp:
     @property
     def state(self) -> tuple[Vector, ...]:
         """What it remembers: the spread it compares with, outputs, and the nodes held."""
-        return np.array([self._widest]), self._pull, self._lift, *(hold.nodes.astype(np.float64) for hold in self._holds)
+        return (
+            np.array([self._widest]),
+            self._pull,
+            self._lift,
+            *(hold.nodes.astype(np.float64) for hold in self._holds),
+        )
 
     def _spread(self) -> float:
         """Return how far the middles of the instrument's fingers are from the middle of all (m), on average."""
@@ -120,11 +173,15 @@ class Grasp:
         """Let go if the fingers have opened; else see how far the tissue is lifted."""
         if self._spread() > self._widest + _CLOSING_M:
             return self._let_go("released", t)
-        self._lift[0] = np.concatenate([hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]).mean()
+        self._lift[0] = np.concatenate(
+            [hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]
+        ).mean()
         return ()
 
     def _watch(self, t: int) -> tuple[TissueGrasp, ...]:
-        """Take hold if at least two fingers touch tissue, have closed since they do, and cannot close any further."""
+        """Take hold if at least two fingers touch tissue, have closed since they do, and cannot close any
+        further.
+        """
         touching = self._probe.touching[self._spheres].max(axis=1)
         if touching.sum() < 2:
             self._widest = 0.0
@@ -134,7 +191,9 @@ class Grasp:
         if spread > self._widest - _CLOSING_M:
             return ()
         outward = self._outward()
-        squeezed = touching & (-(self._probe.forces[self._spheres].sum(axis=1) * outward).sum(axis=1) >= _SQUEEZE_N)
+        squeezed = touching & (
+            -(self._probe.forces[self._spheres].sum(axis=1) * outward).sum(axis=1) >= _SQUEEZE_N
+        )
         if squeezed.sum() >= 2:
             return self._take(squeezed, outward, spread, t)
         if self._gap(touching) <= _SHUT_M:
@@ -155,17 +214,29 @@ class Grasp:
         gaps = np.linalg.norm(positions[:, None] - positions, axis=2) - radii[:, None] - radii
         return float(gaps[of[:, None] != of].min())
 
-    def _take(self, fingers: NDArray[np.bool_], outward: Vector, spread: float, t: int) -> tuple[TissueGrasp, ...]:
-        """Tie the nodes that are within reach of where these fingers face the others, each to the nearest sphere."""
+    def _take(
+        self, fingers: NDArray[np.bool_], outward: Vector, spread: float, t: int
+    ) -> tuple[TissueGrasp, ...]:
+        """Tie the nodes that are within reach of where these fingers face the others, each to the nearest
+        sphere.
+        """
         probe, spheres = self._probe, self._spheres[fingers].ravel()
         radii = probe.radii[spheres]
-        pads = probe.positions[spheres] - radii[:, None] * np.repeat(outward[fingers], self._spheres.shape[1], axis=0)  # (k, 3)
+        # (k, 3)
+        pads = probe.positions[spheres] - radii[:, None] * np.repeat(
+            outward[fingers], self._spheres.shape[1], axis=0
+        )
         for organ, rest in zip(self._organs, self._rest, strict=True):
             distances = np.linalg.norm(organ.nodes[:, None] - pads, axis=2) - radii  # (n, k)
-            nodes = np.flatnonzero((distances.min(axis=1) <= self._reach(organ)) & ~organ.anchored & ~organ.held)
+            nodes = np.flatnonzero(
+                (distances.min(axis=1) <= self._reach(organ)) & ~organ.anchored & ~organ.held
+            )
             if nodes.size:
                 nearest: list[int] = spheres[distances[nodes].argmin(axis=1)].tolist()
-                anchors = [organ.anchor(node, probe.bodies[sphere]) for node, sphere in zip(nodes.tolist(), nearest, strict=True)]
+                anchors = [
+                    organ.anchor(node, probe.bodies[sphere])
+                    for node, sphere in zip(nodes.tolist(), nearest, strict=True)
+                ]
                 self._holds.append(_Hold(organ, nodes, anchors, rest[nodes]))
         if self._holds:
             self._widest = spread
@@ -187,7 +258,9 @@ class Grasp:
         return events
 
     def _set_held(self, spheres: NDArray[np.int64], *, held: bool) -> None:
-        """Let these spheres pass through what they hold, so that all force goes through the anchors, or touch it again."""
+        """Let these spheres pass through what they hold, so that all force goes through the anchors, or touch
+        it again.
+        """
         self._probe.held[spheres] = held
         self._probe.gains[spheres] = 1.0
         numbers: list[int] = spheres.tolist()
@@ -197,9 +270,23 @@ class Grasp:
 
     def _events(self, event: str, t: int) -> tuple[TissueGrasp, ...]:
         header, force = Header(stamp=Time.from_ns(t), frame_id="world"), float(np.linalg.norm(self._pull))
-        return tuple(TissueGrasp(header=header, event=event, body=hold.organ.name, nodes=hold.nodes.astype(np.uint32), force_n=force) for hold in self._holds)
+        return tuple(
+            TissueGrasp(
+                header=header,
+                event=event,
+                body=hold.organ.name,
+                nodes=hold.nodes.astype(np.uint32),
+                force_n=force,
+            )
+            for hold in self._holds
+        )
 
     def _say(self, events: tuple[TissueGrasp, ...]) -> None:
         name = self._probe.name
         self._held[0] = float(bool(self._holds))
-        self.outputs = {f"{name}/held": self._held, f"{name}/pull": self._pull, f"{name}/lift": self._lift, f"{name}/events": events}
+        self.outputs = {
+            f"{name}/held": self._held,
+            f"{name}/pull": self._pull,
+            f"{name}/lift": self._lift,
+            f"{name}/events": events,
+        }

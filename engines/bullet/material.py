@@ -1,4 +1,6 @@
-"""Elastic constants: from Young's modulus to what Bullet's neo-Hookean model takes, and what a time step can bear."""
+"""Elastic constants: from Young's modulus to what Bullet's neo-Hookean model takes, and what a time step can
+bear.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ _SAG_ITERATIONS, _SAG_TOLERANCE = 300, 0.1
 """Of conjugate gradients for the sag: enough to know the lowest frequency to one percent."""
 
 _LARGEST_PHASE = 4.0
-"""Largest timestep x highest frequency: a block pressed at a node is steady at 4.0 and chatters at 4.7 (tests/engines/bullet/test_limits.py)."""
+"""Largest timestep x highest frequency: a block pressed at a node is steady at 4.0 and chatters at 4.7
+(tests/engines/bullet/test_limits.py).
+"""
 
 
 @dataclass(frozen=True)
@@ -44,16 +48,18 @@ class Material:
     def bullet_lame(self) -> tuple[float, float]:
         """What Bullet must be given for as mu and lambda (Pa) so that small strains obey `lame`.
 
-        Bullet has the energy of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph. 37, 2018),
-        whose section 3.4 shows that its linearisation needs 4/3 mu and lambda + 5/6 mu.
+        Bullet has the energy of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (ACM Trans. Graph.
+        37, 2018), whose section 3.4 shows that its linearisation needs 4/3 mu and lambda + 5/6 mu.
         """
         mu, lambda_ = self.lame
         return 4.0 / 3.0 * mu, lambda_ + 5.0 / 6.0 * mu
 
     def contact_stiffness(self, radius: float) -> float:
-        """Return the stiffness (N/m) against a flat round punch of `radius` (m) on a half-space, 2 E radius / (1 - nu^2).
+        """Return the stiffness (N/m) against a flat round punch of `radius` (m) on a half-space, 2 E radius /
+        (1 - nu^2).
 
-        Johnson, Contact Mechanics (1985), section 3.4; for a sphere it is the tangent stiffness where the contact has that radius.
+        Johnson, Contact Mechanics (1985), section 3.4; for a sphere it is the tangent stiffness where the
+        contact has that radius.
         """
         return 2.0 * self.young_modulus * radius / (1.0 - self.poisson_ratio**2)
 
@@ -76,9 +82,11 @@ def highest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
 
 
 def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
-    """Return the lowest natural frequency (rad/s) that weight along z excites; arguments as above, with at least one anchored node.
+    """Return the lowest natural frequency (rad/s) that weight along z excites; arguments as above, with at
+    least one anchored node.
 
-    By Rayleigh's quotient of the sag under weight, which is found by conjugate gradients; where they have not converged it is too high.
+    By Rayleigh's quotient of the sag under weight, which is found by conjugate gradients; where they have not
+    converged it is too high.
     """
     stiffness = _stiffness_per_mass(mesh, free, material)
     load = free[:, None] * np.array([0.0, 0.0, 1.0])
@@ -97,10 +105,13 @@ def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
 
 
 def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Callable[[Vector], Vector]:
-    """Return the map from displacements, shape (n, 3), to elastic forces over the mass of a node, 1/s^2 times as large; arguments as above."""
+    """Return the map from displacements, shape (n, 3), to elastic forces over the mass of a node, 1/s^2 times
+    as large; arguments as above.
+    """
     edges = mesh.nodes[mesh.tetrahedra[:, 1:]] - mesh.nodes[mesh.tetrahedra[:, :1]]  # (m, 3, 3)
     inverse = np.linalg.inv(edges)  # (m, 3, 3): the columns are the gradients of the shape functions 1 to 3
-    gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2).transpose(0, 2, 1)  # (m, 4, 3)
+    # (m, 4, 3)
+    gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2).transpose(0, 2, 1)
     volume = volumes(mesh.nodes, mesh.tetrahedra)
     mu, lambda_ = material.lame
     node_mass = material.density * volume.sum() / len(mesh.nodes)
@@ -110,16 +121,26 @@ def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Call
         trace = np.einsum("mii->m", slope)
         stress = mu * (slope + slope.transpose(0, 2, 1)) + lambda_ * trace[:, None, None] * np.eye(3)
         forces = np.einsum("m,mij,maj->mai", volume, stress, gradients) / node_mass
-        return np.stack([np.bincount(mesh.tetrahedra.ravel(), forces[..., i].ravel(), len(mesh.nodes)) for i in range(3)], axis=1) * free[:, None]
+        return (
+            np.stack(
+                [
+                    np.bincount(mesh.tetrahedra.ravel(), forces[..., i].ravel(), len(mesh.nodes))
+                    for i in range(3)
+                ],
+                axis=1,
+            )
+            * free[:, None]
+        )
 
     return stiffness
 
 
 def longest_step(frequency: float, damping: float) -> float:
-    """Return the longest stable time step (s) for Bullet's scheme: explicit elasticity, implicit damping, then position.
+    """Return the longest stable time step (s) for Bullet's scheme: explicit elasticity, implicit damping,
+    then position.
 
-    For a mode of angular frequency w the scheme reads v' = (v - h w^2 x) / (1 + h d w^2), x' = x + h v'. Its roots leave the unit
-    circle where h^2 w^2 > 4 + 2 h d w^2, so d >= h / 2 keeps any frequency stable. Contacts are solved before the damping, and
-    chatter where h w is too large.
+    For a mode of angular frequency w the scheme reads v' = (v - h w^2 x) / (1 + h d w^2), x' = x + h v'. Its
+    roots leave the unit circle where h^2 w^2 > 4 + 2 h d w^2, so d >= h / 2 keeps any frequency stable.
+    Contacts are solved before the damping, and chatter where h w is too large.
     """
     return min(damping + sqrt(damping**2 + 4.0 / frequency**2), _LARGEST_PHASE / frequency)

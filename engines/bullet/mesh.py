@@ -31,7 +31,9 @@ class TetMesh:
 
     @cached_property
     def triangles(self) -> Indices:
-        """The surface, shape (f, 3), counter-clockwise seen from outside: the faces that belong to one tetrahedron only."""
+        """The surface, shape (f, 3), counter-clockwise seen from outside: the faces that belong to one
+        tetrahedron only.
+        """
         return self._faces[self._shared == 1]
 
     @property
@@ -61,8 +63,16 @@ class TetMesh:
         return np.bincount(numbers)[numbers]
 
     def write_vtk(self, path: Path) -> None:
-        """Write a legacy ASCII .vtk file, the only tetrahedral format that Bullet reads, without losing a bit of the nodes."""
-        lines = ["# vtk DataFile Version 2.0", "organ", "ASCII", "DATASET UNSTRUCTURED_GRID", f"POINTS {len(self.nodes)} double"]
+        """Write a legacy ASCII .vtk file, the only tetrahedral format that Bullet reads, without losing a bit
+        of the nodes.
+        """
+        lines = [
+            "# vtk DataFile Version 2.0",
+            "organ",
+            "ASCII",
+            "DATASET UNSTRUCTURED_GRID",
+            f"POINTS {len(self.nodes)} double",
+        ]
         lines += [f"{x!r} {y!r} {z!r}" for x, y, z in self.nodes.tolist()]
         lines.append(f"CELLS {len(self.tetrahedra)} {5 * len(self.tetrahedra)}")
         lines += [f"4 {a} {b} {c} {d}" for a, b, c, d in self.tetrahedra.tolist()]
@@ -84,13 +94,16 @@ def compact(nodes: Vector, tetrahedra: Indices) -> TetMesh:
 
 
 def shape_quality(nodes: Vector, tetrahedra: Indices) -> Vector:
-    """Return how near every tetrahedron is to a regular one (1), by its mean ratio 12 (3 volume)^(2/3) / sum of squared edges, shape (m,).
+    """Return how near every tetrahedron is to a regular one (1), by its mean ratio 12 (3 volume)^(2/3) / sum
+    of squared edges, shape (m,).
 
     Liu, Joe, Relationship between tetrahedron shape measures, BIT 34 (1994). Zero is flat, negative inverted.
     """
     corners = nodes[tetrahedra]  # (m, 4, 3)
     squares = sum(((corners[:, i] - corners[:, j]) ** 2).sum(axis=1) for i, j in combinations(range(4), 2))
-    return 12.0 * np.cbrt(3.0 * volumes(nodes, tetrahedra)) ** 2 * np.sign(volumes(nodes, tetrahedra)) / squares
+    return (
+        12.0 * np.cbrt(3.0 * volumes(nodes, tetrahedra)) ** 2 * np.sign(volumes(nodes, tetrahedra)) / squares
+    )
 
 
 def dihedral_angles(nodes: Vector, tetrahedra: Indices) -> Vector:

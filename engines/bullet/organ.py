@@ -26,8 +26,12 @@ _WORLD_BODY = -1
 class Organ:
     """The body in Bullet. Node i of the mesh is node i of Bullet's simulation mesh."""
 
-    def __init__(self, name: str, params: OrganParams, client: int, parts: Mapping[str, int] | None = None) -> None:
-        """Load the organ into the world of `client`, where `parts` are the rigid bodies by name that it may be anchored to."""
+    def __init__(
+        self, name: str, params: OrganParams, client: int, parts: Mapping[str, int] | None = None
+    ) -> None:
+        """Load the organ into the world of `client`, where `parts` are the rigid bodies by name that it may
+        be anchored to.
+        """
         import pybullet as bullet
 
         self.name = name
@@ -45,7 +49,9 @@ class Organ:
         free = np.where(self.anchored, 0.0, 1.0)
         self.frequency = highest_frequency(mesh, free, params.elastic)
         """Highest natural frequency, rad/s."""
-        self.period = 2.0 * np.pi / lowest_frequency(mesh, free, params.elastic) if self.anchored.any() else 0.0
+        self.period = (
+            2.0 * np.pi / lowest_frequency(mesh, free, params.elastic) if self.anchored.any() else 0.0
+        )
         """Period of the slowest swing, s; 0 where nothing holds the organ."""
         self._client = client
         self._mesh_data = bullet.getMeshData
@@ -68,7 +74,9 @@ class Organ:
                 frictionCoeff=params.friction,
                 physicsClientId=client,
             )
-        bullet.changeDynamics(self._body, -1, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client)
+        bullet.changeDynamics(
+            self._body, -1, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client
+        )
         bodies = {WORLD: _WORLD_BODY, **(parts or {})}
         for part, tied in params.anchored_nodes.items():
             for node in np.flatnonzero(tied).tolist():
@@ -105,10 +113,14 @@ class Organ:
         moved = np.abs(self.nodes - self.mesh.nodes).max()
         if not moved < self._reach:
             raise SessionError(
-                f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from its place. {self._likeliest(moved)}"
+                f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from"
+                f" its place. {self._likeliest(moved)}"
             )
 
     def _likeliest(self, moved: float) -> str:
         if np.isfinite(moved) and not self.anchored.any():
             return "The likeliest cause is that it fell: nothing anchors it, and no rigid part lies under it"
-        return "The likeliest cause is a probe driven deep into it; else shorten the tissue's timestep, raise its damping, or lower the probe's stiffness"
+        return (
+            "The likeliest cause is a probe driven deep into it; else shorten the tissue's timestep, raise"
+            " its damping, or lower the probe's stiffness"
+        )

@@ -60,10 +60,21 @@ def describe(path: Path, start: Mapping[str, Any]) -> Description:
         if variable is not None:
             variables[row.causality].append(variable)
             ports.append(_port(row, variable, _input_start(path, row, variable, starts)))
-    return Description(path, major, model.guid, co_simulation, tuple(variables["input"]), tuple(variables["output"]), tuple(ports), tuple(starts.values()))
+    return Description(
+        path,
+        major,
+        model.guid,
+        co_simulation,
+        tuple(variables["input"]),
+        tuple(variables["output"]),
+        tuple(ports),
+        tuple(starts.values()),
+    )
 
 
-def _input_start(path: Path, row: ModelVariable, variable: Variable, starts: Mapping[str, Start]) -> tuple[float, ...] | None:
+def _input_start(
+    path: Path, row: ModelVariable, variable: Variable, starts: Mapping[str, Start]
+) -> tuple[float, ...] | None:
     if row.causality != "input":
         return None
     if row.name in starts:
@@ -71,7 +82,9 @@ def _input_start(path: Path, row: ModelVariable, variable: Variable, starts: Map
     try:
         return declared_start(row, variable.size)
     except ValueError as error:
-        raise ScenarioError(f"'{path}': the FMU declares the start value '{row.start}' for '{row.name}', which is no number") from error
+        raise ScenarioError(
+            f"'{path}': the FMU declares the start value '{row.start}' for '{row.name}', which is no number"
+        ) from error
 
 
 def _read(path: Path) -> ModelDescription:
@@ -86,30 +99,51 @@ def _read(path: Path) -> ModelDescription:
         with path.open("rb") as file:  # given a path, FMPy leaves the file open if there is an error in it
             try:
                 return read_model_description(file)
-            except ValidationError as error:  # tools write many FMUs that run well and break a rule of the schema
-                _log.warning("%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems))
+            except (
+                ValidationError
+            ) as error:  # tools write many FMUs that run well and break a rule of the schema
+                _log.warning(
+                    "%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems)
+                )
                 return read_model_description(file, validate=False)
     except Exception as error:  # FMPy lets everything through: BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
         raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {error}") from error
 
 
 def _co_simulation(path: Path, model: ModelDescription, major: int) -> CoSimulation:
-    """Return the co-simulation part of the FMU. Raises ScenarioError if it has none that runs on this platform."""
+    """Return the co-simulation part of the FMU.
+
+    Raises ScenarioError if it has none that runs on this platform.
+    """
     import fmpy
 
     if major not in (2, 3):
         raise ScenarioError(f"'{path}' is an FMI {model.fmiVersion} FMU; FMI 2.0 and 3.0 are allowed")
     if model.coSimulation is None:
-        raise ScenarioError(f"'{path}' cannot be co-simulated: it is for model exchange or scheduled execution only. Export it for co-simulation.")
-    clocks = [v.name for v in model.modelVariables if v.type == "Clock" and v.causality == "input" and v.intervalVariability != "triggered"]
+        raise ScenarioError(
+            f"'{path}' cannot be co-simulated: it is for model exchange or scheduled execution only. Export"
+            " it for co-simulation."
+        )
+    clocks = [
+        v.name
+        for v in model.modelVariables
+        if v.type == "Clock" and v.causality == "input" and v.intervalVariability != "triggered"
+    ]
     if clocks:
-        raise ScenarioError(f"'{path}' has time-based input clocks ({', '.join(clocks)}), which Trocar does not tick. Export it without clocks.")
+        raise ScenarioError(
+            f"'{path}' has time-based input clocks ({', '.join(clocks)}), which Trocar does not tick. Export"
+            " it without clocks."
+        )
     folder = fmpy.platform if major == 2 else fmpy.platform_tuple
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
     if f"binaries/{folder}/{model.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}" not in names:
-        there = sorted({name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1})
-        raise ScenarioError(f"'{path}' has no binary for this platform, {folder}; it has: {', '.join(there) or 'none'}")
+        there = sorted(
+            {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
+        )
+        raise ScenarioError(
+            f"'{path}' has no binary for this platform, {folder}; it has: {', '.join(there) or 'none'}"
+        )
     return model.coSimulation
 
 
@@ -117,7 +151,10 @@ def _starts(path: Path, model: ModelDescription, major: int, start: Mapping[str,
     rows = {row.name: row for row in model.modelVariables if settable(row)}
     for name, given in start.items():
         if name not in rows:
-            raise ScenarioError(f"'{path}' has no variable '{name}' that takes a start value.{did_you_mean(name, rows)}", path=("start", name))
+            raise ScenarioError(
+                f"'{path}' has no variable '{name}' that takes a start value.{did_you_mean(name, rows)}",
+                path=("start", name),
+            )
         try:
             yield given_start(rows[name], given, major, size_of(rows[name], start))
         except ValueError as error:
@@ -127,10 +164,21 @@ def _starts(path: Path, model: ModelDescription, major: int, start: Mapping[str,
 def _variable(path: Path, row: ModelVariable, major: int, size: int) -> Variable | None:
     number = number_type(major, row.type)
     if number is None or size == 0:
-        reason = "it is empty" if number else f"it is a {row.type}; only numbers and truth values flow between participants"
+        reason = (
+            "it is empty"
+            if number
+            else f"it is a {row.type}; only numbers and truth values flow between participants"
+        )
         _log.info("%s: %s '%s' becomes no port: %s", path, row.causality, row.name, reason)
         return None
-    return Variable(row.name, port_name(row.name), row.valueReference, number, size, discrete=row.variability != "continuous")
+    return Variable(
+        row.name,
+        port_name(row.name),
+        row.valueReference,
+        number,
+        size,
+        discrete=row.variability != "continuous",
+    )
 
 
 def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | None) -> Port:
@@ -141,5 +189,6 @@ def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | Non
         size=variable.size,
         unit=unit_of(row),
         start=start,
-        description=f"FMU variable '{row.name}' ({row.type})" + (f": {row.description}" if row.description else ""),
+        description=f"FMU variable '{row.name}' ({row.type})"
+        + (f": {row.description}" if row.description else ""),
     )

@@ -1,9 +1,10 @@
 """FMUs as engines: FMI 2.0 and 3.0 for co-simulation, through FMPy.
 
-Inputs and outputs of the FMU are ports, named as `engines.fmu.variables.port_name` says, in the unit that the FMU declares: nothing
-is converted, so that a length in mm fits an input in mm alone. Scalars are `std_msgs/msg/Float64`, FMI 3 arrays
-`std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and booleans (0, 1) flow as doubles, and an input that is no such
-number ends the session. Strings, binaries and clocks are no ports, which is logged.
+Inputs and outputs of the FMU are ports, named as `engines.fmu.variables.port_name` says, in the unit that the
+FMU declares: nothing is converted, so that a length in mm fits an input in mm alone. Scalars are
+`std_msgs/msg/Float64`, FMI 3 arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and
+booleans (0, 1) flow as doubles, and an input that is no such number ends the session. Strings, binaries and
+clocks are no ports, which is logged.
 """
 
 from __future__ import annotations
@@ -35,11 +36,20 @@ class FmuParams(Params):
     path: Path = Field(description="the .fmu file; a relative path starts at the scenario")
     start: dict[str, Any] = Field(
         default_factory=dict[str, Any],
-        description="start values by FMU variable name: numbers in the variable's unit, texts with a unit, lists for arrays, true or false, or texts",
+        description=(
+            "start values by FMU variable name: numbers in the variable's unit, texts with a unit, lists for"
+            " arrays, true or false, or texts"
+        ),
         examples=[{"mass": "50 g", "stages": 3}],
     )
-    tolerance: float | None = Field(default=None, gt=0, allow_inf_nan=False, description="relative tolerance of the FMU's own solver")
-    step: Duration | None = Field(default=None, gt=0, description="communication step of the FMU, a divisor of the period; default: the period")
+    tolerance: float | None = Field(
+        default=None, gt=0, allow_inf_nan=False, description="relative tolerance of the FMU's own solver"
+    )
+    step: Duration | None = Field(
+        default=None,
+        gt=0,
+        description="communication step of the FMU, a divisor of the period; default: the period",
+    )
 
     @field_validator("path")
     @classmethod
@@ -51,12 +61,14 @@ class FmuParams(Params):
 class FmuEngine(Stepped):
     """One FMU.
 
-    Between communication points an FMU holds its inputs. Where a connection extrapolates linearly, an FMI 2 FMU that can interpolate gets
-    value and slope; any other FMU gets the mean of the input over each communication step, which `step` makes as short as wanted.
+    Between communication points an FMU holds its inputs. Where a connection extrapolates linearly, an FMI 2
+    FMU that can interpolate gets value and slope; any other FMU gets the mean of the input over each
+    communication step, which `step` makes as short as wanted.
 
-    `state_hash` covers the serialised state of the FMU where equal states have equal bytes. Many FMUs serialise addresses of their memory as
-    well (those of modelica/Reference-FMUs do, `getFMUState` in src/cosimulation.c), so that is tried out on a twin; where it is not so, and
-    where the FMU cannot serialise, the hash covers inputs, outputs and the time.
+    `state_hash` covers the serialised state of the FMU where equal states have equal bytes. Many FMUs
+    serialise addresses of their memory as well (those of modelica/Reference-FMUs do, `getFMUState` in
+    src/cosimulation.c), so that is tried out on a twin; where it is not so, and where the FMU cannot
+    serialise, the hash covers inputs, outputs and the time.
     """
 
     params_model: ClassVar[type[Params]] = FmuParams
@@ -87,13 +99,18 @@ class FmuEngine(Stepped):
         """Load the FMU, set its start values and bring it to time 0."""
         step = self.params.step
         if step and setup.period_ns % step:
-            problem = f"the FMU's step of {step / 1e6:g} ms does not divide its period of {setup.period_ns / 1e6:g} ms"
+            problem = (
+                f"the FMU's step of {step / 1e6:g} ms does not divide its period of"
+                f" {setup.period_ns / 1e6:g} ms"
+            )
             raise ScenarioError(problem, path=("participants", self.name, "step"))
         self.close()
         description = self._description
         kind = Fmi2Instance if description.major == 2 else Fmi3Instance
         self._instance = instance = kind(description, self.name)
-        self._outputs = {port: block.values[part] for block in instance.outputs for port, part in block.parts.items()}
+        self._outputs = {
+            port: block.values[part] for block in instance.outputs for port, part in block.parts.items()
+        }
         instance.initialise(description.starts, self.params.tolerance)
         if instance.can_save and not description.co_simulation.canBeInstantiatedOnlyOncePerProcess:
             with closing(kind(description, self.name)) as twin:
@@ -129,7 +146,9 @@ class FmuEngine(Stepped):
         self._check_can_save()
         size = instance.memory.nbytes
         if len(state) < size:
-            raise StateError(f"participant '{self.name}': {len(state)} bytes are no state of '{self.params.path.name}'")
+            raise StateError(
+                f"participant '{self.name}': {len(state)} bytes are no state of '{self.params.path.name}'"
+            )
         instance.deserialise(state[size:])
         instance.memory[:] = np.frombuffer(state, np.float64, instance.memory.size)
 
@@ -148,7 +167,10 @@ class FmuEngine(Stepped):
         capabilities = self._description.co_simulation
         for flag in ("canGetAndSetFMUstate", "canSerializeFMUstate"):
             if not getattr(capabilities, flag):
-                raise StateError(f"participant '{self.name}': '{self.params.path.name}' cannot save its state, its modelDescription.xml says {flag}=false")
+                raise StateError(
+                    f"participant '{self.name}': '{self.params.path.name}' cannot save its state, its"
+                    f" modelDescription.xml says {flag}=false"
+                )
 
     def _read(self, t: int) -> Outputs:
         self._time[0] = t

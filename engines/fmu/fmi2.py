@@ -35,10 +35,16 @@ class Fmi2Instance(Instance):
         """Load and instantiate the FMU."""
         from fmpy.fmi2 import FMU2Slave
 
-        super().__init__(FMU2Slave, description, name, {"callbacks": fmi2_callbacks(), "loggingOn": wants_all()})
+        super().__init__(
+            FMU2Slave, description, name, {"callbacks": fmi2_callbacks(), "loggingOn": wants_all()}
+        )
         self._do_step: Callable[..., int] = self._function("DoStep")
         interpolates = description.co_simulation.canInterpolateInputs
-        continuous = [variable for variable in description.inputs if variable.type.name == "Real" and not variable.discrete and interpolates]
+        continuous = [
+            variable
+            for variable in description.inputs
+            if variable.type.name == "Real" and not variable.discrete and interpolates
+        ]
         self._slope_ports = [variable.port for variable in continuous]
         self._slopes = np.zeros(len(continuous))
         self._set_slopes = self._slope_call([variable.reference for variable in continuous])
@@ -47,7 +53,14 @@ class Fmi2Instance(Instance):
         count = len(references)
         orders = (ctypes.c_int * count)(*[1] * count)
         slopes = self._slopes.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-        return partial(self._function("SetRealInputDerivatives"), self._component, (ctypes.c_uint * count)(*references), count, orders, slopes)
+        return partial(
+            self._function("SetRealInputDerivatives"),
+            self._component,
+            (ctypes.c_uint * count)(*references),
+            count,
+            orders,
+            slopes,
+        )
 
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
         self.call("SetupExperiment", tolerance is not None, tolerance or 0.0, 0.0, False, 0.0)
@@ -79,6 +92,10 @@ class Fmi2Instance(Instance):
     def _step_failure(self, status: int, t: int, h: int) -> SessionError:
         reached = ctypes.c_double()
         about = f" for the step from {t / 1e9:.9g} s to {(t + h) / 1e9:.9g} s"
-        if status == DISCARD and self._function("GetRealStatus")(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) <= WARNING:
+        if (
+            status == DISCARD
+            and self._function("GetRealStatus")(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached))
+            <= WARNING
+        ):
             about += f", of which it got to {reached.value:.9g} s"
         return self.failure("DoStep", status, about)

@@ -26,7 +26,10 @@ _MOST_EVENTS = 10_000
 
 
 class Fmi3Instance(Instance):
-    """An FMI 3.0 FMU. Where it has an event mode, events are handled at the time they happen, inside the step."""
+    """An FMI 3.0 FMU.
+
+    Where it has an event mode, events are handled at the time they happen, inside the step.
+    """
 
     prefix = "fmi3"
     counted = True
@@ -45,17 +48,33 @@ class Fmi3Instance(Instance):
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:  # noqa: ARG001
             log_message(name, status, category, message)
 
-        options = {"eventModeUsed": self._has_events, "earlyReturnAllowed": True, "logMessage": log, "loggingOn": wants_all()}
+        options = {
+            "eventModeUsed": self._has_events,
+            "earlyReturnAllowed": True,
+            "logMessage": log,
+            "loggingOn": wants_all(),
+        }
         super().__init__(FMU3Slave, description, name, options)
         self._event_blocks = [block for block in self.inputs if block.discrete and self._has_events]
         self._step_blocks = [block for block in self.inputs if block not in self._event_blocks]
-        self.memory = np.full(1 + sum(block.values.size for block in self._event_blocks), math.inf)  # time of the next event, discrete inputs
+        # time of the next event, discrete inputs
+        self.memory = np.full(1 + sum(block.values.size for block in self._event_blocks), math.inf)
         self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
-        self._again, self._nominals, self._states, self._scheduled = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._again, self._nominals, self._states, self._scheduled = (
+            ctypes.c_bool(),
+            ctypes.c_bool(),
+            ctypes.c_bool(),
+            ctypes.c_bool(),
+        )
         self._reached, self._next = ctypes.c_double(), ctypes.c_double()
         self._do_step = partial(self._function("DoStep"), self._component)
-        self._step_results = [ctypes.byref(x) for x in (self._event, self._terminate, self._early, self._reached)]
-        self._update_results = [ctypes.byref(x) for x in (self._again, self._terminate, self._nominals, self._states, self._scheduled, self._next)]
+        self._step_results = [
+            ctypes.byref(x) for x in (self._event, self._terminate, self._early, self._reached)
+        ]
+        self._update_results = [
+            ctypes.byref(x)
+            for x in (self._again, self._terminate, self._nominals, self._states, self._scheduled, self._next)
+        ]
 
     def _initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
         structural = [start for start in starts if start.structural]
@@ -74,7 +93,9 @@ class Fmi3Instance(Instance):
             self.call("EnterStepMode")
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
-        """Give the FMU its inputs: continuous ones as their mean over the `dt` seconds, discrete ones, if they have changed, in event mode."""
+        """Give the FMU its inputs: continuous ones as their mean over the `dt` seconds, discrete ones, if
+        they have changed, in event mode.
+        """
         for block in self._step_blocks:
             block.take(inputs, tau + dt / 2)
             self.transfer(block)
@@ -95,12 +116,16 @@ class Fmi3Instance(Instance):
             needs_event = target - now < _SAME_INSTANT_S  # an event scheduled for this instant
             if not needs_event:
                 now = self._step_to(now, target)
-                needs_event = self._has_events and (self._event.value or now > self.memory[0] - _SAME_INSTANT_S)
+                needs_event = self._has_events and (
+                    self._event.value or now > self.memory[0] - _SAME_INSTANT_S
+                )
             if needs_event:
                 self._handle_event()
             if end - now < _SAME_INSTANT_S:
                 return
-        raise SessionError(f"the FMU got no further than {now:.9g} s in {_MOST_EVENTS} events of the step to {end:.9g} s")
+        raise SessionError(
+            f"the FMU got no further than {now:.9g} s in {_MOST_EVENTS} events of the step to {end:.9g} s"
+        )
 
     def _step_to(self, now: float, target: float) -> float:
         """Step towards `target` and return the time that was reached."""
@@ -127,4 +152,6 @@ class Fmi3Instance(Instance):
             if not self._again.value:
                 self.memory[0] = self._next.value if self._scheduled.value else math.inf
                 return
-        raise SessionError(f"the discrete states of the FMU do not settle in {_MOST_EVENTS} iterations of one event")
+        raise SessionError(
+            f"the discrete states of the FMU do not settle in {_MOST_EVENTS} iterations of one event"
+        )

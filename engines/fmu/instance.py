@@ -30,12 +30,23 @@ DISCARD, _ERROR, _FATAL = 2, 3, 4
 
 
 def _load(slave: type[Any], description: Description, directory: Path, name: str) -> Any:
-    """Load the FMU that was extracted to `directory` through FMPy's class `slave`. Raises ScenarioError if its library cannot be loaded."""
+    """Load the FMU that was extracted to `directory` through FMPy's class `slave`.
+
+    Raises ScenarioError if its library cannot be loaded.
+    """
     identifier = description.co_simulation.modelIdentifier
     try:
-        with contextlib.chdir(Path.cwd()):  # FMPy changes the directory to load, and leaves it changed when that fails
-            return slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(directory), instanceName=name)
-    except Exception as error:  # FMPy raises a bare Exception or, for a function that is missing, AttributeError
+        # FMPy changes the directory to load, and leaves it changed when that fails
+        with contextlib.chdir(Path.cwd()):
+            return slave(
+                guid=description.guid,
+                modelIdentifier=identifier,
+                unzipDirectory=str(directory),
+                instanceName=name,
+            )
+    except (
+        Exception
+    ) as error:  # FMPy raises a bare Exception or, for a function that is missing, AttributeError
         raise ScenarioError(f"the library of '{description.path}' cannot be loaded: {error}") from error
 
 
@@ -51,10 +62,13 @@ class Instance(ABC):
     byte: ClassVar[Any]
     """C type of a serialised state's elements."""
 
-    def __init__(self, slave: type[Any], description: Description, name: str, options: Mapping[str, Any]) -> None:
+    def __init__(
+        self, slave: type[Any], description: Description, name: str, options: Mapping[str, Any]
+    ) -> None:
         """Extract and load the FMU through FMPy's class `slave` and instantiate it with `options`.
 
-        Raises ScenarioError if the library cannot be loaded, SessionError if the FMU refuses to be instantiated.
+        Raises ScenarioError if the library cannot be loaded, SessionError if the FMU refuses to be
+        instantiated.
         """
         from fmpy import extract
 
@@ -67,15 +81,21 @@ class Instance(ABC):
             try:
                 self._fmu.instantiate(**options)
             except Exception as error:  # FMPy raises a bare Exception
-                raise SessionError(f"'{description.path}' cannot be instantiated{self._complaint()}") from error
+                raise SessionError(
+                    f"'{description.path}' cannot be instantiated{self._complaint()}"
+                ) from error
             self._loaded = stack.pop_all()
-        self.can_save = description.co_simulation.canGetAndSetFMUstate and description.co_simulation.canSerializeFMUstate
+        self.can_save = (
+            description.co_simulation.canGetAndSetFMUstate and description.co_simulation.canSerializeFMUstate
+        )
         self._component: int = self._fmu.component
         self._initialised = False
         self._worst = 0
         self._state = ctypes.c_void_p()
         self.memory = np.zeros(0)
-        """What is known between steps apart from the FMU's own state; an array to be written into, never replaced."""
+        """What is known between steps apart from the FMU's own state; an array to be written into, never
+        replaced.
+        """
         self._serialised: Any = (self.byte * 0)()
         self.inputs = [Block("Set", group, self._access) for group in grouped(description.inputs)]
         self.outputs = [Block("Get", group, self._access) for group in grouped(description.outputs)]
@@ -115,7 +135,12 @@ class Instance(ABC):
     def deserialise(self, state: bytes) -> None:
         """Bring the FMU back to a state that `serialise` returned."""
         restored = ctypes.c_void_p()
-        self.call(f"{self.deserialise_word}{self.state_word}", (self.byte * len(state)).from_buffer_copy(state), len(state), ctypes.byref(restored))
+        self.call(
+            f"{self.deserialise_word}{self.state_word}",
+            (self.byte * len(state)).from_buffer_copy(state),
+            len(state),
+            ctypes.byref(restored),
+        )
         try:
             self.call(f"Set{self.state_word}", restored)
         finally:
@@ -128,7 +153,11 @@ class Instance(ABC):
                 return  # no function of the FMU may be called any more (fmi2Fatal, fmi3Fatal)
             if self._state:
                 self._function(f"Free{self.state_word}")(self._component, ctypes.byref(self._state))
-            if self._initialised and self._worst < _ERROR and self._function("Terminate")(self._component) > WARNING:
+            if (
+                self._initialised
+                and self._worst < _ERROR
+                and self._function("Terminate")(self._component) > WARNING
+            ):
                 _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._complaint())
             self._function("FreeInstance")(self._component)
 
@@ -139,7 +168,10 @@ class Instance(ABC):
             raise self.failure(function, status)
 
     def failure(self, function: str, status: int, about: str = "") -> SessionError:
-        """Return the error for a function that failed, and remember how bad it was. `about` says what it was called for."""
+        """Return the error for a function that failed, and remember how bad it was.
+
+        `about` says what it was called for.
+        """
         self._worst = max(self._worst, status)
         label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
         return SessionError(f"{self.prefix}{function} returned '{label}'{about}{self._complaint()}")
@@ -158,12 +190,16 @@ class Instance(ABC):
         """Set or get a block."""
         status = block.call()
         if status > WARNING:
-            raise self.failure(block.function, status, f" for '{block.refused() if status == DISCARD else block.names}'")
+            raise self.failure(
+                block.function, status, f" for '{block.refused() if status == DISCARD else block.names}'"
+            )
 
     def _set_start(self, start: Start) -> None:
         if isinstance(start.value, bytes):
             text = (ctypes.c_char_p * 1)(start.value)
-            self.call("SetString", (ctypes.c_uint * 1)(start.reference), 1, text, *([1] if self.counted else []))
+            self.call(
+                "SetString", (ctypes.c_uint * 1)(start.reference), 1, text, *([1] if self.counted else [])
+            )
             return
         status = self._access(f"Set{start.access}", [start.reference], np.ascontiguousarray(start.value))()
         if status > WARNING:

@@ -25,7 +25,9 @@ def log_message(instance: str, status: int, category: bytes | None, message: byt
 
 
 def last_complaint(instance: str) -> str:
-    """Return the last warning or error of an instance, to be put into the error that follows from it, and forget it."""
+    """Return the last warning or error of an instance, to be put into the error that follows from it, and
+    forget it.
+    """
     return _complaints.pop(instance, "")
 
 
@@ -36,7 +38,10 @@ def wants_all() -> bool:
 
 @cache
 def fmi2_callbacks() -> Any:
-    """Return the callbacks of all FMI 2 instances. FMPy's proxy, which formats the variadic messages, holds one logger a process."""
+    """Return the callbacks of all FMI 2 instances.
+
+    FMPy's proxy, which formats the variadic messages, holds one logger a process.
+    """
     from fmpy import calloc, fmi2, free
 
     callbacks = fmi2.fmi2CallbackFunctions()
@@ -52,5 +57,11 @@ def fmi2_callbacks() -> Any:
     return callbacks
 
 
-def _fmi2_log(environment: int | None, instance: bytes | None, status: int, category: bytes | None, message: bytes | None) -> None:  # noqa: ARG001
+def _fmi2_log(
+    environment: int | None,
+    instance: bytes | None,
+    status: int,
+    category: bytes | None,
+    message: bytes | None,
+) -> None:
     log_message((instance or b"").decode(errors="replace"), status, category, message)

@@ -1,4 +1,6 @@
-"""Start values: those that an FMU declares for its inputs, and those that a scenario gives for parameters, inputs and states."""
+"""Start values: those that an FMU declares for its inputs, and those that a scenario gives for parameters,
+inputs and states.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +36,12 @@ class Start:
 
 
 def settable(row: ModelVariable) -> bool:
-    """Say whether a start value can be given (FMI 2.0.5 section 4.2.4, FMI 3.0.2 section 2.3.2: state Instantiated)."""
-    return row.variability != "constant" and (row.causality in {"input", "parameter", "structuralParameter"} or row.initial in {"exact", "approx"})
+    """Say whether a start value can be given (FMI 2.0.5 section 4.2.4, FMI 3.0.2 section 2.3.2: state
+    Instantiated).
+    """
+    return row.variability != "constant" and (
+        row.causality in {"input", "parameter", "structuralParameter"} or row.initial in {"exact", "approx"}
+    )
 
 
 def unit_of(row: ModelVariable) -> str:
@@ -44,8 +50,12 @@ def unit_of(row: ModelVariable) -> str:
 
 
 def size_of(row: ModelVariable, start: Mapping[str, Any]) -> int:
-    """Return the number of elements of a variable; structural parameters among the start values change that of FMI 3 arrays."""
-    return math.prod(int(start.get(d.variable.name, d.variable.start) if d.variable else d.start) for d in row.dimensions)
+    """Return the number of elements of a variable; structural parameters among the start values change that
+    of FMI 3 arrays.
+    """
+    return math.prod(
+        int(start.get(d.variable.name, d.variable.start) if d.variable else d.start) for d in row.dimensions
+    )
 
 
 def declared_start(row: ModelVariable, size: int) -> tuple[float, ...] | None:
@@ -57,7 +67,8 @@ def declared_start(row: ModelVariable, size: int) -> tuple[float, ...] | None:
 
 
 def given_start(row: ModelVariable, given: Any, major: int, size: int) -> Start:
-    """Return the start value `given`: a number, a text with a unit, a list of them, a truth value, or a text for a String.
+    """Return the start value `given`: a number, a text with a unit, a list of them, a truth value, or a text
+    for a String.
 
     Numbers are in the variable's unit. Raises ValueError if it does not fit the variable.
     """
@@ -73,12 +84,18 @@ def given_start(row: ModelVariable, given: Any, major: int, size: int) -> Start:
     if len(numbers) not in {1, size}:
         raise ValueError(f"'{row.name}' takes {size} numbers, not {len(numbers)}")
     values = np.array(numbers * size if len(numbers) == 1 else numbers)
-    return Start(row.name, row.valueReference, number.access, structural, number.from_float64(values, row.name))
+    return Start(
+        row.name, row.valueReference, number.access, structural, number.from_float64(values, row.name)
+    )
 
 
 def _number(row: ModelVariable, item: Any) -> float:
     boolean = row.type == "Boolean"
-    fits = item in (False, True) if boolean else isinstance(item, int | float | str) and not isinstance(item, bool)
+    fits = (
+        item in (False, True)
+        if boolean
+        else isinstance(item, int | float | str) and not isinstance(item, bool)
+    )
     if not fits:
         raise ValueError(f"'{row.name}' takes {'true or false' if boolean else 'numbers'}, not {item!r}")
     number = to_si(item, unit_of(row)) if isinstance(item, str) else float(item)

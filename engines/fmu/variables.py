@@ -32,7 +32,8 @@ class NumberType:
     """The C type of those functions."""
 
     def from_float64(self, values: Vector, variable: str) -> NDArray[Any]:
-        """Return `values` in the C type. Raises ValueError, naming the variable, if one of them has no exact place there.
+        """Return `values` in the C type. Raises ValueError, naming the variable, if one of them has no exact
+        place there.
 
         A boolean is 0 or 1, an integer a whole number in its range and of at most 2^53.
         """
@@ -42,7 +43,9 @@ class NumberType:
             fits &= values == np.rint(values)
         if not fits.all():
             what = "numbers" if self.dtype.kind == "f" else "whole numbers"
-            raise ValueError(f"'{variable}' takes {what} from {low:.17g} to {high:.17g}, not {values[~fits][0]:.17g}")
+            raise ValueError(
+                f"'{variable}' takes {what} from {low:.17g} to {high:.17g}, not {values[~fits][0]:.17g}"
+            )
         return values.astype(self.dtype)
 
     def _bounds(self) -> tuple[float, float]:
@@ -75,24 +78,36 @@ _FMI2 = {
     "Boolean": NumberType("Boolean", "Boolean", np.dtype(np.int32)),
 }
 _FMI3 = {
-    **{f"Float{bits}": NumberType(f"Float{bits}", f"Float{bits}", np.dtype(f"float{bits}")) for bits in (32, 64)},
-    **{f"Int{bits}": NumberType(f"Int{bits}", f"Int{bits}", np.dtype(f"int{bits}")) for bits in (8, 16, 32, 64)},
-    **{f"UInt{bits}": NumberType(f"UInt{bits}", f"UInt{bits}", np.dtype(f"uint{bits}")) for bits in (8, 16, 32, 64)},
+    **{
+        f"Float{bits}": NumberType(f"Float{bits}", f"Float{bits}", np.dtype(f"float{bits}"))
+        for bits in (32, 64)
+    },
+    **{
+        f"Int{bits}": NumberType(f"Int{bits}", f"Int{bits}", np.dtype(f"int{bits}"))
+        for bits in (8, 16, 32, 64)
+    },
+    **{
+        f"UInt{bits}": NumberType(f"UInt{bits}", f"UInt{bits}", np.dtype(f"uint{bits}"))
+        for bits in (8, 16, 32, 64)
+    },
     "Enumeration": NumberType("Enumeration", "Int64", np.dtype(np.int64)),
     "Boolean": NumberType("Boolean", "Boolean", np.dtype(np.bool_)),
 }
 
 
 def number_type(major: int, fmi_type: str) -> NumberType | None:
-    """Return an FMI type by name, as FMI 2.0 (fmi2TypesPlatform.h) or 3.0 (fmi3PlatformTypes.h) has it; None if it holds no numbers."""
+    """Return an FMI type by name, as FMI 2.0 (fmi2TypesPlatform.h) or 3.0 (fmi3PlatformTypes.h) has it; None
+    if it holds no numbers.
+    """
     return (_FMI2 if major == 2 else _FMI3).get(fmi_type)
 
 
 def port_name(variable: str) -> str:
     """Return the port name of an FMU variable. No two variables share one: the name can be read backwards.
 
-    A dot becomes `/`; any other character that a port name cannot hold becomes `_xHH_`, with its code point in hexadecimal,
-    or `xHH_` where a part starts with it: `body.r[1]` is `body/r_x5B_1_x5D_`, `arm._q` is `arm/x5F_q`.
+    A dot becomes `/`; any other character that a port name cannot hold becomes `_xHH_`, with its code point
+    in hexadecimal, or `xHH_` where a part starts with it: `body.r[1]` is `body/r_x5B_1_x5D_`, `arm._q` is
+    `arm/x5F_q`.
     """
     parts = variable.split(".")
     return "/".join(map(_escaped, parts if all(parts) else [variable]))

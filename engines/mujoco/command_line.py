@@ -1,4 +1,6 @@
-"""The commands `trocar model`: where an arm's tip stands, what its dynamics are, and the model as files for other programs."""
+"""The commands `trocar model`: where an arm's tip stands, what its dynamics are, and the model as files for
+other programs.
+"""
 
 from __future__ import annotations
 
@@ -56,19 +58,40 @@ def _numbers(text: str) -> list[float] | None:
 
 def _checked(text: str | None) -> str | None:
     if text is not None and not _numbers(text):
-        raise typer.BadParameter(f"'{text}' holds no numbers; write one per joint in SI units, separated by spaces or commas")
+        raise typer.BadParameter(
+            f"'{text}' holds no numbers; write one per joint in SI units, separated by spaces or commas"
+        )
     return text
 
 
-Arm = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(ARMS)}.", autocompletion=lambda: list(ARMS))]
-ArmArgument = Annotated[str, typer.Argument(metavar="ARM", help=f"One of {', '.join(_CART)}.", autocompletion=lambda: list(_CART))]
+Arm = Annotated[
+    str, typer.Argument(metavar="ARM", help=f"One of {', '.join(ARMS)}.", autocompletion=lambda: list(ARMS))
+]
+ArmArgument = Annotated[
+    str, typer.Argument(metavar="ARM", help=f"One of {', '.join(_CART)}.", autocompletion=lambda: list(_CART))
+]
 Tool = Annotated[
     str | None,
-    typer.Option("--instrument", metavar="N", help="Of a PSM: its instrument, by name or number (400006 unless given); of the ECM: straight, up or down."),
+    typer.Option(
+        "--instrument",
+        metavar="N",
+        help=(
+            "Of a PSM: its instrument, by name or number (400006 unless given); of the ECM: straight, up or"
+            " down."
+        ),
+    ),
 ]
-Positions = Annotated[str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_checked, help="Joint positions, rad and m.")]
+Positions = Annotated[
+    str, typer.Option("--q", metavar="Q1 Q2 ...", callback=_checked, help="Joint positions, rad and m.")
+]
 Velocities = Annotated[
-    str | None, typer.Option("--dq", metavar="V1 V2 ...", callback=_checked, help="Joint velocities for the friction, rad/s and m/s; 0 unless given.")
+    str | None,
+    typer.Option(
+        "--dq",
+        metavar="V1 V2 ...",
+        callback=_checked,
+        help="Joint velocities for the friction, rad/s and m/s; 0 unless given.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
@@ -82,7 +105,9 @@ def fk(arm: Arm, *, instrument: Tool = None, q: Positions, as_json: Json = False
 
 
 @app.command(cls=_NumbersInARow)
-def dynamics(arm: ArmArgument, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False) -> None:
+def dynamics(
+    arm: ArmArgument, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False
+) -> None:
     """Print an arm's joint-space inertia, gravity, friction and elasticity, its base upright; SI units."""
     _need_mujoco("dynamics")
     name, positions = _cart_arm(arm), _numbers(q) or []
@@ -98,13 +123,20 @@ def dynamics(arm: ArmArgument, *, instrument: Tool = None, q: Positions, dq: Vel
 
         found = of(name, tool, positions, velocities)
     if as_json:
-        typer.echo(json.dumps({"arm": arm, "instrument": tool, "q": positions, "dq": velocities, **_plain(found)}, indent=2))
+        typer.echo(
+            json.dumps(
+                {"arm": arm, "instrument": tool, "q": positions, "dq": velocities, **_plain(found)}, indent=2
+            )
+        )
     else:
         _print(found)
 
 
 def _plain(found: JointDynamics) -> dict[str, Any]:
-    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in asdict(found).items()}
+    return {
+        key: value.tolist() if isinstance(value, np.ndarray) else value
+        for key, value in asdict(found).items()
+    }
 
 
 def _print(found: JointDynamics) -> None:
@@ -124,14 +156,32 @@ def _print(found: JointDynamics) -> None:
 
 @app.command()
 def export(
-    path: Annotated[Path, typer.Argument(help="File (.xml or .urdf), or folder for dvrk.xml or dvrk.urdf; meshes go to assets beside it.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="File (.xml or .urdf), or folder for dvrk.xml or dvrk.urdf; meshes go to assets beside it."
+        ),
+    ],
     *,
     arms: Annotated[str, typer.Option(metavar="ARM,ARM", help="Which arms of the cart.")] = ",".join(_CART),
     instrument: Annotated[
-        list[str] | None, typer.Option(metavar="ARM=N", help="Instrument of a PSM or endoscope of the ECM (400006 and straight unless given). May be repeated.")
+        list[str] | None,
+        typer.Option(
+            metavar="ARM=N",
+            help=(
+                "Instrument of a PSM or endoscope of the ECM (400006 and straight unless given). May be"
+                " repeated."
+            ),
+        ),
     ] = None,
-    mounting: Annotated[Literal["cart", "free"], typer.Option(help="On the cart's setup joints, or one arm alone with its base in the origin.")] = "cart",
-    form: Annotated[Literal["mjcf", "urdf"] | None, typer.Option("--format", help="By default what the file's suffix says, else mjcf.")] = None,
+    mounting: Annotated[
+        Literal["cart", "free"],
+        typer.Option(help="On the cart's setup joints, or one arm alone with its base in the origin."),
+    ] = "cart",
+    form: Annotated[
+        Literal["mjcf", "urdf"] | None,
+        typer.Option("--format", help="By default what the file's suffix says, else mjcf."),
+    ] = None,
 ) -> None:
     """Write the robot's model as MJCF or URDF with its meshes."""
     _need_mujoco("export")
@@ -157,11 +207,17 @@ def _scene(arms: list[CartArm], instruments: list[str], mounting: str) -> SceneP
     for text in instruments:
         arm, _, tool = text.partition("=")
         if arm not in tools or not tool:
-            problem = f"'{text}' is no ARM=N with an arm of this model: {', '.join(tools)}; write for instance {arms[0]}=400006"
+            problem = (
+                f"'{text}' is no ARM=N with an arm of this model: {', '.join(tools)}; write for instance"
+                f" {arms[0]}=400006"
+            )
             raise typer.BadParameter(problem, param_hint="--instrument")
         tools[_cart_arm(arm)] = {"endoscope" if arm == "ECM" else "instrument": tool}
     if mounting == "free" and len(tools) > 1:
-        raise typer.BadParameter(f"{len(tools)} arms would stand in one place; name one with --arms, or mount them on the cart", param_hint="--mounting")
+        raise typer.BadParameter(
+            f"{len(tools)} arms would stand in one place; name one with --arms, or mount them on the cart",
+            param_hint="--mounting",
+        )
     with _refusing():
         return SceneParams.model_validate({"arms": tools, "mounting": mounting})
 
@@ -180,7 +236,9 @@ def _refusing() -> Generator[None]:
     except MotionError as error:
         raise typer.BadParameter(str(error)) from error
     except ValidationError as error:
-        raise typer.BadParameter("; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.errors())) from error
+        raise typer.BadParameter(
+            "; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.errors())
+        ) from error
 
 
 def _need_mujoco(command: str) -> None:

@@ -11,7 +11,8 @@ __all__ = ["effective_mass"]
 
 
 def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Return the least mass (kg) that a force meets in any direction where the velocity is J dq: 1 / max eig(J M^-1 J^T).
+    """Return the least mass (kg) that a force meets in any direction where the velocity is J dq: 1 / max
+    eig(J M^-1 J^T).
 
     The joints of the linkage go with those they follow: J and M are those of the independent joints.
 
@@ -28,7 +29,9 @@ def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData)
 
 
 def _followers(model: mujoco.MjModel) -> Vector:
-    """Return T, shape (nv, independent), with dq = T dq_independent: the joint equalities of the model as ratios of velocities."""
+    """Return T, shape (nv, independent), with dq = T dq_independent: the joint equalities of the model as
+    ratios of velocities.
+    """
     ties, led = np.eye(model.nv), list[int]()
     for i in range(model.neq):
         if model.eq_type[i] == mujoco.mjtEq.mjEQ_JOINT and model.eq_active0[i]:

@@ -1,7 +1,7 @@
 """The stereo endoscope: draws the scene at the joint positions it is given, at a period of its own.
 
-A picture of the state at `t` comes out at the end of the step that begins there, stamped `t`, as a camera delivers a frame one
-period after it was exposed (docs/decisions/0013).
+A picture of the state at `t` comes out at the end of the step that begins there, stamped `t`, as a camera
+delivers a frame one period after it was exposed (docs/decisions/0013).
 """
 
 from __future__ import annotations
@@ -53,7 +53,13 @@ class Endoscope(Stepped):
         if params.images in ("compressed", "both"):
             kinds["image_raw/compressed"] = CompressedImage
         self._pictures = tuple(
-            Port(name=f"{eye}/{kind}", causality="output", type=model.ros_type, variability="event", frame=self._frame)
+            Port(
+                name=f"{eye}/{kind}",
+                causality="output",
+                type=model.ros_type,
+                variability="event",
+                frame=self._frame,
+            )
             for eye in EYES
             for kind, model in kinds.items()
         )
@@ -62,29 +68,56 @@ class Endoscope(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """`qpos` of the same scene and the nodes of soft bodies in; per eye, with ROS's names, pictures and their calibration out.
+        """`qpos` of the same scene and the nodes of soft bodies in; per eye, with ROS's names, pictures and
+        their calibration out.
 
         Pictures are events: none comes before the first step, and none at all on a machine without OpenGL.
         """
-        qpos = Port(name="qpos", causality="input", size=self._positions.size, description="joint positions of the scene, as the mujoco engine publishes them")
+        qpos = Port(
+            name="qpos",
+            causality="input",
+            size=self._positions.size,
+            description="joint positions of the scene, as the mujoco engine publishes them",
+        )
         nodes = "positions of the nodes of a soft body; the first message brings its surface"
-        bodies = (Port(name=f"{organ}/nodes", causality="input", type=SoftBodyState.ros_type, frame="world", description=nodes) for organ in self._bodies)
+        bodies = (
+            Port(
+                name=f"{organ}/nodes",
+                causality="input",
+                type=SoftBodyState.ros_type,
+                frame="world",
+                description=nodes,
+            )
+            for organ in self._bodies
+        )
         return (qpos, *bodies, *self._pictures)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
-        """Build the scene, unless soft bodies are missing from it. Where there is no OpenGL, say so once and publish no pictures."""
+        """Build the scene, unless soft bodies are missing from it.
+
+        Where there is no OpenGL, say so once and publish no pictures.
+        """
         if not self._pictures:
             return {}
         for package in ("mujoco", "PIL"):
             if find_spec(package) is None:
-                raise MissingExtraError(f"participant '{self.name}' (kind endoscope)", "mujoco", "pillow" if package == "PIL" else package)
+                raise MissingExtraError(
+                    f"participant '{self.name}' (kind endoscope)",
+                    "mujoco",
+                    "pillow" if package == "PIL" else package,
+                )
         opengl.import_mujoco()
         found = opengl.find()
         self._gl = found.name
         if found.name and not self._bodies:
             self._build()
         elif not found.name:
-            _log.warning("participant '%s' publishes no pictures: no OpenGL works here (%s). To mend it: %s", self.name, found.detail, opengl.REMEDY)
+            _log.warning(
+                "participant '%s' publishes no pictures: no OpenGL works here (%s). To mend it: %s",
+                self.name,
+                found.detail,
+                opengl.REMEDY,
+            )
         return self._outputs({})
 
     def _build(self) -> EndoscopeScene:
@@ -94,7 +127,10 @@ class Endoscope(Stepped):
         return self._scene
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Draw the state at `t`. Raises SessionError if a soft body is not what it was, or its surface unknown."""
+        """Draw the state at `t`.
+
+        Raises SessionError if a soft body is not what it was, or its surface unknown.
+        """
         self._positions[:] = inputs["qpos"]
         for organ, body in self._bodies.items():
             body.take(inputs.message(f"{organ}/nodes"))
@@ -104,16 +140,33 @@ class Endoscope(Stepped):
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
         pictures = scene.draw(self._positions)
         return self._outputs(
-            {f"{eye}/{name}": message for eye, pixels in zip(EYES, pictures, strict=True) for name, message in self._messages(eye, pixels, header)}
+            {
+                f"{eye}/{name}": message
+                for eye, pixels in zip(EYES, pictures, strict=True)
+                for name, message in self._messages(eye, pixels, header)
+            }
         )
 
     def _messages(self, eye: Eye, pixels: NDArray[np.uint8], header: Header) -> Iterator[tuple[str, Message]]:
         params = self.params
         yield "camera_info", camera_info(params.camera, eye, header)
         if params.images != "compressed":
-            yield "image_raw", Image(header=header, height=params.height, width=params.width, encoding="rgb8", step=3 * params.width, data=pixels.reshape(-1))
+            yield (
+                "image_raw",
+                Image(
+                    header=header,
+                    height=params.height,
+                    width=params.width,
+                    encoding="rgb8",
+                    step=3 * params.width,
+                    data=pixels.reshape(-1),
+                ),
+            )
         if params.images != "raw":
-            yield "image_raw/compressed", CompressedImage(header=header, format=params.format, data=self._compressed(pixels))
+            yield (
+                "image_raw/compressed",
+                CompressedImage(header=header, format=params.format, data=self._compressed(pixels)),
+            )
 
     def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
         return {port.name: (messages[port.name],) if messages else () for port in self._pictures}
@@ -128,7 +181,9 @@ class Endoscope(Stepped):
         return np.frombuffer(file.getvalue(), np.uint8)
 
     def state_hash(self) -> int:
-        """Return the hash of what was last drawn, positions and nodes; of no pixel, since two machines need not draw the same ones."""
+        """Return the hash of what was last drawn, positions and nodes; of no pixel, since two machines need
+        not draw the same ones.
+        """
         return state_hash(self.save())
 
     def save(self) -> bytes:
@@ -141,7 +196,10 @@ class Endoscope(Stepped):
         for body in self._bodies.values():
             rest = body.restore(rest)
         if len(state) < size or rest:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes is none of this scene; was it saved elsewhere?")
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes is none of this scene; was"
+                " it saved elsewhere?"
+            )
         self._positions[:] = np.frombuffer(state, np.float64, self._positions.size)
         if self._bodies:
             self.close()  # their surfaces may be others
@@ -154,7 +212,9 @@ class Endoscope(Stepped):
 
 
 def camera_info(camera: StereoCamera, eye: Eye, header: Header) -> CameraInfo:
-    """Return the calibration of one camera, as ROS has it for a rectified stereo pair: both in the left camera's optical frame."""
+    """Return the calibration of one camera, as ROS has it for a rectified stereo pair: both in the left
+    camera's optical frame.
+    """
     return CameraInfo(
         header=header,
         height=camera.height,

@@ -23,7 +23,9 @@ _MOST_PIXELS = 2048
 class ViewParams(Params):
     """Cameras that stand still in the world, upright."""
 
-    position: tuple[Length, Length, Length] = Field(description="of the middle between the cameras, in the world")
+    position: tuple[Length, Length, Length] = Field(
+        description="of the middle between the cameras, in the world"
+    )
     target: tuple[Length, Length, Length] = Field(description="the point in the world they look at")
 
     @model_validator(mode="after")
@@ -37,21 +39,42 @@ class EndoscopeParams(SceneParams):
     """The scene it looks at, the same as the robot's, and its cameras."""
 
     width: int = Field(default=endoscope.WIDTH, ge=16, le=_MOST_PIXELS, description="pixels of each picture")
-    height: int = Field(default=endoscope.HEIGHT, ge=16, le=_MOST_PIXELS, description="pixels of each picture")
+    height: int = Field(
+        default=endoscope.HEIGHT, ge=16, le=_MOST_PIXELS, description="pixels of each picture"
+    )
     field_of_view: Angle = Field(default=endoscope.FIELD_OF_VIEW, gt=0.0, lt=3.0, description="horizontal")
     baseline: Length = Field(default=endoscope.BASELINE, ge=0.0, description="distance of the two cameras")
     near: Length = Field(default=endoscope.NEAR, gt=0.0, description="what is nearer is not seen")
-    far: Length | None = Field(default=None, gt=0.0, description="what is farther is not seen; 2 m from the endoscope's tip, all of the scene from elsewhere")
+    far: Length | None = Field(
+        default=None,
+        gt=0.0,
+        description=(
+            "what is farther is not seen; 2 m from the endoscope's tip, all of the scene from elsewhere"
+        ),
+    )
     view: ViewParams | None = Field(
-        default=None, description="cameras that stand in the world; without it they are at the ECM's tip or, in a scene without ECM, look at all of it"
+        default=None,
+        description=(
+            "cameras that stand in the world; without it they are at the ECM's tip or, in a scene without"
+            " ECM, look at all of it"
+        ),
     )
     skins: dict[Name, SkinParams] = Field(
-        default_factory=dict[Name, SkinParams], description="soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
+        default_factory=dict[Name, SkinParams],
+        description=(
+            "soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
+        ),
     )
-    images: Literal["raw", "compressed", "both", "none"] = Field(default="raw", description="what is published of each picture; none: the camera is off")
+    images: Literal["raw", "compressed", "both", "none"] = Field(
+        default="raw", description="what is published of each picture; none: the camera is off"
+    )
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
-    quality: int = Field(default=95, ge=1, le=95, description="of a JPEG; beyond 95 files grow and pictures do not get better")
-    shadows: bool = Field(default=False, description="draw shadows and reflections: without a GPU several times as slow")
+    quality: int = Field(
+        default=95, ge=1, le=95, description="of a JPEG; beyond 95 files grow and pictures do not get better"
+    )
+    shadows: bool = Field(
+        default=False, description="draw shadows and reflections: without a GPU several times as slow"
+    )
 
     @property
     def camera(self) -> StereoCamera:

@@ -26,8 +26,12 @@ _SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
 class EndoscopeScene:
     """The model of the scene, its state, and the cameras in it."""
 
-    def __init__(self, params: EndoscopeParams, gl: str, bodies: Mapping[str, SoftBody] = MappingProxyType({})) -> None:
-        """Build the scene with the soft `bodies`, and prepare to draw it with the OpenGL that MUJOCO_GL calls `gl`."""
+    def __init__(
+        self, params: EndoscopeParams, gl: str, bodies: Mapping[str, SoftBody] = MappingProxyType({})
+    ) -> None:
+        """Build the scene with the soft `bodies`, and prepare to draw it with the OpenGL that MUJOCO_GL calls
+        `gl`.
+        """
         scene, ecm = spec(params), params.arms.get("ECM")
         if params.view is not None or ecm is None:
             _add_sky(scene)
@@ -43,8 +47,12 @@ class EndoscopeScene:
             far = far or FAR
         else:
             self._mounting = look_at(_overview(self._model))
-        far = far or float(np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent)
-        self._renderer = StereoRenderer(self._model, params.camera, (params.near, far), gl, shadows=params.shadows)
+        far = far or float(
+            np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent
+        )
+        self._renderer = StereoRenderer(
+            self._model, params.camera, (params.near, far), gl, shadows=params.shadows
+        )
 
     def draw(self, positions: Vector) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,)."""
@@ -71,7 +79,9 @@ class EndoscopeScene:
 
 
 def look_at(view: ViewParams) -> Vector:
-    """Return the optical frame (x right, y down, z ahead) of cameras at `view`, shape (4, 4), upright unless they look along the vertical."""
+    """Return the optical frame (x right, y down, z ahead) of cameras at `view`, shape (4, 4), upright unless
+    they look along the vertical.
+    """
     position, target = np.array(view.position), np.array(view.target)
     ahead = (target - position) / np.linalg.norm(target - position)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
@@ -88,10 +98,19 @@ def _overview(model: mujoco.MjModel) -> ViewParams:
     camera = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, camera)
     azimuth, elevation = np.radians([camera.azimuth, camera.elevation])
-    ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    ahead = np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    )
     x, y, z = camera.lookat - camera.distance * ahead
     return ViewParams(position=(x, y, z), target=tuple(camera.lookat))
 
 
 def _add_sky(scene: mujoco.MjSpec) -> None:
-    scene.add_texture(type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, rgb1=_SKY, rgb2=_GROUND, width=64, height=6 * 64)
+    scene.add_texture(
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=_SKY,
+        rgb2=_GROUND,
+        width=64,
+        height=6 * 64,
+    )

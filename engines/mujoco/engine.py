@@ -1,7 +1,9 @@
-"""The MuJoCo engine: dVRK arms with joint servos, things to hold, power bonds at probes and contact spheres, and exact checkpoints.
+"""The MuJoCo engine: dVRK arms with joint servos, things to hold, power bonds at probes and contact spheres,
+and exact checkpoints.
 
-A sub-step is `mj_step2` (actuation to integration) followed by `mj_step1` (kinematics, velocities, sensors): the same
-work as `mj_step`, in the order that leaves every output at the end of the step instead of one sub-step behind.
+A sub-step is `mj_step2` (actuation to integration) followed by `mj_step1` (kinematics, velocities, sensors):
+the same work as `mj_step`, in the order that leaves every output at the end of the step instead of one
+sub-step behind.
 """
 
 from __future__ import annotations
@@ -53,20 +55,28 @@ class MujocoEngine(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Per arm commands in and measured state out; the whole model's positions; per object its pose, holder, slip and lift."""
+        """Per arm commands in and measured state out; the whole model's positions; per object its pose,
+        holder, slip and lift.
+        """
         return scene_ports(self.params)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Per palpation probe `<arm>/probe`: its sphere; per instrument with contact spheres `<arm>/contact`: their centres; in the world."""
-        return tuple(side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)}) for side in bond_sides(self.params))
+        """Per palpation probe `<arm>/probe`: its sphere; per instrument with contact spheres `<arm>/contact`:
+        their centres; in the world.
+        """
+        return tuple(
+            side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)})
+            for side in bond_sides(self.params)
+        )
 
     def configure(self, setup: Setup) -> Outputs:
         """Build and compile the model, and put the arms where they start."""
         timestep, period = self.params.timestep, setup.period_ns
         if period % timestep:
             problem = (
-                f"timestep {timestep / 1e6:g} ms does not divide the participant's period {period / 1e6:g} ms; set it to {period / 1e6:g} ms or a part of it"
+                f"timestep {timestep / 1e6:g} ms does not divide the participant's period {period / 1e6:g}"
+                f" ms; set it to {period / 1e6:g} ms or a part of it"
             )
             raise ScenarioError(problem, path=("participants", self.name, "timestep"))
         if find_spec("mujoco") is None:
@@ -79,7 +89,8 @@ class MujocoEngine(Stepped):
         from engines.mujoco.rigid_contact import RigidContact
         from engines.mujoco.servos import Servos
 
-        mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)  # else MuJoCo writes MUJOCO_LOG.TXT where the user stands
+        # else MuJoCo writes MUJOCO_LOG.TXT where the user stands
+        mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
         spec = model.spec(self.params)
         holding.prepare(spec, self.params)
         spec.option.timestep = timestep * 1e-9
@@ -90,14 +101,21 @@ class MujocoEngine(Stepped):
         mujoco.mj_forward(self._model, self._data)
         self._readings = Readings(self._model, self._data, self.params.arms, self._servos)
         self._brakes = holding.Brakes(self._model, self._data, self.params)
-        self._holding = holding.Holding(self._model, self._data, self.params, self.params.publish_period * 1e-9)
+        self._holding = holding.Holding(
+            self._model, self._data, self.params, self.params.publish_period * 1e-9
+        )
         psms = (arm for arm, params in self.params.arms.items() if isinstance(params, PsmParams))
         self._rigid = RigidContact(self._model, self._data, psms)
         self._outputs.update({**self._readings.outputs, **self._holding.outputs, **self._rigid.outputs})
         self._couple(setup)
         self._readings.refresh()
         self._holding.refresh()
-        self._keepers = [self._servos, self._brakes, self._holding, *(touching.motion for touching in self._touching)]
+        self._keepers = [
+            self._servos,
+            self._brakes,
+            self._holding,
+            *(touching.motion for touching in self._touching),
+        ]
         trouble = mujoco.mjtWarning
         self._trouble = self._data.warning.number.data[trouble.mjWARN_BADQPOS : trouble.mjWARN_BADCTRL + 1]
         self._signature = self._what_is_state()
@@ -119,10 +137,16 @@ class MujocoEngine(Stepped):
                 touching = kinds[kind](arm, MotionSide(bond, plan), self._model, self._data)
                 self._touching.append(touching)
                 self._outputs.update(touching.outputs)
-        self._renewed = [touching for touching in self._touching if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None]
+        self._renewed = [
+            touching
+            for touching in self._touching
+            if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None
+        ]
 
     def _what_is_state(self) -> int:
-        """Return which parts of MuJoCo's data are state: without a bond nothing ever applies a force, and half of its numbers stay 0."""
+        """Return which parts of MuJoCo's data are state: without a bond nothing ever applies a force, and
+        half of its numbers stay 0.
+        """
         state = self._mujoco.mjtState
         applied = int(state.mjSTATE_QFRC_APPLIED | state.mjSTATE_XFRC_APPLIED)
         return int(state.mjSTATE_INTEGRATION) & ~(0 if self._touching else applied)
@@ -154,14 +178,19 @@ class MujocoEngine(Stepped):
         return self._outputs
 
     def _diagnosis(self, t: int, inputs: Inputs) -> str:
-        bad = self._mujoco.mjtWarning(self._mujoco.mjtWarning.mjWARN_BADQPOS + list(map(bool, self._trouble)).index(True))
+        bad = self._mujoco.mjtWarning(
+            self._mujoco.mjtWarning.mjWARN_BADQPOS + list(map(bool, self._trouble)).index(True)
+        )
         where = f"MuJoCo reports {bad.name} in the step from {t * 1e-9:g} s"
-        for port in [port.name for port in self.ports if port.causality == "input"] + [touching.motion.force_port for touching in self._touching]:
+        for port in [port.name for port in self.ports if port.causality == "input"] + [
+            touching.motion.force_port for touching in self._touching
+        ]:
             if not np.isfinite(inputs[port]).all():
                 return f"{where}: input '{port}' is {inputs[port]}; every number must be finite"
         return (
-            f"{where}, arms {', '.join(self.params.arms)}: the simulation is unstable. Likeliest cause: a bond whose wrench is too stiff for its step"
-            f" (shorten the step, or use impulse-linearised), else the sub-step (timestep, now {self.params.timestep} ns)"
+            f"{where}, arms {', '.join(self.params.arms)}: the simulation is unstable. Likeliest cause: a"
+            " bond whose wrench is too stiff for its step (shorten the step, or use impulse-linearised),"
+            f" else the sub-step (timestep, now {self.params.timestep} ns)"
         )
 
     def _read_state(self) -> None:
@@ -173,19 +202,26 @@ class MujocoEngine(Stepped):
             at += state.size
 
     def state_hash(self) -> int:
-        """Return the hash of MuJoCo's integration state, setpoints and modes, who holds what, and the bonds' books."""
+        """Return the hash of MuJoCo's integration state, setpoints and modes, who holds what, and the bonds'
+        books.
+        """
         self._read_state()
         return state_hash(self._state)
 
     def save(self) -> bytes:
-        """Return MuJoCo's integration state (`mjSTATE_INTEGRATION`, applied forces only where there are probes) and what the other parts remember."""
+        """Return MuJoCo's integration state (`mjSTATE_INTEGRATION`, applied forces only where there are
+        probes) and what the other parts remember.
+        """
         self._read_state()
         return self._state.tobytes()
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state, bit for bit. Raises StateError if it is none of this model's."""
         if len(state) != self._state.nbytes:
-            raise StateError(f"participant '{self.name}': a saved state of {len(state)} bytes, this model's has {self._state.nbytes}; was it saved elsewhere?")
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes, this model's has"
+                f" {self._state.nbytes}; was it saved elsewhere?"
+            )
         values = np.frombuffer(state)
         at = self._size
         for keeper in self._keepers:

@@ -1,7 +1,8 @@
 """Who holds what: objects between jaws, and the brakes of the endoscope manipulator.
 
-An object is held by an arm once both fingers have touched it for `_SETTLED`. With `grasp: weld` a weld between wrist and object
-comes and goes with that; with `grasp: friction` nothing but contact acts, and this module only looks.
+An object is held by an arm once both fingers have touched it for `_SETTLED`. With `grasp: weld` a weld
+between wrist and object comes and goes with that; with `grasp: friction` nothing but contact acts, and this
+module only looks.
 """
 
 from __future__ import annotations
@@ -24,29 +25,45 @@ _SETTLED = 0.1
 _RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 _BRAKED = "ECM"
 _POSE = np.array([0, 1, 2, 4, 5, 6, 3])
-"""Where a pose (x, y, z, qx, qy, qz, qw) stands in the position of a free joint, with the quaternion w first."""
+"""Where a pose (x, y, z, qx, qy, qz, qw) stands in the position of a free joint, with the quaternion w first.
+"""
 
 
 def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
     """Add to the model of `scene` what this module needs.
 
-    That is the tie that makes two fingers one jaw (however hard it closes, they do not give way together to one side), and, not active
-    yet, welds and brakes.
+    That is the tie that makes two fingers one jaw (however hard it closes, they do not give way together to
+    one side), and, not active yet, welds and brakes.
     """
     if _BRAKED in scene.arms:
         for joint in scene.arms[_BRAKED].chain.joints:
             name = f"{_BRAKED}/{joint.name}"
-            spec.add_equality(name=f"{name}/brake", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=name, active=False, **_RIGID)
+            spec.add_equality(
+                name=f"{name}/brake",
+                type=mujoco.mjtEq.mjEQ_JOINT,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                name1=name,
+                active=False,
+                **_RIGID,
+            )
     for arm in _jawed(scene):
         left, right = (f"{arm}/{finger}" for finger in FINGERS)
         spec.add_equality(
-            name=f"{arm}/jaw", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=left, name2=right, data=[0.0, 1.0, *[0.0] * 10], **_RIGID
+            name=f"{arm}/jaw",
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=left,
+            name2=right,
+            data=[0.0, 1.0, *[0.0] * 10],
+            **_RIGID,
         )
     if scene.grasp == "weld":
         for thing in scene.objects:
             for arm in _jawed(scene):
                 ends = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "name1": f"{arm}/wrist_yaw", "name2": thing}
-                spec.add_equality(name=f"{thing}/{arm}/weld", type=mujoco.mjtEq.mjEQ_WELD, active=False, **ends, **_RIGID)
+                spec.add_equality(
+                    name=f"{thing}/{arm}/weld", type=mujoco.mjtEq.mjEQ_WELD, active=False, **ends, **_RIGID
+                )
 
 
 def _jawed(scene: SceneParams) -> list[str]:
@@ -73,7 +90,9 @@ class Brakes:
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not hold: where the brakes closed, and whether they are; the same array at every call."""
+        """What MuJoCo's own state does not hold: where the brakes closed, and whether they are; the same
+        array at every call.
+        """
         return self._state
 
     @state.setter
@@ -98,14 +117,20 @@ class Holding:
         shape = (len(things), len(arms))
         self._ends = _ends(model, things, [f"{arm}/{finger}" for arm in arms for finger in FINGERS])
         self._contacts = np.zeros((*shape, 2, 4))  # per finger: how many, sum of their positions
-        welds = [model.equality(f"{thing}/{arm}/weld").id for thing in things for arm in arms] if scene.grasp == "weld" else []
+        welds = (
+            [model.equality(f"{thing}/{arm}/weld").id for thing in things for arm in arms]
+            if scene.grasp == "weld"
+            else []
+        )
         self._welds = np.array(welds, int).reshape(shape) if welds else None
         sizes = np.cumsum([shape[0] * shape[1], shape[0], 10 * shape[0] * shape[1]])
         self._state = np.concatenate([np.zeros(sizes[2]), model.eq_data[welds].ravel()])
         touched, self._holder, grip, weld_data = np.split(self._state, sizes)
         self._touched = touched.reshape(shape)  # how often in succession both fingers were seen to touch
         self._holder[:] = -1.0  # index of an arm
-        self._grip = grip.reshape(*shape, 10)  # where the fingers took hold: in the object, and in the left finger; the object's orientation in that finger
+        # where the fingers took hold: in the object, and in the left finger; the object's orientation in that
+        # finger
+        self._grip = grip.reshape(*shape, 10)
         self._weld_data = weld_data.reshape(-1, model.eq_data.shape[1])
         joints = [int(model.joint(thing).qposadr[0]) + _POSE for thing in things]
         self._where, self._positions = np.array(joints, int).reshape(-1, 7), data.qpos
@@ -113,7 +138,10 @@ class Holding:
         self._height = data.xpos[self._bodies, 2].copy()
         self.outputs: dict[str, Vector] = {}
         for i, thing in enumerate(things):
-            values = {f"{thing}/{name}": self._values[i, k : k + 1] for k, name in enumerate(("held_by", "slip", "turn", "lift"))}
+            values = {
+                f"{thing}/{name}": self._values[i, k : k + 1]
+                for k, name in enumerate(("held_by", "slip", "turn", "lift"))
+            }
             self.outputs |= {f"{thing}/pose": self._poses[i], **values}
 
     def update(self) -> None:
@@ -133,9 +161,11 @@ class Holding:
         self.refresh()
 
     def _look(self) -> bool:
-        """Count the contacts of every finger with every object, and sum their positions; say whether there are any.
+        """Count the contacts of every finger with every object, and sum their positions; say whether there
+        are any.
 
-        Once per look and in Python: 36 contact sensors of a full cart with six objects cost MuJoCo a twentieth of every sub-step.
+        Once per look and in Python: 36 contact sensors of a full cart with six objects cost MuJoCo a
+        twentieth of every sub-step.
         """
         self._contacts[:] = 0.0
         contact = self._data.contact
@@ -148,7 +178,8 @@ class Holding:
 
     def refresh(self) -> None:
         """Bring the outputs up to the model's present state."""
-        self._positions.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
+        # three times as fast as the default mode
+        self._positions.take(self._where, None, self._poses, "clip")
         np.subtract(self._poses[:, 2], self._height, out=self._values[:, 3])
         self._values[:, :3] = 0.0
         for i, holder in enumerate(map(int, self._holder.tolist())):
@@ -182,10 +213,16 @@ class Holding:
     def _slip(self, i: int, j: int) -> float:
         data, body, finger = self._data, self._bodies[i], self._fingers[j]
         point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self._grip[i, j, :3]
-        return float(np.linalg.norm(data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:6]))
+        return float(
+            np.linalg.norm(
+                data.xmat[finger].reshape(3, 3).T @ (point - data.xpos[finger]) - self._grip[i, j, 3:6]
+            )
+        )
 
     def _turn(self, i: int, j: int) -> float:
-        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` since it was taken."""
+        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` since it was
+        taken.
+        """
         w = abs(float(self._grip[i, j, 6:] @ self._orientation(i, j)))
         return 2.0 * acos(min(w, 1.0))
 
@@ -209,7 +246,9 @@ class Holding:
 
 
 def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> NDArray[np.intp]:
-    """Return for every geom of `model` i + 1 if it is of the object i, -(i + 1) if it is of the finger i or of a pad on it, else 0."""
+    """Return for every geom of `model` i + 1 if it is of the object i, -(i + 1) if it is of the finger i or
+    of a pad on it, else 0.
+    """
     ends = np.zeros(model.nbody, int)
     for sign, bodies in (1, things), (-1, fingers):
         for i, body in enumerate(bodies, 1):

@@ -12,5 +12,7 @@ _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def moment(arms: Vector, forces: Vector) -> Vector:
-    """Return the moments, shape (..., 3), of `forces` (..., 3) at the ends of `arms` (..., 3): the cross product, at a quarter of the cost of np.cross."""
+    """Return the moments, shape (..., 3), of `forces` (..., 3) at the ends of `arms` (..., 3): the cross
+    product, at a quarter of the cost of np.cross.
+    """
     return arms.take(_YZX, -1) * forces.take(_ZXY, -1) - arms.take(_ZXY, -1) * forces.take(_YZX, -1)

@@ -22,8 +22,13 @@ _Side = Annotated[Length, Field(gt=0.0)]
 
 
 class _Object(Params):
-    position: tuple[Length, Length, Length] = Field(description="of the object's frame in the world at time 0")
-    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the object's frame in the world at time 0: quaternion x, y, z, w")
+    position: tuple[Length, Length, Length] = Field(
+        description="of the object's frame in the world at time 0"
+    )
+    orientation: UnitQuaternion = Field(
+        default=(0.0, 0.0, 0.0, 1.0),
+        description="of the object's frame in the world at time 0: quaternion x, y, z, w",
+    )
 
 
 class _Wire(_Object):
@@ -35,7 +40,9 @@ class _Wire(_Object):
     @model_validator(mode="after")
     def _is_thinner_than_its_circle(self) -> Self:
         if self.wire_radius >= self.radius:
-            raise ValueError(f"wire_radius ({self.wire_radius:g} m) must be less than radius ({self.radius:g} m)")
+            raise ValueError(
+                f"wire_radius ({self.wire_radius:g} m) must be less than radius ({self.radius:g} m)"
+            )
         return self
 
 
@@ -54,9 +61,11 @@ class RingParams(_Wire):
 
 
 class NeedleParams(_Wire):
-    """A round wire bent to an arc; its frame is in the arc's centre, z normal to its plane, x to the middle of the wire.
+    """A round wire bent to an arc; its frame is in the arc's centre, z normal to its plane, x to the middle
+    of the wire.
 
-    The defaults are the needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm, wire 0.8 mm.
+    The defaults are the needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre
+    line 11.44 mm, wire 0.8 mm.
     """
 
     kind: Literal["needle"]
@@ -67,7 +76,9 @@ class NeedleParams(_Wire):
 
 
 class BlockParams(_Object):
-    """A box; its frame is in the middle. The default size is that of the small objects in unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt."""
+    """A box; its frame is in the middle. The default size is that of the small objects in
+    unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt.
+    """
 
     kind: Literal["block"]
     size: tuple[_Side, _Side, _Side] = Field(default=(9e-3, 14e-3, 20.5e-3), description="along x, y and z")

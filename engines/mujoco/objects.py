@@ -1,7 +1,7 @@
 """The table and the things that lie on it, as bodies of the MuJoCo model.
 
-A bent wire is a row of capsules. Its mass, centre and inertia are those of the smooth wire, so they do not depend on how
-many capsules there are.
+A bent wire is a row of capsules. Its mass, centre and inertia are those of the smooth wire, so they do not
+depend on how many capsules there are.
 """
 
 from __future__ import annotations
@@ -18,27 +18,46 @@ from schemas.vectors import Vector
 
 __all__ = ["CONTACT", "add", "add_table", "wire_inertia"]
 
-CONTACT: dict[str, Any] = {"condim": 4, "friction": [1.0, 0.005, 0.0001], "solref": [0.001, 1.0], "solimp": [0.999, 0.9999, 0.0001, 0.5, 2.0], "priority": 1}
-"""How objects touch: by sliding and twisting friction, and stiffer than MuJoCo's default, so that a light thin wire does not sink
-into a jaw (docs/decisions/0012). The priority makes this hold for every pair that has an object in it. Friction coefficients are
-MuJoCo's defaults; 1 stands for the knurled jaws of a needle driver."""
+CONTACT: dict[str, Any] = {
+    "condim": 4,
+    "friction": [1.0, 0.005, 0.0001],
+    "solref": [0.001, 1.0],
+    "solimp": [0.999, 0.9999, 0.0001, 0.5, 2.0],
+    "priority": 1,
+}
+"""How objects touch: by sliding and twisting friction, and stiffer than MuJoCo's default, so that a light
+thin wire does not sink into a jaw (docs/decisions/0012). The priority makes this hold for every pair that has
+an object in it. Friction coefficients are MuJoCo's defaults; 1 stands for the knurled jaws of a needle
+driver.
+"""
 
 _THINGS, _TABLE, _WIRES = 1, 32, 64
-"""Collision bits beside those of the arms (engines.mujoco.model.shapes): of whatever is no wire, as is MuJoCo's default; of tables; of wires among each other.
-A wire lies on a table with a few balls, so that one at rest costs a few contacts and not two for each of its capsules."""
+"""Collision bits beside those of the arms (engines.mujoco.model.shapes): of whatever is no wire, as is
+MuJoCo's default; of tables; of wires among each other. A wire lies on a table with a few balls, so that one
+at rest costs a few contacts and not two for each of its capsules.
+"""
 _BALLS_APART = pi / 4.0
 """Greatest angle between two of those balls, rad."""
-_RGBA = {"ring": [0.85, 0.2, 0.15, 1.0], "needle": [0.8, 0.8, 0.85, 1.0], "block": [0.9, 0.75, 0.2, 1.0], "table": [0.32, 0.45, 0.4, 1.0]}
+_RGBA = {
+    "ring": [0.85, 0.2, 0.15, 1.0],
+    "needle": [0.8, 0.8, 0.85, 1.0],
+    "block": [0.9, 0.75, 0.2, 1.0],
+    "table": [0.32, 0.45, 0.4, 1.0],
+}
 _ROUNDNESS = 0.1
 """Greatest distance of a wire's capsules from its centre line, as a share of its radius."""
 
 
 def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
-    """Add the table to the world, as a body: MuJoCo pairs geoms of the world itself with every link, wherever that is."""
+    """Add the table to the world, as a body: MuJoCo pairs geoms of the world itself with every link, wherever
+    that is.
+    """
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
     body = spec.worldbody.add_body(name="table", pos=[x, y, z - half[2]])
-    body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, conaffinity=_TABLE, rgba=_RGBA["table"])
+    body.add_geom(
+        name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, conaffinity=_TABLE, rgba=_RGBA["table"]
+    )
 
 
 def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
@@ -49,23 +68,34 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
     match params:
         case BlockParams():
             half = [extent / 2.0 for extent in params.size]
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half, density=params.density, rgba=_RGBA[params.kind], **CONTACT)
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                size=half,
+                density=params.density,
+                rgba=_RGBA[params.kind],
+                **CONTACT,
+            )
         case RingParams() | NeedleParams():
             _add_wire(body, params)
 
 
 def _add_wire(body: mujoco.MjsBody, params: RingParams | NeedleParams) -> None:
     radius, thickness = params.radius, params.wire_radius
-    most = 2.0 * acos(1.0 - min(1.0, _ROUNDNESS * thickness / radius))  # the angle whose chord strays that far from its arc
+    # the angle whose chord strays that far from its arc
+    most = 2.0 * acos(1.0 - min(1.0, _ROUNDNESS * thickness / radius))
     points = _on_arc(params, max(4, ceil(params.arc / most)))
     rgba = _RGBA[params.kind]
     for start, end in pairwise(points):
         size, ends = [thickness, 0.0, 0.0], np.concatenate([start, end])
         bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=size, fromto=ends, mass=0.0, rgba=rgba, **bits, **CONTACT)
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=size, fromto=ends, mass=0.0, rgba=rgba, **bits, **CONTACT
+        )
     for point in _on_arc(params, ceil(params.arc / _BALLS_APART)):
         size, bits = [thickness, 0.0, 0.0], {"contype": _TABLE, "conaffinity": 0}
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=point, mass=0.0, rgba=rgba, **bits, **CONTACT)
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=point, mass=0.0, rgba=rgba, **bits, **CONTACT
+        )
     mass, centre, inertia = wire_inertia(radius, thickness, params.arc, params.density)
     body.mass, body.ipos, body.inertia, body.explicitinertial = mass, [centre, 0.0, 0.0], inertia, True
 
@@ -77,7 +107,8 @@ def _on_arc(params: RingParams | NeedleParams, count: int) -> Vector:
 
 
 def wire_inertia(radius: float, thickness: float, arc: float, density: float) -> tuple[float, float, Vector]:
-    """Return mass (kg), distance of the centre of mass from the arc's centre (m) and principal moments about it (kg m^2).
+    """Return mass (kg), distance of the centre of mass from the arc's centre (m) and principal moments about
+    it (kg m^2).
 
     Args:
         radius: Of the centre line, m.
@@ -85,8 +116,8 @@ def wire_inertia(radius: float, thickness: float, arc: float, density: float) ->
         arc: From end to end, rad; the wire lies in the plane z = 0, its middle on the x axis.
         density: kg/m^3.
 
-    A thin wire along r (cos a, sin a, 0), |a| < arc/2: its moments are means of cos^2 and sin^2 over the arc; each of its
-    sections adds m s^2/4 about its diameters and m s^2/2 about the tangent (s: `thickness`).
+    A thin wire along r (cos a, sin a, 0), |a| < arc/2: its moments are means of cos^2 and sin^2 over the arc;
+    each of its sections adds m s^2/4 about its diameters and m s^2/2 about the tangent (s: `thickness`).
     """
     mass = density * pi * thickness**2 * radius * arc
     centre = radius * sin(arc / 2.0) / (arc / 2.0)

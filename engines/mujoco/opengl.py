@@ -1,7 +1,8 @@
 """Which OpenGL draws without a screen on this machine.
 
-A process can try one only: PyOpenGL and MuJoCo settle on it at the first use. So each is tried in a process of its own, which
-also survives a driver that crashes. `MUJOCO_GL`, if it is set, is obeyed (https://mujoco.readthedocs.io/en/stable/programming).
+A process can try one only: PyOpenGL and MuJoCo settle on it at the first use. So each is tried in a process
+of its own, which also survives a driver that crashes. `MUJOCO_GL`, if it is set, is obeyed
+(https://mujoco.readthedocs.io/en/stable/programming).
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ _PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class OpenGL:
-    """What `find` found: the value of MUJOCO_GL that works, empty if none does, and the renderer's name or what went wrong."""
+    """What `find` found: the value of MUJOCO_GL that works, empty if none does, and the renderer's name or
+    what went wrong.
+    """
 
     name: str
     detail: str
@@ -54,9 +57,18 @@ def find() -> OpenGL:
 
 
 def _try(name: str) -> tuple[bool, str]:
-    environment = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"} | {"MUJOCO_GL": name}
+    environment = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"} | {
+        "MUJOCO_GL": name
+    }
     try:
-        done = subprocess.run([sys.executable, "-P", "-m", __name__, name], env=environment, capture_output=True, text=True, timeout=_PATIENCE_S, check=False)
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", __name__, name],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE_S,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         return False, f"nothing drawn within {_PATIENCE_S:g} s"
     if done.returncode == 0:
@@ -65,9 +77,11 @@ def _try(name: str) -> tuple[bool, str]:
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo, also where MUJOCO_GL names an OpenGL that this machine does not have: physics needs none.
+    """Import MuJoCo, also where MUJOCO_GL names an OpenGL that this machine does not have: physics needs
+    none.
 
-    MuJoCo's package loads that OpenGL as it is imported, and fails with whatever the OpenGL library's loader raises.
+    MuJoCo's package loads that OpenGL as it is imported, and fails with whatever the OpenGL library's loader
+    raises.
     """
     try:
         import_module("mujoco")
@@ -82,14 +96,19 @@ def import_mujoco() -> None:
 
 
 def context(name: str, width: int, height: int) -> Any:
-    """Return a `GLContext` of MuJoCo, with `make_current` and `free`, of the OpenGL that MUJOCO_GL calls `name`."""
-    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)  # it reports that an optional package is not there
+    """Return a `GLContext` of MuJoCo, with `make_current` and `free`, of the OpenGL that MUJOCO_GL calls
+    `name`.
+    """
+    # it reports that an optional package is not there
+    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
     os.environ["MUJOCO_GL"] = name  # MuJoCo's library asks it where OpenGL's functions are
     return import_module(f"mujoco.{'glfw' if name in _SCREEN else name}").GLContext(width, height)
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether cameras work on this machine, what was found, and what mends it where they do not: for `trocar doctor`."""
+    """Return whether cameras work on this machine, what was found, and what mends it where they do not: for
+    `trocar doctor`.
+    """
     if find_spec("mujoco") is None:
         return False, "not tried: mujoco is not installed", "pip install 'trocar[mujoco]'"
     found = find()
@@ -102,7 +121,9 @@ def _draw(name: str) -> None:
 
     gl = context(name, 16, 16)
     gl.make_current()
-    drawing = mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), mujoco.mjtFontScale.mjFONTSCALE_50)
+    drawing = mujoco.MjrContext(
+        mujoco.MjModel.from_xml_string("<mujoco/>"), mujoco.mjtFontScale.mjFONTSCALE_50
+    )
     renderer: Any = import_module("OpenGL.GL")
     sys.stdout.write(renderer.glGetString(renderer.GL_RENDERER).decode())
     drawing.free()

@@ -25,7 +25,9 @@ __all__ = ["EcmParams", "MujocoParams", "PsmParams", "SceneParams"]
 class PsmParams(MountedPsm):
     """A patient-side manipulator: what it holds and where it starts."""
 
-    probe_radius: Length = Field(default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe")
+    probe_radius: Length = Field(
+        default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe"
+    )
 
 
 EcmParams = MountedEcm
@@ -56,7 +58,10 @@ def _validated_as(form: Any) -> GetPydanticSchema:
 def _object_names(objects: Mapping[str, ObjectParams]) -> Mapping[str, ObjectParams]:
     for name in objects:
         if not valid_name(name) or name in _Arms.__annotations__:
-            raise ValueError(f"'{name}' is no name of an object: a letter, then letters, digits and underscores, and no arm's name")
+            raise ValueError(
+                f"'{name}' is no name of an object: a letter, then letters, digits and underscores, and no"
+                " arm's name"
+            )
     return objects
 
 
@@ -66,40 +71,72 @@ class SceneParams(Params):
     model: Literal["dvrk"] = "dvrk"
     arms: Annotated[dict[CartArm, PsmParams | EcmParams], _validated_as(_Arms), Field(min_length=1)]
     mounting: Literal["free", "cart"] = Field(
-        default="free", description="each arm where its position and orientation say, or on the setup joints of the cart, whose frame is the world then"
+        default="free",
+        description=(
+            "each arm where its position and orientation say, or on the setup joints of the cart, whose frame"
+            " is the world then"
+        ),
     )
     setup_joints: Annotated[dict[CartArm, SetupPositions], _validated_as(_SetupJoints)] = Field(
         default_factory=dict[CartArm, SetupPositions],
-        description="where the braked setup joints are set; an arm that is not named has the simulated positions",
+        description=(
+            "where the braked setup joints are set; an arm that is not named has the simulated positions"
+        ),
     )
     table: TableParams | None = None
-    objects: Annotated[dict[str, ObjectParams], AfterValidator(_object_names)] = Field(default_factory=dict[str, ObjectParams])
-    grasp: Literal["friction", "weld"] = Field(
-        default="friction", description="what holds an object between two jaws: friction alone, or a weld as long as both touch it"
+    objects: Annotated[dict[str, ObjectParams], AfterValidator(_object_names)] = Field(
+        default_factory=dict[str, ObjectParams]
     )
-    looks: bool = Field(default=True, description="give the robot its meshes; without, only what collides is there")
+    grasp: Literal["friction", "weld"] = Field(
+        default="friction",
+        description=(
+            "what holds an object between two jaws: friction alone, or a weld as long as both touch it"
+        ),
+    )
+    looks: bool = Field(
+        default=True, description="give the robot its meshes; without, only what collides is there"
+    )
 
     @model_validator(mode="after")
     def _stands_in_one_place(self) -> Self:
         if self.mounting == "free" and self.setup_joints:
             raise ValueError("setup_joints are those of the cart; say 'mounting: cart' or leave them out")
-        placed = [name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}]
+        placed = [
+            name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}
+        ]
         if self.mounting == "cart" and placed:
-            raise ValueError(f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart setup_joints say where an arm stands")
+            raise ValueError(
+                f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart"
+                " setup_joints say where an arm stands"
+            )
         return self
 
     @model_validator(mode="after")
     def _rolls_by_friction(self) -> Self:
-        rolling = [name for name, arm in self.arms.items() if isinstance(arm, PsmParams) and arm.tool.roller is not None]
+        rolling = [
+            name
+            for name, arm in self.arms.items()
+            if isinstance(arm, PsmParams) and arm.tool.roller is not None
+        ]
         if rolling and self.objects and self.grasp == "weld":
-            raise ValueError(f"grasp: weld would hold what the instrument of {', '.join(rolling)} is to roll; take grasp: friction")
+            raise ValueError(
+                f"grasp: weld would hold what the instrument of {', '.join(rolling)} is to roll; take grasp:"
+                " friction"
+            )
         return self
 
 
 class MujocoParams(SceneParams):
     """A scene, and how it is stepped."""
 
-    timestep: Duration = Field(default=500_000, gt=0, description="sub-step of the physics; divides the participant's period")
+    timestep: Duration = Field(
+        default=500_000, gt=0, description="sub-step of the physics; divides the participant's period"
+    )
     publish_period: Duration = Field(
-        default=5_000_000, gt=0, description="at which measured_cp, setpoint_js, qpos and the objects' poses are published; a multiple of the period"
+        default=5_000_000,
+        gt=0,
+        description=(
+            "at which measured_cp, setpoint_js, qpos and the objects' poses are published; a multiple of the"
+            " period"
+        ),
     )

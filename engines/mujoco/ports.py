@@ -10,9 +10,16 @@ from schemas.ports import BondSide, Port
 
 __all__ = ["bond_sides", "has_hand", "has_jaw", "has_probe", "has_spheres", "scene_ports"]
 
-_JOINT_STATE, _POSE, _WRENCH = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/WrenchStamped"
+_JOINT_STATE, _POSE, _WRENCH = (
+    "sensor_msgs/msg/JointState",
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/WrenchStamped",
+)
 _ALL = ("position", "velocity", "effort")
-_MODES = "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort; 3 and 4 the last two without gravity compensation"
+_MODES = (
+    "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort; 3 and 4 the last two"
+    " without gravity compensation"
+)
 
 
 def has_jaw(params: PsmParams | EcmParams) -> bool:
@@ -38,14 +45,28 @@ def has_probe(params: PsmParams | EcmParams) -> bool:
 def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
     """Return all ports but those of bonds."""
     slow = params.publish_period
-    ports = [port for name, arm in params.arms.items() for port in (*_arm_ports(name, arm, slow), *_jaw_ports(name, arm), *_hand_ports(name, arm))]
+    ports = [
+        port
+        for name, arm in params.arms.items()
+        for port in (*_arm_ports(name, arm, slow), *_jaw_ports(name, arm), *_hand_ports(name, arm))
+    ]
     size = position_count(params)
-    ports.append(Port(name="qpos", causality="output", size=size, period_ns=slow, description="joint positions of the whole model, as MuJoCo has them"))
+    ports.append(
+        Port(
+            name="qpos",
+            causality="output",
+            size=size,
+            period_ns=slow,
+            description="joint positions of the whole model, as MuJoCo has them",
+        )
+    )
     return (*ports, *(port for name in params.objects for port in _object_ports(name, slow)))
 
 
 def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
-    """Return per palpation probe the bond `<arm>/probe`, and per instrument with contact spheres `<arm>/contact`, all in the world."""
+    """Return per palpation probe the bond `<arm>/probe`, and per instrument with contact spheres
+    `<arm>/contact`, all in the world.
+    """
     return tuple(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm))
 
 
@@ -59,52 +80,157 @@ def _arm_bonds(name: str, arm: PsmParams | EcmParams) -> Iterator[BondSide]:
 def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[Port]:
     names = tuple(joint.name for joint in params.chain.joints)
     still = (0.0,) * len(names)
-    yield Port(name=f"{arm}/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=params.start, description="goal of the joint servos")
-    yield Port(name=f"{arm}/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode")
+    yield Port(
+        name=f"{arm}/servo_jp",
+        causality="input",
+        type=_JOINT_STATE,
+        names=names,
+        start=params.start,
+        description="goal of the joint servos",
+    )
+    yield Port(
+        name=f"{arm}/servo_jf",
+        causality="input",
+        type=_JOINT_STATE,
+        names=names,
+        fields=("effort",),
+        start=still,
+        description="acts in effort mode",
+    )
     yield Port(name=f"{arm}/control_mode", causality="input", size=2, start=(1.0, 1.0), description=_MODES)
     yield Port(name=f"{arm}/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
     yield Port(name=f"{arm}/setpoint_js", causality="output", type=_JOINT_STATE, names=names, period_ns=slow)
     yield Port(name=f"{arm}/measured_cp", causality="output", type=_POSE, frame=f"{arm}_base", period_ns=slow)
     if has_probe(params) or has_spheres(params):
-        felt = "mean over the last step of the force through the bonds on the instrument, with its moment about the tip: what a haptic device feels"
-        yield Port(name=f"{arm}/tip_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt)
+        felt = (
+            "mean over the last step of the force through the bonds on the instrument, with its moment about"
+            " the tip: what a haptic device feels"
+        )
+        yield Port(
+            name=f"{arm}/tip_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt
+        )
     if isinstance(params, PsmParams):
-        felt = "the same of rigid contacts: table, objects, cart, other arms; an object in the jaws pulls with its weight"
-        yield Port(name=f"{arm}/rigid_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt)
+        felt = (
+            "the same of rigid contacts: table, objects, cart, other arms; an object in the jaws pulls with"
+            " its weight"
+        )
+        yield Port(
+            name=f"{arm}/rigid_wrench",
+            causality="output",
+            type=_WRENCH,
+            frame=f"{arm}_base",
+            description=felt,
+        )
 
 
 def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
     if isinstance(params, PsmParams) and has_jaw(params):
         names = tuple(joint.name for joint in params.tool.jaw_joints)
         start, still = (params.jaw, 0.0)[: len(names)], (0.0,) * len(names)
-        goal = "goal of the jaw's servo" + ("" if params.tool.roller is None else ", and by how much the pads are to roll a needle of 0.8 mm between them")
-        yield Port(name=f"{arm}/jaw/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=start, description=goal)
-        yield Port(
-            name=f"{arm}/jaw/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode"
+        goal = "goal of the jaw's servo" + (
+            ""
+            if params.tool.roller is None
+            else ", and by how much the pads are to roll a needle of 0.8 mm between them"
         )
-        yield Port(name=f"{arm}/jaw/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL)
+        yield Port(
+            name=f"{arm}/jaw/servo_jp",
+            causality="input",
+            type=_JOINT_STATE,
+            names=names,
+            start=start,
+            description=goal,
+        )
+        yield Port(
+            name=f"{arm}/jaw/servo_jf",
+            causality="input",
+            type=_JOINT_STATE,
+            names=names,
+            fields=("effort",),
+            start=still,
+            description="acts in effort mode",
+        )
+        yield Port(
+            name=f"{arm}/jaw/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL
+        )
 
 
 def _hand_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
     if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
         names, still = tuple(motor.name for motor in hand.joints), (0.0,) * len(hand.joints)
         goal = "goal of closings and spreads"
-        yield Port(name=f"{arm}/hand/servo_jp", causality="input", type=_JOINT_STATE, names=names, start=params.hand, description=goal)
         yield Port(
-            name=f"{arm}/hand/servo_jf", causality="input", type=_JOINT_STATE, names=names, fields=("effort",), start=still, description="acts in effort mode"
+            name=f"{arm}/hand/servo_jp",
+            causality="input",
+            type=_JOINT_STATE,
+            names=names,
+            start=params.hand,
+            description=goal,
+        )
+        yield Port(
+            name=f"{arm}/hand/servo_jf",
+            causality="input",
+            type=_JOINT_STATE,
+            names=names,
+            fields=("effort",),
+            start=still,
+            description="acts in effort mode",
         )
         closing = "closings of the fingers and positions of their first joints, and the torques of the motors"
-        yield Port(name=f"{arm}/hand/measured_js", causality="output", type=_JOINT_STATE, names=names, fields=_ALL, description=closing)
+        yield Port(
+            name=f"{arm}/hand/measured_js",
+            causality="output",
+            type=_JOINT_STATE,
+            names=names,
+            fields=_ALL,
+            description=closing,
+        )
         bones = tuple(link.name for link in hand.links)
-        yield Port(name=f"{arm}/hand/phalanges/measured_js", causality="output", type=_JOINT_STATE, names=bones, fields=_ALL, description="of each joint")
+        yield Port(
+            name=f"{arm}/hand/phalanges/measured_js",
+            causality="output",
+            type=_JOINT_STATE,
+            names=bones,
+            fields=_ALL,
+            description="of each joint",
+        )
 
 
 def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(name=f"{thing}/pose", causality="output", type=_POSE, frame="world", period_ns=slow)
-    holder = "number of the PSM between whose jaws it is held (the first, where two hold it), 0 while nobody holds it"
-    yield Port(name=f"{thing}/held_by", causality="output", type="std_msgs/msg/Float64", period_ns=slow, description=holder)
+    holder = (
+        "number of the PSM between whose jaws it is held (the first, where two hold it), 0 while nobody"
+        " holds it"
+    )
+    yield Port(
+        name=f"{thing}/held_by",
+        causality="output",
+        type="std_msgs/msg/Float64",
+        period_ns=slow,
+        description=holder,
+    )
     slip = "how far it has moved in the jaws that hold it since they closed"
-    yield Port(name=f"{thing}/slip", causality="output", type="std_msgs/msg/Float64", unit="m", period_ns=slow, description=slip)
+    yield Port(
+        name=f"{thing}/slip",
+        causality="output",
+        type="std_msgs/msg/Float64",
+        unit="m",
+        period_ns=slow,
+        description=slip,
+    )
     turn = "angle by which it has turned in the jaws that hold it since they closed, at most half a turn"
-    yield Port(name=f"{thing}/turn", causality="output", type="std_msgs/msg/Float64", unit="rad", period_ns=slow, description=turn)
-    yield Port(name=f"{thing}/lift", causality="output", type="std_msgs/msg/Float64", unit="m", period_ns=slow, description="height over where it started")
+    yield Port(
+        name=f"{thing}/turn",
+        causality="output",
+        type="std_msgs/msg/Float64",
+        unit="rad",
+        period_ns=slow,
+        description=turn,
+    )
+    yield Port(
+        name=f"{thing}/lift",
+        causality="output",
+        type="std_msgs/msg/Float64",
+        unit="m",
+        period_ns=slow,
+        description="height over where it started",
+    )

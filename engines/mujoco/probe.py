@@ -22,15 +22,20 @@ class Probe:
     """Views of the model's data that belong to one probe; nothing is allocated in a step."""
 
     acts_off_centre = False
-    """A wrench that does not change need not be renewed in a step: it acts at the centre of mass of its link."""
+    """A wrench that does not change need not be renewed in a step: it acts at the centre of mass of its link.
+    """
 
     def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Let `motion` act on the probe of `arm`."""
         self.motion, self.bond = motion, f"{arm}/probe"
-        self._wrench = data.xfrc_applied[model.body(probe_body(arm)).id]  # at the body's centre of mass, which is the probe's centre; (6,)
+        # at the body's centre of mass, which is the probe's centre; (6,)
+        self._wrench = data.xfrc_applied[model.body(probe_body(arm)).id]
         self._torque = self._wrench[3:].data
         sensor = int(model.sensor(f"{arm}/tip/position").adr[0])
-        self._sensors, self._twist = data.sensordata[sensor : sensor + 7], data.sensordata[sensor + 7 : sensor + 13]
+        self._sensors, self._twist = (
+            data.sensordata[sensor : sensor + 7],
+            data.sensordata[sensor + 7 : sensor + 13],
+        )
         self._position, self._quaternion = self._sensors[:3], self._sensors[3:]
         self._pose = np.empty(7)
         self._moved, self._turned = np.zeros(6), np.empty(3)
@@ -60,7 +65,8 @@ class Probe:
         """Book the work of the wrench since it was set, and bring the pose up to the model's present state."""
         np.subtract(self._position, self._pose[:3], out=self._translation)  # the pose is still the one before
         if any(self._torque):  # a sphere in contact feels none
-            mujoco.mju_subQuat(self._turned, self._quaternion, self._pose[_W_FIRST])  # in the probe's own axes
+            # in the probe's own axes
+            mujoco.mju_subQuat(self._turned, self._quaternion, self._pose[_W_FIRST])
             mujoco.mju_rotVecQuat(self._rotation, self._turned, self._quaternion)
         self.motion.add(self._wrench, self._moved)
         self.refresh()

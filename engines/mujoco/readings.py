@@ -21,8 +21,12 @@ __all__ = ["Readings", "place"]
 
 _POSE = np.array([0, 1, 2, 4, 5, 6, 3])
 """Where a pose (x, y, z, qx, qy, qz, qw) stands among MuJoCo's sensors, with quaternions w first."""
-_JAW = np.array([[1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.5, 0.5]])
-"""Position, velocity and effort of a jaw of those of its two fingers: opened by both, with the torque of either."""
+_JAW = np.array(
+    [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.5, 0.5]]
+)
+"""Position, velocity and effort of a jaw of those of its two fingers: opened by both, with the torque of
+either.
+"""
 _ROLLING_JAW = np.zeros((6, 9))
 """The same of a jaw and its roller by turns, of those of the two fingers and the roller."""
 _ROLLING_JAW[::2, :6], _ROLLING_JAW[1::2, 6:] = _JAW, np.eye(3)
@@ -33,7 +37,13 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, Psm
     for arm, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
         if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-            start |= dict(zip((link.name for link in hand.links), hand.unloaded(np.array(params.hand)).ravel().tolist(), strict=True))
+            start |= dict(
+                zip(
+                    (link.name for link in hand.links),
+                    hand.unloaded(np.array(params.hand)).ravel().tolist(),
+                    strict=True,
+                )
+            )
         start |= dict.fromkeys(PADS, 0.0)
         for link in links(arm, params):
             if link.follow is not None:
@@ -48,7 +58,13 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, Psm
 class Readings:
     """Views of the model's sensors by output port; what is no view is copied when it is due."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams], servos: Servos) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        arms: Mapping[CartArm, PsmParams | EcmParams],
+        servos: Servos,
+    ) -> None:
         """Report on `arms`."""
         self._sensors, self._qpos = data.sensordata, np.empty(model.nq)
         self._positions = data.qpos
@@ -68,9 +84,15 @@ class Readings:
                 matrix = _JAW if params.tool.roller is None else _ROLLING_JAW
                 self._jaws.append((matrix, self._sensors[fingers : fingers + matrix.shape[1]], jaw))
             elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-                fingers, k, m = int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]), 3 * len(hand.joints), 3 * len(hand.links)
+                fingers, k, m = (
+                    int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]),
+                    3 * len(hand.joints),
+                    3 * len(hand.links),
+                )
                 self.outputs[f"{arm}/hand/measured_js"] = self._sensors[fingers : fingers + k]
-                self.outputs[f"{arm}/hand/phalanges/measured_js"] = self._sensors[fingers + k : fingers + k + m]
+                self.outputs[f"{arm}/hand/phalanges/measured_js"] = self._sensors[
+                    fingers + k : fingers + k + m
+                ]
         self._where = np.concatenate(poses)
         self.update()
 

@@ -19,16 +19,32 @@ _MOST_PIXELS = 1024
 
 @app.command()
 def render(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it.")],
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it."
+        ),
+    ],
     *,
     output: Annotated[Path, typer.Option("--output", "-o", help="Picture to write: .png or .jpg.")],
     time: Annotated[float, typer.Option(min=0.0, metavar="S", help="Simulated time, in seconds.")] = 0.0,
-    camera: Annotated[Literal["overview", "left", "right"], typer.Option(help="From outside, or with an eye of the endoscope.")] = "overview",
-    position: Annotated[str | None, typer.Option("--from", metavar="X,Y,Z", help="Where the overview looks from, m in the world.")] = None,
-    target: Annotated[str | None, typer.Option("--at", metavar="X,Y,Z", help="Where the overview looks at, m in the world.")] = None,
+    camera: Annotated[
+        Literal["overview", "left", "right"],
+        typer.Option(help="From outside, or with an eye of the endoscope."),
+    ] = "overview",
+    position: Annotated[
+        str | None,
+        typer.Option("--from", metavar="X,Y,Z", help="Where the overview looks from, m in the world."),
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option("--at", metavar="X,Y,Z", help="Where the overview looks at, m in the world.")
+    ] = None,
     width: Annotated[int, typer.Option(min=16, max=_MOST_PIXELS, help="Pixels.")] = 800,
     height: Annotated[int, typer.Option(min=16, max=_MOST_PIXELS, help="Pixels.")] = 600,
-    robot: Annotated[str | None, typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco.")] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco."),
+    ] = None,
 ) -> None:
     """Draw the scene of a recording as it was at one moment, soft bodies and all."""
     if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
@@ -43,7 +59,9 @@ def render(
 
     scene = RecordedScene(Recording(recording), robot)
     eyes = None if position is None else _point(position, "--from")
-    picture = scene.picture(round(time * 1e9), camera, (width, height), eyes, None if target is None else _point(target, "--at"))
+    picture = scene.picture(
+        round(time * 1e9), camera, (width, height), eyes, None if target is None else _point(target, "--at")
+    )
     Image.fromarray(picture).save(output)
     typer.echo(output)
 

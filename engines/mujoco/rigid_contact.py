@@ -16,26 +16,34 @@ __all__ = ["RigidContact"]
 
 
 class RigidContact:
-    """Sums the contact forces on the instruments of some arms over the sub-steps of a step, and gives their means.
+    """Sums the contact forces on the instruments of some arms over the sub-steps of a step, and gives their
+    means.
 
-    What an instrument holds counts through its contacts with it, or through the weld. Contacts of an instrument with itself do not.
+    What an instrument holds counts through its contacts with it, or through the weld. Contacts of an
+    instrument with itself do not.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Iterable[str]) -> None:
         """Watch the instruments of `arms`."""
         self._model, self._data, arms = model, data, list(arms)
         self._owner = _owners(model, arms)
-        self._welds = [(weld, arms.index(arm)) for weld in range(model.neq) if (arm := _welded_to(model, weld)) in arms]
+        self._welds = [
+            (weld, arms.index(arm)) for weld in range(model.neq) if (arm := _welded_to(model, weld)) in arms
+        ]
         tips = np.array([int(model.sensor(f"{arm}/tip/position").adr[0]) for arm in arms], int)
         self._tips = tips[:, None] + np.arange(3)
-        self._to_base: list[Vector] = [np.kron(np.eye(2), data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).T) for arm in arms]
+        self._to_base: list[Vector] = [
+            np.kron(np.eye(2), data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).T) for arm in arms
+        ]
         self._arms = np.arange(len(arms))
         self._sums, self._means = np.zeros((len(arms), 6)), np.zeros((len(arms), 6))
         self._substeps = 0
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
 
     def add(self) -> None:
-        """Add the sub-step whose forces are solved and whose contacts are not yet found anew: between `mj_step2` and `mj_step1`."""
+        """Add the sub-step whose forces are solved and whose contacts are not yet found anew: between
+        `mj_step2` and `mj_step1`.
+        """
         self._substeps += 1
         if self._data.ncon:
             self._add_contacts()
@@ -61,7 +69,11 @@ class RigidContact:
         for load, i in zip(loads, found.tolist(), strict=True):
             mujoco.mj_contactForce(model, data, i, load)
         loads.reshape(-1, 2, 3)[:] = loads.reshape(-1, 2, 3) @ contact.frame[found].reshape(-1, 3, 3)
-        owners, at, tips = owners[found, :, None] == self._arms, contact.pos[found], data.sensordata[self._tips]
+        owners, at, tips = (
+            owners[found, :, None] == self._arms,
+            contact.pos[found],
+            data.sensordata[self._tips],
+        )
         sides = owners[:, 1] * 1.0 - owners[:, 0]  # (found, arms)
         loads[:, 3:] += moment(at, loads[:, :3])
         total = sides.T @ loads
@@ -69,14 +81,19 @@ class RigidContact:
         self._sums += total
 
     def _add_weld(self, weld: int, owner: int) -> None:
-        """Add the reaction of the object in a weld, whose free joint has the force at its origin in the world and the torque in its own frame."""
+        """Add the reaction of the object in a weld, whose free joint has the force at its origin in the world
+        and the torque in its own frame.
+        """
         model, data = self._model, self._data
         of_weld = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == weld)
         generalised = np.zeros(model.nv)
         mujoco.mj_mulJacTVec(model, data, generalised, np.where(of_weld, data.efc_force, 0.0))
         thing = int(model.eq_obj2id[weld])
         first = int(model.body_dofadr[thing])
-        force, torque = generalised[first : first + 3], data.xmat[thing].reshape(3, 3) @ generalised[first + 3 : first + 6]
+        force, torque = (
+            generalised[first : first + 3],
+            data.xmat[thing].reshape(3, 3) @ generalised[first + 3 : first + 6],
+        )
         arm = data.xpos[thing] - data.sensordata[self._tips[owner]]
         self._sums[owner, :3] -= force
         self._sums[owner, 3:] -= torque + moment(arm, force)

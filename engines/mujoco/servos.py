@@ -1,8 +1,9 @@
 """The drives of all arms of a scene: commands in, inputs of MuJoCo's servos out.
 
-All joints and jaws of all arms stand in one vector, in the order of the arms: joints, then the jaw if there is one. The setpoints
-follow the commands at most as fast as joints and jaws may move, so no command, however it jumps, closes a jaw through what lies
-between its fingers. One product lays out what the servos take: position, its slope as velocity, and a feed-forward effort.
+All joints and jaws of all arms stand in one vector, in the order of the arms: joints, then the jaw if there
+is one. The setpoints follow the commands at most as fast as joints and jaws may move, so no command, however
+it jumps, closes a jaw through what lies between its fingers. One product lays out what the servos take:
+position, its slope as velocity, and a feed-forward effort.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ __all__ = ["Servos"]
 _OFF, _POSITION, _EFFORT = 0.0, 1.0, 2.0
 """Control modes: no torque, position servo, effort. The latter two with gravity compensation."""
 _BARE = 2.0
-"""Added to the latter two: without the gravity compensation that the real controller can switch off, see docs/decisions/0010."""
+"""Added to the latter two: without the gravity compensation that the real controller can switch off, see
+docs/decisions/0010.
+"""
 
 
 @dataclass
@@ -42,14 +45,22 @@ class _Group:
     ports: str
     """Its ports' names up to `servo_jp` and `servo_jf`."""
     weighed: list[int]
-    """Those of `bodies` whose weight the real controller bears: the endoscope. Springs and weights balance all else."""
+    """Those of `bodies` whose weight the real controller bears: the endoscope. Springs and weights balance
+    all else.
+    """
     mode: float = _POSITION
 
 
 class Servos:
     """Takes commands and modes, and keeps the setpoints."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams], period: float) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        arms: Mapping[CartArm, PsmParams | EcmParams],
+        period: float,
+    ) -> None:
         """Drive `arms`, which are stepped every `period` seconds, from where they start."""
         self._model, self._data = model, data
         self._groups: list[_Group] = []
@@ -58,8 +69,13 @@ class Servos:
         for arm, params in arms.items():
             names = [joint.name for joint in params.chain.joints]
             self._add_group(arm, f"{arm}/", names, len(rows), len(names))
-            shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
-            rows += [(q, joint.lower, joint.upper, joint.velocity) for q, joint in zip(params.start, params.chain.joints, strict=True)]
+            shares += [
+                (actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)
+            ]
+            rows += [
+                (q, joint.lower, joint.upper, joint.velocity)
+                for q, joint in zip(params.start, params.chain.joints, strict=True)
+            ]
             if isinstance(params, PsmParams) and (jaw := params.tool.jaw) is not None:
                 self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
                 shares += [(actuator, len(rows), 0.5) for actuator in self._groups[-1].actuators]
@@ -70,9 +86,16 @@ class Servos:
                     shares.append((self._groups[-1].actuators[-1], len(rows), 1.0))
                     rows.append((0.0, roller.joint.lower, roller.joint.upper, roller.joint.velocity))
             elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-                self._add_group(arm, f"{arm}/hand/", [motor.name for motor in hand.joints], len(rows), len(hand.joints))
-                shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
-                rows += [(q, motor.lower, motor.upper, motor.velocity) for q, motor in zip(params.hand, hand.joints, strict=True)]
+                self._add_group(
+                    arm, f"{arm}/hand/", [motor.name for motor in hand.joints], len(rows), len(hand.joints)
+                )
+                shares += [
+                    (actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)
+                ]
+                rows += [
+                    (q, motor.lower, motor.upper, motor.velocity)
+                    for q, motor in zip(params.hand, hand.joints, strict=True)
+                ]
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
@@ -98,27 +121,33 @@ class Servos:
         model = self._model
         actuators = [model.actuator(f"{arm}/{joint}").id for joint in joints]
         grasps = ports != f"{arm}/"
-        grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, *PADS, "finger"))  # those of a jaw with its pads, and the phalanges of a hand
+        # those of a jaw with its pads, and the phalanges of a hand
+        grasping = tuple(f"{arm}/{finger}" for finger in (*FINGERS, *PADS, "finger"))
         own = [i for i in range(model.nbody) if model.body(i).name.startswith(f"{arm}/")]
         bodies = [i for i in own if model.body(i).name.startswith(grasping) == grasps]
         weighed = [i for i in bodies if model.body(i).name == "ECM/roll"]
         self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports, weighed))
 
     def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
-        """Return what makes `ctrl` of (setpoint, setpoint one step ago, effort), and what makes the drives' positions of `qpos`."""
+        """Return what makes `ctrl` of (setpoint, setpoint one step ago, effort), and what makes the drives'
+        positions of `qpos`.
+        """
         model = self._model
         layout, measure = np.zeros((model.nu, 3 * n)), np.zeros((n, model.nq))
         for actuator, drive, share in shares:
             at = int(model.actuator_ctrladr[actuator])
             layout[at, drive] = share
             layout[at + 1, [drive, n + drive]] = share / period, -share / period
-            layout[at + 2, 2 * n + drive] = 1.0  # both fingers with the jaw's torque: their work is then that of the jaw
+            # both fingers with the jaw's torque: their work is then that of the jaw
+            layout[at + 2, 2 * n + drive] = 1.0
             for joint, coefficient in self._moved(actuator):
                 measure[drive, model.jnt_qposadr[joint]] = coefficient
         return layout, measure
 
     def _moved(self, actuator: int) -> list[tuple[int, float]]:
-        """Return the joints whose positions, each times its factor, add up to the actuator's: one, or those of a tendon from the palm outwards."""
+        """Return the joints whose positions, each times its factor, add up to the actuator's: one, or those
+        of a tendon from the palm outwards.
+        """
         model, target = self._model, int(self._model.actuator_trnid[actuator, 0])
         if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
             return [(target, 1.0)]
@@ -131,7 +160,10 @@ class Servos:
         stiffness, rest = np.zeros(n), np.zeros(n)
         for actuator, drive, _share in shares:
             joint = self._moved(actuator)[0][0]
-            stiffness[drive], rest[drive] = np.ravel(model.jnt_stiffness[joint])[0], model.qpos_spring[model.jnt_qposadr[joint]]
+            stiffness[drive], rest[drive] = (
+                np.ravel(model.jnt_stiffness[joint])[0],
+                model.qpos_spring[model.jnt_qposadr[joint]],
+            )
         return stiffness, rest
 
     def arm_setpoint(self, arm: str) -> Vector:
@@ -139,7 +171,10 @@ class Servos:
         return self.setpoint[next(group.part for group in self._groups if group.arm == arm)]
 
     def begin(self, inputs: Inputs) -> None:
-        """Take commands and modes for the step that begins. Raises SessionError for a mode that there is none of."""
+        """Take commands and modes for the step that begins.
+
+        Raises SessionError for a mode that there is none of.
+        """
         np.concatenate([inputs[port] for port in self._ports], out=self._taken)
         if self._wanted.tobytes() != self._modes.tobytes():
             self._set_modes(self._wanted)
@@ -150,13 +185,16 @@ class Servos:
         self._previous[:] = setpoint
         np.maximum(command, reach[0], out=command)
         np.minimum(command, reach[1], out=setpoint)
-        np.multiply(self._springs, np.subtract(setpoint, self._rest, out=self._effort), out=self._effort)  # what holds against the springs there
+        # what holds against the springs there
+        np.multiply(self._springs, np.subtract(setpoint, self._rest, out=self._effort), out=self._effort)
         if not self._holding:
             self._let_go(inputs)
         self._layout.dot(self._inputs, self._data.ctrl)
 
     def _let_go(self, inputs: Inputs) -> None:
-        """Where no position is held, push as told, and let the setpoint go with the joint: it is held from where it is then."""
+        """Where no position is held, push as told, and let the setpoint go with the joint: it is held from
+        where it is then.
+        """
         measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)
         for group in self._groups:
             part = group.part
@@ -169,17 +207,26 @@ class Servos:
         gain, bias = self._gains
         for (arm, port), wanted in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
             if not np.isin(wanted, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
-                modes_there_are = "0 (off), 1 (position servo) or 2 (effort), 3 and 4 the last two without gravity compensation"
+                modes_there_are = (
+                    "0 (off), 1 (position servo) or 2 (effort), 3 and 4 the last two without gravity"
+                    " compensation"
+                )
                 raise SessionError(f"input '{port}' is {wanted}; each of [arm, jaw] is {modes_there_are}")
-            for group, asked in zip([group for group in self._groups if group.arm == arm], wanted.tolist(), strict=False):
+            for group, asked in zip(
+                [group for group in self._groups if group.arm == arm], wanted.tolist(), strict=False
+            ):
                 mode = asked - _BARE if asked > _EFFORT else asked
                 self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
                 self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
-                self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (mode != _OFF)
+                self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (
+                    mode != _OFF
+                )
                 self._model.body_gravcomp[group.weighed] *= asked == mode
                 group.mode = mode
         self._modes[:] = modes
-        self.off = frozenset(arm for arm, mode in zip(self._mode_ports, modes[::2].tolist(), strict=True) if mode == _OFF)
+        self.off = frozenset(
+            arm for arm, mode in zip(self._mode_ports, modes[::2].tolist(), strict=True) if mode == _OFF
+        )
         self._holding = all(group.mode == _POSITION for group in self._groups)
 
     @property

@@ -1,8 +1,10 @@
-"""From the coarse triangles of a soft body to a surface that looks smooth: sharp edges kept, triangles curved.
+"""From the coarse triangles of a soft body to a surface that looks smooth: sharp edges kept, triangles
+curved.
 
-The nodes stay where they are; between them the surface follows the cubic edge of a curved point-normal triangle (Vlachos, Peters, Boyd,
-Mitchell: Curved PN Triangles, I3D 2001): the middle of the edge from a to b with unit normals n and m there, and d = b - a, is
-(a + b)/2 - ((d . n) n - (d . m) m)/8. It depends on the edge alone, so neighbours meet without a gap.
+The nodes stay where they are; between them the surface follows the cubic edge of a curved point-normal
+triangle (Vlachos, Peters, Boyd, Mitchell: Curved PN Triangles, I3D 2001): the middle of the edge from a to b
+with unit normals n and m there, and d = b - a, is (a + b)/2 - ((d . n) n - (d . m) m)/8. It depends on the
+edge alone, so neighbours meet without a gap.
 """
 
 from __future__ import annotations
@@ -19,18 +21,28 @@ __all__ = ["SkinMesh"]
 Indices = NDArray[np.int64]
 
 _CREASE = radians(80.0)
-"""Faces that meet at a greater angle at rest (0: in one plane) meet at a sharp edge, as those of a box do. The curved parts of the
-organs in `engines.bullet.organs`, of 150 to 3000 nodes, stay below, all but some rims; the ends of the colon are above."""
+"""Faces that meet at a greater angle at rest (0: in one plane) meet at a sharp edge, as those of a box do.
+
+The curved parts of the organs in `engines.bullet.organs`, of 150 to 3000 nodes, stay below, all but some
+rims; the ends of the colon are above.
+"""
 
 _ENOUGH = 12_000
-"""Triangles are divided once, and again while there are no more than these: MuJoCo takes its light at vertices, so large triangles show."""
+"""Triangles are divided once, and again while there are no more than these: MuJoCo takes its light at
+vertices, so large triangles show.
+"""
 
 
 class SkinMesh:
-    """The displayed surface of a soft body. A vertex on a sharp edge stands once for each smooth face that it bounds."""
+    """The displayed surface of a soft body.
+
+    A vertex on a sharp edge stands once for each smooth face that it bounds.
+    """
 
     def __init__(self, rest: Vector, triangles: Indices) -> None:
-        """Take the nodes at rest, shape (n, 3), m, and the surface, node indices of shape (f, 3), counter-clockwise from outside."""
+        """Take the nodes at rest, shape (n, 3), m, and the surface, node indices of shape (f, 3),
+        counter-clockwise from outside.
+        """
         faces, self._node = _split(rest, triangles)
         self._divisions: list[_Division] = []
         while not self._divisions or 4 * len(faces) <= _ENOUGH:
@@ -41,7 +53,9 @@ class SkinMesh:
         """Vertex indices, shape (m, 3), counter-clockwise from outside."""
 
     def vertices(self, nodes: Vector) -> Vector:
-        """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: first those at nodes, then those between them."""
+        """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: first those at nodes, then
+        those between them.
+        """
         points = nodes[self._node]
         for division in self._divisions:
             points = division.refined(points)
@@ -58,7 +72,8 @@ class _Division:
         count = int(corners.max()) + 1
         self._around = by_vertex // 3
         self._first = np.searchsorted(corners.ravel()[by_vertex], np.arange(count))
-        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)  # (3 f, 2)
+        # (3 f, 2)
+        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
         edges, edge_of, sharing = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
         self._ends = edges.T.copy()
         self._curved = (sharing == 2)[:, None] / 8.0
@@ -80,7 +95,8 @@ class _Division:
 
 
 def _split(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
-    """Return the corners of the triangles as vertex indices, shape (f, 3), and the node of each vertex, shape (v,).
+    """Return the corners of the triangles as vertex indices, shape (f, 3), and the node of each vertex, shape
+    (v,).
 
     Two corners at a node are one vertex if one can go from one to the other across edges that are not sharp.
     """
@@ -101,9 +117,12 @@ def _split(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
 
 
 def _smooth_pairs(triangles: Indices, normals: Vector) -> tuple[Indices, Indices]:
-    """Return pairs of corners (numbered 3 face + corner), shape (p,) each, that share a node and an edge which is not sharp."""
+    """Return pairs of corners (numbered 3 face + corner), shape (p,) each, that share a node and an edge
+    which is not sharp.
+    """
     corner = np.arange(triangles.size).reshape(-1, 3)
-    ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2)  # (3 f, 2): the corners of each side
+    # (3 f, 2): the corners of each side
+    ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2)
     nodes = triangles.ravel()[ends]
     ends = np.where((nodes[:, :1] > nodes[:, 1:]), ends[:, ::-1], ends)
     _, edge_of, count = np.unique(np.sort(nodes, axis=1), axis=0, return_inverse=True, return_counts=True)

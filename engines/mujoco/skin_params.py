@@ -10,7 +10,11 @@ from hub.participant import Params
 
 __all__ = ["Rgb", "SkinParams"]
 
-Rgb = tuple[Annotated[float, Field(ge=0.0, le=1.0)], Annotated[float, Field(ge=0.0, le=1.0)], Annotated[float, Field(ge=0.0, le=1.0)]]
+Rgb = tuple[
+    Annotated[float, Field(ge=0.0, le=1.0)],
+    Annotated[float, Field(ge=0.0, le=1.0)],
+    Annotated[float, Field(ge=0.0, le=1.0)],
+]
 """Red, green and blue, each from 0 to 1."""
 
 _COLOURS: dict[str, Rgb] = {
@@ -21,8 +25,10 @@ _COLOURS: dict[str, Rgb] = {
     "kidney": (0.60, 0.24, 0.20),
     "liver": (0.52, 0.20, 0.15),
 }
-"""Chosen by eye for a white lamp at the camera, after what anatomy says of the living organs: liver and kidney red-brown, the liver
-darker; the colon a greyish pink; the adrenal gland the yellow of its cortex; `tissue`, which is all else, the pink of muscle."""
+"""Chosen by eye for a white lamp at the camera, after what anatomy says of the living organs: liver and
+kidney red-brown, the liver darker; the colon a greyish pink; the adrenal gland the yellow of its cortex;
+`tissue`, which is all else, the pink of muscle.
+"""
 
 
 class SkinParams(Params):
@@ -30,7 +36,10 @@ class SkinParams(Params):
 
     colour: Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"] | Rgb | None = Field(
         default=None,
-        description="name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue with whose name the body's ends, if there is one",
+        description=(
+            "name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue with whose"
+            " name the body's ends, if there is one"
+        ),
     )
 
     def rgb(self, name: str) -> Rgb:

@@ -16,7 +16,8 @@ __all__ = ["Spheres"]
 class Spheres:
     """Views of the model's data that belong to the spheres of one instrument.
 
-    A force stays with the sphere's centre, which moves against the centre of mass of the link that carries it.
+    A force stays with the sphere's centre, which moves against the centre of mass of the link that carries
+    it.
     """
 
     acts_off_centre = True
@@ -28,19 +29,26 @@ class Spheres:
         sites = _sites(arm, model)
         n, self._carriers = len(sites), model.site_bodyid[sites]
         first = int(model.sensor(f"{model.site(sites[0]).name}/position").adr[0])
-        self._position, self._velocity = data.sensordata[first : first + 3 * n], data.sensordata[first + 3 * n : first + 6 * n]
+        self._position, self._velocity = (
+            data.sensordata[first : first + 3 * n],
+            data.sensordata[first + 3 * n : first + 6 * n],
+        )
         self._centres = self._position.reshape(n, 3)
         self._bodies = np.unique(self._carriers)
         self._share = (self._carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
         self._applied, self._masses = data.xfrc_applied, data.xipos
-        self._loads = np.zeros((n, 6))  # force, and its moment about the centre of mass of the link that carries the sphere
+        # force, and its moment about the centre of mass of the link that carries the sphere
+        self._loads = np.zeros((n, 6))
         self._forces, self._moments = self._loads[:, :3], self._loads[:, 3:]
         self._force = np.zeros(3 * n)
         self._last = self._position.copy()
         tip, base = int(model.sensor(f"{arm}/tip/position").adr[0]), model.site(f"{arm}/base").id
         self._tip, self._to_base = data.sensordata[tip : tip + 3], data.site_xmat[base].reshape(3, 3).T.copy()
         self._tip_wrench = np.zeros(6)
-        self.outputs = {**motion.result(self._position, self._velocity), f"{arm}/tip_wrench": self._tip_wrench}
+        self.outputs = {
+            **motion.result(self._position, self._velocity),
+            f"{arm}/tip_wrench": self._tip_wrench,
+        }
 
     def begin(self, inputs: Inputs) -> None:
         """Take the reaction for the step that begins."""
@@ -86,6 +94,12 @@ class Spheres:
 
 
 def _sites(arm: str, model: mujoco.MjModel) -> list[int]:
-    """Return the sites of the spheres in the order in which the instrument lists them, which is that of their sensors."""
+    """Return the sites of the spheres in the order in which the instrument lists them, which is that of their
+    sensors.
+    """
     sensors = [model.sensor(i) for i in range(model.nsensor)]
-    return [int(sensor.objid[0]) for sensor in sensors if sensor.name.startswith(f"{arm}/{CONTACT}/") and sensor.name.endswith("/position")]
+    return [
+        int(sensor.objid[0])
+        for sensor in sensors
+        if sensor.name.startswith(f"{arm}/{CONTACT}/") and sensor.name.endswith("/position")
+    ]

@@ -1,4 +1,6 @@
-"""Draws what two cameras side by side see of a MuJoCo model: one scene, one pass, one picture with both halves."""
+"""Draws what two cameras side by side see of a MuJoCo model: one scene, one pass, one picture with both
+halves.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ __all__ = ["StereoRenderer"]
 
 _NO_SHADOWS = (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)
 _SHADOW_PIXELS = 2048
-"""Of the shadow map's side. MuJoCo's own 8192 takes three times as long to fill without a GPU and shows no more at endoscope resolution."""
+"""Of the shadow map's side. MuJoCo's own 8192 takes three times as long to fill without a GPU and shows no
+more at endoscope resolution.
+"""
 _SPARE_GEOMS = 100
 """Room in the scene for what MuJoCo may add to a model's geoms."""
 
@@ -25,11 +29,20 @@ _SPARE_GEOMS = 100
 class StereoRenderer:
     """Owns an OpenGL context, which belongs to the thread that made it, and draws `model` in it."""
 
-    def __init__(self, model: mujoco.MjModel, camera: StereoCamera, clip: tuple[float, float], gl: str, *, shadows: bool) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        camera: StereoCamera,
+        clip: tuple[float, float],
+        gl: str,
+        *,
+        shadows: bool,
+    ) -> None:
         """Prepare to draw.
 
         Args:
-            model: What to draw; its offscreen size and quality are set here, so it belongs to this renderer alone.
+            model: What to draw; its offscreen size and quality are set here, so it belongs to this renderer
+            alone.
             camera: The two cameras.
             clip: Near and far distance between which they see, m.
             gl: The OpenGL to use, by the name that MUJOCO_GL has for it.
@@ -56,7 +69,8 @@ class StereoRenderer:
         self._frustum = (half * camera.height / camera.width, *clip)
 
     def render(self, data: mujoco.MjData, pose: Vector) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Return what the left and the right camera see, each of shape (height, width, 3), RGB, the first row on top.
+        """Return what the left and the right camera see, each of shape (height, width, 3), RGB, the first row
+        on top.
 
         Args:
             data: State whose kinematics are up to date.

@@ -1,7 +1,9 @@
-"""Two masses coupled by a spring-damper, each an engine of its own: the smallest co-simulation that can go wrong.
+"""Two masses coupled by a spring-damper, each an engine of its own: the smallest co-simulation that can go
+wrong.
 
-Mass 1 takes a force and gives position and velocity; mass 2 carries the coupling spring, takes position and velocity
-and gives the force. Each is integrated in small sub-steps, so that all error seen comes from the coupling.
+Mass 1 takes a force and gives position and velocity; mass 2 carries the coupling spring, takes position and
+velocity and gives the force. Each is integrated in small sub-steps, so that all error seen comes from the
+coupling.
 """
 
 import numpy as np
@@ -13,7 +15,9 @@ SUB_STEPS = 50
 
 
 class MassParams(Params):
-    """One mass on a spring-damper to ground, in SI units; on mass 2 also the coupling, and where mass 1 starts."""
+    """One mass on a spring-damper to ground, in SI units; on mass 2 also the coupling, and where mass 1
+    starts.
+    """
 
     mass: float
     stiffness: float
@@ -65,7 +69,16 @@ class SprungMass(Mass):
     @property
     def bonds(self) -> tuple[BondSide, ...]:
         p = self.params
-        return (BondSide(name="tip", side="force", dof=1, stiffness=p.coupling_stiffness, damping=p.coupling_damping, proxy_mass=p.mass),)
+        return (
+            BondSide(
+                name="tip",
+                side="force",
+                dof=1,
+                stiffness=p.coupling_stiffness,
+                damping=p.coupling_damping,
+                proxy_mass=p.mass,
+            ),
+        )
 
     def configure(self, setup: Setup) -> Outputs:
         self.side = ForceSide(self.bonds[0], setup.bonds["tip"])
@@ -83,4 +96,7 @@ class SprungMass(Mass):
             side.add(spring, damper, tau, dt)
             self.move(spring + damper, dt)
         end = h / 1e9
-        return side.result(p.coupling_stiffness * (side.position(end) - self.x), p.coupling_damping * (side.velocity(end) - self.v))
+        return side.result(
+            p.coupling_stiffness * (side.position(end) - self.x),
+            p.coupling_damping * (side.velocity(end) - self.v),
+        )

@@ -22,7 +22,10 @@ log = logging.getLogger("trocar")
 app = typer.Typer(
     name="trocar",
     help="Co-simulation hub for robotic surgery research.",
-    epilog="Exit codes: 0 done; 1 the session failed; 2 bad usage or a bad scenario. Results go to stdout, progress and logs to stderr.",
+    epilog=(
+        "Exit codes: 0 done; 1 the session failed; 2 bad usage or a bad scenario. Results go to stdout,"
+        " progress and logs to stderr."
+    ),
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -56,11 +59,19 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def options(
     *,
-    debug: Annotated[bool, typer.Option("--debug", help="Show debug logs, and the traceback of an error.")] = False,
-    version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")] = False,  # noqa: ARG001
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show debug logs, and the traceback of an error.")
+    ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Co-simulation hub for robotic surgery research."""
-    logging.basicConfig(level=logging.DEBUG if debug else logging.INFO, format="%(message)s", handlers=[RichHandler(console=console, show_path=debug)])
+    logging.basicConfig(
+        level=logging.DEBUG if debug else logging.INFO,
+        format="%(message)s",
+        handlers=[RichHandler(console=console, show_path=debug)],
+    )
 
 
 def main() -> None:

@@ -36,7 +36,13 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(result, indent=2, default=str))
         return
-    console.print(table(_readable(name, value) for name, value in result.items() if value is not None and not isinstance(value, dict)))
+    console.print(
+        table(
+            _readable(name, value)
+            for name, value in result.items()
+            if value is not None and not isinstance(value, dict)
+        )
+    )
     if rows := list(latency_rows(result.get("latency", {}))):
         console.print()
         console.print(table(rows, *LATENCY_COLUMNS))
@@ -57,7 +63,13 @@ def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> It
         for stream, row in streams.items():
             of_device.setdefault(stream.rpartition(" -> ")[2].partition(".")[0], {})[stream] = row
         for device, rows in of_device.items():
-            shown = rows if len(rows) <= _MOST_STREAMS else {f"{device}, the slowest of {len(rows)}": max(rows.values(), key=lambda row: row["p99_s"])}
+            shown = (
+                rows
+                if len(rows) <= _MOST_STREAMS
+                else {
+                    f"{device}, the slowest of {len(rows)}": max(rows.values(), key=lambda row: row["p99_s"])
+                }
+            )
             for stream, row in shown.items():
                 yield way, stream, round(row["count"]), *(f"{1e3 * row[name]:.3f} ms" for name in _TIMES)
 
@@ -75,7 +87,9 @@ class RunProgress:
 
     def __init__(self, scenario: Scenario) -> None:
         """Take what is run."""
-        self._bar = Bar(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[now]}"), console=console)
+        self._bar = Bar(
+            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[now]}"), console=console
+        )
         total = None if scenario.duration is None else scenario.duration / 1e9
         self._task = self._bar.add_task(scenario.name, total=total, now="starting")
 
@@ -83,12 +97,16 @@ class RunProgress:
         self._bar.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._bar.stop()
 
     def __call__(self, progress: Progress) -> None:
         """Show where the run is."""
         live = (f"{name} {value:.3f} {unit}".rstrip() for name, (value, unit) in progress.live.items())
         late = (f"{progress.late_steps} late steps",) if progress.late_steps else ()
-        now = "  ".join((f"{progress.sim_time_s:.2f} s", f"{progress.real_time_factor:.2f} x real time", *late, *live))
+        now = "  ".join(
+            (f"{progress.sim_time_s:.2f} s", f"{progress.real_time_factor:.2f} x real time", *late, *live)
+        )
         self._bar.update(self._task, completed=progress.sim_time_s, now=now)

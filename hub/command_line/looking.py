@@ -49,21 +49,32 @@ def _print_plan(plan: Plan) -> None:
     for member in plan.members.values():
         console.print(f"[bold]{member.name}[/] ({member.role} of kind {member.kind}) on host {member.host}")
         for port in member.ports:
-            detail = " ".join(part for part in (port.type, port.unit, port.frame and f"in {port.frame}") if part)
+            detail = " ".join(
+                part for part in (port.type, port.unit, port.frame and f"in {port.frame}") if part
+            )
             source = ", ".join(feeds.get((member.name, port.name), ()))
             console.print(
-                f"    {'->' if port.causality == 'output' else '<-'} {port.name}  [dim]{detail}[/]{f'  from {source}' if source else ''}", soft_wrap=True
+                f"    {'->' if port.causality == 'output' else '<-'} {port.name} "
+                f" [dim]{detail}[/]{f'  from {source}' if source else ''}",
+                soft_wrap=True,
             )
     console.print(f"they step in the order {', '.join(plan.order)}")
 
 
 def ls(
     *,
-    connect: Annotated[list[str] | None, typer.Option(metavar="ENDPOINT", help="Where a hub listens; by default all of this machine's are asked.")] = None,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ENDPOINT", help="Where a hub listens; by default all of this machine's are asked."
+        ),
+    ] = None,
     certs: Certificates = None,
     as_json: Json = False,
 ) -> None:
-    """List the sessions that are running: participants, the clocks and links of devices, and how long things take."""
+    """List the sessions that are running: participants, the clocks and links of devices, and how long things
+    take.
+    """
     from hub.remote.live_sessions import live_sessions
     from hub.transport.endpoints import listening_endpoints
 
@@ -75,7 +86,9 @@ def ls(
     if not sessions:
         out.print("no session is running")
         return
-    rows = [(s.session, s.state, p.name, p.role, p.host, p.pid, p.step) for s in sessions for p in s.participants]
+    rows = [
+        (s.session, s.state, p.name, p.role, p.host, p.pid, p.step) for s in sessions for p in s.participants
+    ]
     out.print(table(rows, "session", "state", "name", "role", "host", "pid", "step"))
     for columns, of_session in ((_DEVICE_COLUMNS, _device_rows), (LATENCY_COLUMNS, _latency_rows)):
         if told := [(status.session, *row) for status in sessions for row in of_session(status)]:
@@ -88,14 +101,21 @@ _DEVICE_COLUMNS = ("device", "its clock to the hub's", "known within", "link")
 
 def _session_row(status: SessionStatus) -> dict[str, Any]:
     shown = {"participants": status.participants, "devices": status.devices, "latency": status.latencies}
-    return {"session": status.session} | {name: [one.model_dump() for one in found] for name, found in shown.items()}
+    return {"session": status.session} | {
+        name: [one.model_dump() for one in found] for name, found in shown.items()
+    }
 
 
 def _device_rows(status: SessionStatus) -> Iterator[tuple[str, ...]]:
     for device in status.devices:
         known = device.round_trip_ns >= 0
         offset = f"{device.offset_ns / 1e6:+.3f} ms" if known else "the same"
-        yield device.device, offset, f"{device.round_trip_ns / 2e6:.3f} ms" if known else "-", device.link or "-"
+        yield (
+            device.device,
+            offset,
+            f"{device.round_trip_ns / 2e6:.3f} ms" if known else "-",
+            device.link or "-",
+        )
 
 
 def _latency_rows(status: SessionStatus) -> Iterator[tuple[object, ...]]:

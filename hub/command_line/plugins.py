@@ -1,4 +1,5 @@
-"""Commands that other packages bring: a `typer.Typer` under an entry point of the group `trocar.commands` is mounted under its name.
+"""Commands that other packages bring: a `typer.Typer` under an entry point of the group `trocar.commands` is
+mounted under its name.
 
 One that has a single command is that command, as it would be by itself; any other is a group.
 """
@@ -17,14 +18,25 @@ __all__ = ["GROUP", "mount"]
 log = logging.getLogger(__name__)
 
 GROUP = "trocar.commands"
-"""Entry-point group. Whatever is mounted is imported for every command, so it imports what it needs inside its own ones."""
+"""Entry-point group.
+
+Whatever is mounted is imported for every command, so it imports what it needs inside its own ones.
+"""
 
 
 def mount(app: typer.Typer) -> None:
-    """Add every installed sub-command to `app`; one that cannot be had is left out with a warning, so that the others work."""
-    taken = {(info.name or getattr(info.callback, "__name__", "")).replace("_", "-") for info in app.registered_commands}
+    """Add every installed sub-command to `app`; one that cannot be had is left out with a warning, so that
+    the others work.
+    """
+    taken = {
+        (info.name or getattr(info.callback, "__name__", "")).replace("_", "-")
+        for info in app.registered_commands
+    }
     for entry in sorted(entry_points(group=GROUP), key=lambda e: (e.name, e.value)):
-        brought = f"command '{entry.name}' of '{entry.dist.name if entry.dist else 'an unnamed distribution'}' ({entry.value})"
+        brought = (
+            f"command '{entry.name}' of '{entry.dist.name if entry.dist else 'an unnamed distribution'}'"
+            f" ({entry.value})"
+        )
         if entry.name in taken:
             log.warning("%s is left out: there is another command of that name", brought)
             continue

@@ -14,12 +14,19 @@ from hub.recording.recording import Recording
 
 __all__ = ["recover", "replay", "report", "verify"]
 
-RecordingPath = Annotated[Path, typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it.")]
-Output = Annotated[Path | None, typer.Option("--output", "-o", help="Where to write; by default beside the recording.")]
+RecordingPath = Annotated[
+    Path,
+    typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it."),
+]
+Output = Annotated[
+    Path | None, typer.Option("--output", "-o", help="Where to write; by default beside the recording.")
+]
 
 
 def verify(recording: RecordingPath, *, listen: Listen = None, as_json: Json = False) -> None:
-    """Simulate a recorded session again and compare every state hash; exit code 1 and the first difference if one is not the same."""
+    """Simulate a recorded session again and compare every state hash; exit code 1 and the first difference if
+    one is not the same.
+    """
     from hub.verify import verify as resimulate
 
     opened = Recording(recording)
@@ -33,7 +40,9 @@ def verify(recording: RecordingPath, *, listen: Listen = None, as_json: Json = F
 def replay(
     recording: RecordingPath,
     *,
-    rate: Annotated[float, typer.Option(min=0.0, help="Simulated seconds per second; 0: as fast as it goes.")] = 1.0,
+    rate: Annotated[
+        float, typer.Option(min=0.0, help="Simulated seconds per second; 0: as fast as it goes.")
+    ] = 1.0,
     listen: Listen = None,
     as_json: Json = False,
 ) -> None:

@@ -18,7 +18,11 @@ __all__ = ["run"]
 
 
 def _is_new(directory: Path | None) -> Path | None:
-    if directory is not None and directory.exists() and not (directory.is_dir() and not any(directory.iterdir())):
+    if (
+        directory is not None
+        and directory.exists()
+        and not (directory.is_dir() and not any(directory.iterdir()))
+    ):
         raise typer.BadParameter(f"'{directory}' is there already; name a new directory.")
     return directory
 
@@ -26,22 +30,36 @@ def _is_new(directory: Path | None) -> Path | None:
 def run(
     scenario: ScenarioName,
     *,
-    record: Annotated[Path | None, typer.Option(metavar="DIR", callback=_is_new, help="Record to a new rosbag2 directory.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(metavar="DIR", callback=_is_new, help="Record to a new rosbag2 directory.")
+    ] = None,
     overrides: Overrides = None,
-    pace: Annotated[Literal["fast", "realtime"] | None, typer.Option(help="Instead of the scenario's own.")] = None,
+    pace: Annotated[
+        Literal["fast", "realtime"] | None, typer.Option(help="Instead of the scenario's own.")
+    ] = None,
     listen: Annotated[
         list[str] | None,
-        typer.Option(metavar="ENDPOINT", help="Where to listen beside loopback, such as tls/0.0.0.0:7447; or where on loopback. May be repeated."),
+        typer.Option(
+            metavar="ENDPOINT",
+            help=(
+                "Where to listen beside loopback, such as tls/0.0.0.0:7447; or where on loopback. May be"
+                " repeated."
+            ),
+        ),
     ] = None,
     certs: Certificates = None,
-    one_host: Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")] = False,
+    one_host: Annotated[
+        bool, typer.Option("--one-host", help="Run every participant in the hub's process.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Run a scenario."""
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
     inside, outside = parted(listen or ())
     with locating(file.source):
-        session = launch(file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host)
+        session = launch(
+            file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host
+        )
         with RunProgress(session.scenario) as progress:
             summary = session.run(progress)
     show(summary.as_dict(), as_json=as_json)

@@ -16,10 +16,22 @@ __all__ = ["Json", "Listen", "Overrides", "ScenarioName", "locating"]
 
 ScenarioName = Annotated[
     str,
-    typer.Argument(metavar="NAME|PATH", help="An installed scenario, or a YAML file of your own.", autocompletion=lambda: list(installed_scenarios())),
+    typer.Argument(
+        metavar="NAME|PATH",
+        help="An installed scenario, or a YAML file of your own.",
+        autocompletion=lambda: list(installed_scenarios()),
+    ),
 ]
-Overrides = Annotated[list[str] | None, typer.Option("--set", metavar="A.B=VALUE", help="Override one value of the scenario. May be repeated.")]
-Listen = Annotated[str | None, typer.Option(metavar="ENDPOINT", help="Where to listen; by default on loopback, port 7447 or the next free one.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="A.B=VALUE", help="Override one value of the scenario. May be repeated."),
+]
+Listen = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ENDPOINT", help="Where to listen; by default on loopback, port 7447 or the next free one."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 

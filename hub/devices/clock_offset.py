@@ -1,4 +1,5 @@
-"""How far the clock of a device's host is from the hub's: four timestamps an exchange, and the best of the last exchanges.
+"""How far the clock of a device's host is from the hub's: four timestamps an exchange, and the best of the
+last exchanges.
 
 The clocks are the monotonic ones of both machines, so that nobody who sets a wall clock disturbs it.
 """
@@ -11,7 +12,9 @@ __all__ = ["ClockOffset", "Exchange"]
 
 _WINDOW = 16
 _DRIFT = 15e-6
-"""How far two clocks drift apart at most while nobody looks, s/s: PHI of NTP's clock filter, RFC 5905 section 7.1."""
+"""How far two clocks drift apart at most while nobody looks, s/s: PHI of NTP's clock filter, RFC 5905 section
+7.1.
+"""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,9 @@ class Exchange:
 
     @property
     def offset_ns(self) -> int:
-        """The hub's clock minus the host's, if the way there takes as long as the way back (RFC 5905, section 8)."""
+        """The hub's clock minus the host's, if the way there takes as long as the way back (RFC 5905, section
+        8).
+        """
         return (self.received_ns - self.asked_ns + self.replied_ns - self.answered_ns) // 2
 
     @property
@@ -47,12 +52,20 @@ class ClockOffset:
         """Begin without an exchange."""
         self._exchanges: tuple[Exchange, ...] = ()
         self.best: Exchange | None = None
-        """The exchange whose offset is least wrong, None before the first; it stays so until the next one, as all of them go wrong at the same pace."""
+        """The exchange whose offset is least wrong, None before the first; it stays so until the next one, as
+        all of them go wrong at the same pace.
+        """
 
     def add(self, exchange: Exchange) -> None:
-        """Take an exchange. One that cannot be true together with those before (a clock stood still or jumped) makes them forgotten."""
+        """Take an exchange. One that cannot be true together with those before (a clock stood still or
+        jumped) makes them forgotten.
+        """
         now_ns, best = exchange.answered_ns, self.best
-        if best is not None and abs(best.offset_ns - exchange.offset_ns) > best.error_ns(now_ns) + exchange.error_ns(now_ns) + 2:
+        if (
+            best is not None
+            and abs(best.offset_ns - exchange.offset_ns)
+            > best.error_ns(now_ns) + exchange.error_ns(now_ns) + 2
+        ):
             self._exchanges = ()
         self._exchanges = (*self._exchanges, exchange)[-_WINDOW:]
         self.best = min(self._exchanges, key=lambda exchange: exchange.error_ns(now_ns))

@@ -1,4 +1,5 @@
-"""What devices on other machines say of their condition, in the hub's log: whoever runs the session reads which device it is and what to do.
+"""What devices on other machines say of their condition, in the hub's log: whoever runs the session reads
+which device it is and what to do.
 
 Those that the session has started itself log the same where everybody sees it.
 """
@@ -45,7 +46,10 @@ class Complaints:
             if port.causality == "output" and port.type == DiagnosticStatus.ros_type
         ]
         self._last: dict[str, tuple[int, str]] = {}
-        self._subscribers = [session.declare_subscriber(keys.output("device", *source), self._listener("/".join(source))) for source in ports]
+        self._subscribers = [
+            session.declare_subscriber(keys.output("device", *source), self._listener("/".join(source)))
+            for source in ports
+        ]
 
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
         allowance = Allowance(_RATE)
@@ -61,7 +65,12 @@ class Complaints:
             said = " ".join(status.message.split())[:_LONGEST]  # on one line, whoever it is from
             if self._last.get(source) != (status.level, said):
                 self._last[source] = status.level, said
-                log.log(logging.WARNING if status.level else logging.INFO, "device '%s' says: %s", source.removesuffix("/diagnostics"), said)
+                log.log(
+                    logging.WARNING if status.level else logging.INFO,
+                    "device '%s' says: %s",
+                    source.removesuffix("/diagnostics"),
+                    said,
+                )
 
         return Callback(hear, indirect=True)
 

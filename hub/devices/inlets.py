@@ -1,7 +1,7 @@
 """Inlets: where device samples, and values set by hand, enter simulated time.
 
-Samples arrive whenever they like and are checked at once; at a communication point the newest of each stream and all of
-each event queue are written into the grant. Nothing else enters a simulation.
+Samples arrive whenever they like and are checked at once; at a communication point the newest of each stream
+and all of each event queue are written into the grant. Nothing else enters a simulation.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from schemas.trocar_msgs import InletSample
 __all__ = ["Inlets"]
 
 _MOST_QUEUED = 10_000
-"""An event queue longer than this is a flood: further samples are refused until the next communication point."""
+"""An event queue longer than this is a flood: further samples are refused until the next communication point.
+"""
 
 
 @dataclass
@@ -48,7 +49,10 @@ class _Inlet:
     def follow(self, stamp: Stamp) -> None:
         """Refuse what is not newer than what was here already; raises LateError."""
         if stamp[:2] <= self.newest:
-            raise LateError(f"sample {stamp.sequence} of '{self.source}.{self.port}' comes late: {self.newest[1]} was here before it")
+            raise LateError(
+                f"sample {stamp.sequence} of '{self.source}.{self.port}' comes late: {self.newest[1]} was"
+                " here before it"
+            )
         self.newest = stamp[:2]
 
 
@@ -60,17 +64,28 @@ class Inlets:
         self._lock = threading.Lock()
         self.latencies = Latencies()
         """From a device to the grant."""
-        self.offsets_ns = {m.name: 0 for m in plan.members.values() if m.follows_clock or (m.role == "device" and m.host == "hub")}
+        self.offsets_ns = {
+            m.name: 0
+            for m in plan.members.values()
+            if m.follows_clock or (m.role == "device" and m.host == "hub")
+        }
         """What is added to a device's clock to have that of the hub, as far as it is known."""
         self._inlets: dict[tuple[str, str], _Inlet] = {}
         for inlet in plan.inlets:
             port = plan.members[inlet.target].port(inlet.target_port)
             source = plan.members[inlet.device].port(inlet.device_port)
             device = plan.members[inlet.device]
-            new = _Inlet(inlet.device, inlet.device_port, PortCodec(source.filled_from(port)), simulated=device.follows_clock)
+            new = _Inlet(
+                inlet.device,
+                inlet.device_port,
+                PortCodec(source.filled_from(port)),
+                simulated=device.follows_clock,
+            )
             known = self._inlets.setdefault((inlet.device, inlet.device_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
-        fed = {(link.target, link.target_port) for link in plan.links} | {(i.target, i.target_port) for i in plan.inlets}
+        fed = {(link.target, link.target_port) for link in plan.links} | {
+            (i.target, i.target_port) for i in plan.inlets
+        }
         self._settable = {
             (member.name, port.name): port
             for member in plan.members.values()
@@ -81,13 +96,20 @@ class Inlets:
             self._inlets[name, port_name] = _Inlet(name, port_name, PortCodec(port), stale=False)
 
     def settable(self, participant: str, port: str) -> Port:
-        """Return the input that `set` may write; raises MessageError if it is fed by a connection or does not exist."""
+        """Return the input that `set` may write; raises MessageError if it is fed by a connection or does not
+        exist.
+        """
         found = self._settable.get((participant, port))
         if found is None:
-            raise MessageError(f"'{participant}.{port}' cannot be set.{did_you_mean(f'{participant}.{port}', ('.'.join(k) for k in self._settable))}")
+            raise MessageError(
+                f"'{participant}.{port}' cannot be"
+                f" set.{did_you_mean(f'{participant}.{port}', ('.'.join(k) for k in self._settable))}"
+            )
         return found
 
-    def offer(self, participant: str, port: str, payload: bytes, now_ns: int, stamp: Stamp | None = None) -> None:
+    def offer(
+        self, participant: str, port: str, payload: bytes, now_ns: int, stamp: Stamp | None = None
+    ) -> None:
         """Take a sample that arrived at `now_ns` of the port's clock; what is set by hand has no stamp.
 
         Raises MessageError if it is none of this port, and LateError if a newer one was here before it.
@@ -102,7 +124,9 @@ class Inlets:
             if not inlet.codec.is_event:
                 inlet.queue.clear()
             elif len(inlet.queue) >= _MOST_QUEUED:
-                raise MessageError(f"'{participant}.{port}' has {_MOST_QUEUED} samples waiting; this one is refused")
+                raise MessageError(
+                    f"'{participant}.{port}' has {_MOST_QUEUED} samples waiting; this one is refused"
+                )
             inlet.queue.append((payload, now_ns, None if stamp is None else stamp.sent_ns))
             inlet.arrived_ns = now_ns
 
@@ -121,7 +145,9 @@ class Inlets:
                 for payload, arrived_ns, sent_ns in inlet.queue:
                     entering.append(_sample(inlet, payload, stale=stale, age_ns=now_ns - arrived_ns))
                     if sent_ns is not None and inlet.source in self.offsets_ns:
-                        self.latencies.add("device to grant", inlet.name, now_ns - sent_ns - self.offsets_ns[inlet.source])
+                        self.latencies.add(
+                            "device to grant", inlet.name, now_ns - sent_ns - self.offsets_ns[inlet.source]
+                        )
                 if stale != inlet.stale and not inlet.queue:
                     entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
                 inlet.queue.clear()
@@ -131,4 +157,6 @@ class Inlets:
 
 def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> InletSample:
     data = np.frombuffer(payload, np.uint8)
-    return InletSample.model_construct(participant=inlet.source, port=inlet.port, stale=stale, payload=data, age_ns=age_ns)
+    return InletSample.model_construct(
+        participant=inlet.source, port=inlet.port, stale=stale, payload=data, age_ns=age_ns
+    )

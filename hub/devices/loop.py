@@ -1,4 +1,6 @@
-"""A device that lives in wall time: a thread reads it at its own rate, and when it has something new, whether or not a hub is there to be told."""
+"""A device that lives in wall time: a thread reads it at its own rate, and when it has something new, whether
+or not a hub is there to be told.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,20 @@ class Uplink(Protocol):
     """Where the samples go."""
 
     def exchange(self, t: int, samples: list[Sample]) -> bool:
-        """Take the samples read at `t` (ns since the loop's start); return whether a link holds things up, so that it wants to be asked again soon."""
+        """Take the samples read at `t` (ns since the loop's start); return whether a link holds things up, so
+        that it wants to be asked again soon.
+        """
         ...
 
 
 class DeviceLoop:
-    """Reads a device at its period; what it says goes to the uplink that is attached, and to nobody while there is none."""
+    """Reads a device at its period; what it says goes to the uplink that is attached, and to nobody while
+    there is none.
+    """
 
-    def __init__(self, name: str, device: Device, period_ns: int, *, failed: Callable[[str, str], None]) -> None:
+    def __init__(
+        self, name: str, device: Device, period_ns: int, *, failed: Callable[[str, str], None]
+    ) -> None:
         """`failed` is told the device's name and the cause when the loop ends by an error."""
         self._name, self._device, self._period_ns, self._failed = name, device, period_ns, failed
         self._uplink: Uplink | None = None
@@ -68,7 +76,10 @@ class DeviceLoop:
                 uplink.exchange(self.now_ns, list(self._standing.values()))
 
     def write(self, port: str, value: Value) -> None:
-        """Write to the device; may be called from any thread. Raises MessageError if it refuses the value; anything else ends the loop."""
+        """Write to the device; may be called from any thread.
+
+        Raises MessageError if it refuses the value; anything else ends the loop.
+        """
         try:
             self._device.write(port, value)
         except MessageError:
@@ -84,7 +95,11 @@ class DeviceLoop:
                 samples = list(self._device.read(t))
                 delayed = False
                 with self._attaching:
-                    self._standing.update((sample.port, sample) for sample in samples if isinstance(sample.message, Joy | DiagnosticStatus))
+                    self._standing.update(
+                        (sample.port, sample)
+                        for sample in samples
+                        if isinstance(sample.message, Joy | DiagnosticStatus)
+                    )
                     if self._uplink is not None:
                         delayed = self._uplink.exchange(t, samples)
                 if self._start_ns + t >= due_ns:  # it was not read early

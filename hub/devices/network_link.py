@@ -1,11 +1,13 @@
-"""The link of a device: delay, jitter, loss and outages between it and the hub, for studies of remote operation.
+"""The link of a device: delay, jitter, loss and outages between it and the hub, for studies of remote
+operation.
 
-Nothing here looks at a clock: whoever uses a link says what time it is, wall or simulated, so that the same seed and the same messages at
-the same times give the same arrivals. Chance is drawn for each port and direction by itself, two numbers a message, whatever the others do.
+Nothing here looks at a clock: whoever uses a link says what time it is, wall or simulated, so that the same
+seed and the same messages at the same times give the same arrivals. Chance is drawn for each port and
+direction by itself, two numbers a message, whatever the others do.
 
-A *signal* travels as datagrams do: what is lost stays lost, and with jitter one message may overtake another (whoever receives refuses the
-one that comes late). *Events* travel as over TCP: none overtakes another, and a lost one is sent again until it is through, each time a
-round trip later.
+A *signal* travels as datagrams do: what is lost stays lost, and with jitter one message may overtake another
+(whoever receives refuses the one that comes late). *Events* travel as over TCP: none overtakes another, and a
+lost one is sent again until it is through, each time a round trip later.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class LinkOrder(BaseModel):
 class Line:
     """One port's messages in one direction. All times in nanoseconds since the start of the device's clock.
 
-    One thread may send while another takes what has arrived: the interpreter does each operation on the heap as one.
+    One thread may send while another takes what has arrived: the interpreter does each operation on the heap
+    as one.
     """
 
     link: Link
@@ -71,21 +74,27 @@ class Line:
         heappush(self._waiting, (arrival_ns, self._count, message))
 
     def arrived(self, now_ns: int) -> Iterator[tuple[int, Any]]:
-        """Yield what has arrived by now and was not yielded before, in the order of arrival, each with its time of arrival."""
+        """Yield what has arrived by now and was not yielded before, in the order of arrival, each with its
+        time of arrival.
+        """
         while self._waiting and self._waiting[0][0] <= now_ns:
             arrival_ns, _, message = heappop(self._waiting)
             yield arrival_ns, message
 
 
 class Link:
-    """Both directions of all ports of one device. Without a spec everything arrives at once; it can be changed at any time."""
+    """Both directions of all ports of one device. Without a spec everything arrives at once; it can be
+    changed at any time.
+    """
 
     def __init__(self, spec: LinkSpec | None) -> None:
         """Take the link of the scenario."""
         self.spec = spec or LinkSpec()
         self._lines: dict[tuple[str, str], Line] = {}
         self.used = False
-        """Whether anything was ever sent over it: a gateway has hundreds of ports, and most links lie nowhere."""
+        """Whether anything was ever sent over it: a gateway has hundreds of ports, and most links lie
+        nowhere.
+        """
         self._outages = list(self.spec.outages)
         self._orders: deque[LinkOrder] = deque()
 
@@ -103,7 +112,9 @@ class Link:
         """Return the line of one of the device's ports: outputs go to the hub, inputs come from there."""
         line = self._lines.get((port.causality, port.name))
         if line is None:
-            line = self._lines[port.causality, port.name] = Line(self, port.variability == "event", self._chance(port.causality, port.name))
+            line = self._lines[port.causality, port.name] = Line(
+                self, port.variability == "event", self._chance(port.causality, port.name)
+            )
         return line
 
     def order(self, order: LinkOrder) -> None:
@@ -111,11 +122,16 @@ class Link:
         self._orders.append(order)
 
     def settle(self, now_ns: int) -> None:
-        """Carry out what was ordered: what is sent from now on goes the new way, what is on its way arrives as it was to."""
+        """Carry out what was ordered: what is sent from now on goes the new way, what is on its way arrives
+        as it was to.
+        """
         while self._orders:
             order = self._orders.popleft()
             reseeded, self.spec = order.spec.seed != self.spec.seed, order.spec
-            self._outages = [*self.spec.outages, *([Outage.model_construct(at=now_ns, duration=order.outage_ns)] if order.outage_ns else ())]
+            self._outages = [
+                *self.spec.outages,
+                *([Outage.model_construct(at=now_ns, duration=order.outage_ns)] if order.outage_ns else ()),
+            ]
             for (causality, name), line in self._lines.items() if reseeded else ():
                 line.chance = self._chance(causality, name)
 

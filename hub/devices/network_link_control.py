@@ -21,7 +21,10 @@ __all__ = ["LinkReply", "LinkRequest", "Relink"]
 
 
 class LinkRequest(BaseModel):
-    """Change the link of a device; what is not said stays as it is. A preset or a delay takes the place of the other."""
+    """Change the link of a device; what is not said stays as it is.
+
+    A preset or a delay takes the place of the other.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -54,7 +57,10 @@ class Relink:
         self._simulated = simulated
         away = [name for name in self._specs if name not in simulated]
         block, cdr = zenoh.CongestionControl.BLOCK, zenoh.Encoding.APPLICATION_CDR
-        self._publishers = {name: session.declare_publisher(keys.link(name), encoding=cdr, congestion_control=block) for name in away}
+        self._publishers = {
+            name: session.declare_publisher(keys.link(name), encoding=cdr, congestion_control=block)
+            for name in away
+        }
         self._changed: set[str] = set()
 
     def change(self, request: LinkRequest) -> LinkReply:
@@ -62,11 +68,19 @@ class Relink:
         name = request.device
         if name not in self._specs:
             raise MessageError(f"there is no device '{name}'.{did_you_mean(name, self._specs)}")
-        said: dict[str, Any] = request.model_dump(mode="json", exclude={"device", "outage"}, exclude_none=True)
+        said: dict[str, Any] = request.model_dump(
+            mode="json", exclude={"device", "outage"}, exclude_none=True
+        )
         replaced = {"preset": None, "delay": 0} if said.keys() & {"preset", "delay"} else {}
-        self._specs[name] = LinkSpec.model_validate(self._specs[name].model_dump(mode="json") | replaced | said)
+        self._specs[name] = LinkSpec.model_validate(
+            self._specs[name].model_dump(mode="json") | replaced | said
+        )
         self._order(name, request.outage)
-        return LinkReply(device=name, link=self._specs[name], description=in_words(self._specs[name], outage_ns=request.outage))
+        return LinkReply(
+            device=name,
+            link=self._specs[name],
+            description=in_words(self._specs[name], outage_ns=request.outage),
+        )
 
     def repeat(self, device: str) -> None:
         """Tell the host of a device that has joined anew how its link was changed before."""

@@ -1,4 +1,6 @@
-"""The devices of a session as its hub has them: their samples on the way to the grant, their links, and what their hosts tell of them."""
+"""The devices of a session as its hub has them: their samples on the way to the grant, their links, and what
+their hosts tell of them.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +33,9 @@ from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
 __all__ = ["Intake"]
 
 _SWITCH_S = 5e-4
-"""How long a step may compute in Python before a device's sample is taken, instead of 5 ms: it brought the median of `bench/latency.py` from 2.5
-to 2.2 ms."""
+"""How long a step may compute in Python before a device's sample is taken, instead of 5 ms: it brought the
+median of `bench/latency.py` from 2.5 to 2.2 ms.
+"""
 
 _STATUSES = 10.0
 """How often the host of a device may tell of it, in a second; it does so once."""
@@ -52,16 +55,27 @@ class Intake:
         self._switch_s = sys.getswitchinterval()
 
     def lay(
-        self, session: zenoh.Session, devices: Mapping[str, Device], feeds: Mapping[str, Feed], observers: Observers, failed: Callable[[str, str], None]
+        self,
+        session: zenoh.Session,
+        devices: Mapping[str, Device],
+        feeds: Mapping[str, Feed],
+        observers: Observers,
+        failed: Callable[[str, str], None],
     ) -> None:
         """Lay out the `devices` of this process, and listen to those of others."""
         self._observers = observers
         members = self._plan.members
         simulated = {name: device for name, device in devices.items() if members[name].follows_clock}
         self.simulated = SimulatedDevices(self._plan, simulated, feeds, self._drops)
-        self._loops = {name: DeviceLoop(name, device, members[name].read_ns, failed=failed) for name, device in devices.items() if name not in simulated}
+        self._loops = {
+            name: DeviceLoop(name, device, members[name].read_ns, failed=failed)
+            for name, device in devices.items()
+            if name not in simulated
+        }
         run = Run(self._plan, self._keys, self._run)
-        self._uplinks = [DeviceUplink(members[name], run, session, loop, self._drops) for name, loop in self._loops.items()]
+        self._uplinks = [
+            DeviceUplink(members[name], run, session, loop, self._drops) for name, loop in self._loops.items()
+        ]
         for uplink, loop in zip(self._uplinks, self._loops.values(), strict=True):
             loop.attach(uplink)
         self.relink = Relink(self._plan, session, self._keys, self.simulated.links)
@@ -69,9 +83,19 @@ class Intake:
         self._away = [m.name for m in members.values() if m.role == "device" and m.host != "hub"]
         self._status_allowance = Allowance(_STATUSES * (1.0 + len(members)))
         wall = [member for member in members.values() if member.role == "device" and not member.follows_clock]
-        spoken = [(m.name, p.name) for m in wall for p in m.ports if p.causality == "output" and self._is_heard(m.name, p.name)]
-        self._subscribers = [session.declare_subscriber(self._keys.output("device", *source), self._listener(*source)) for source in spoken]
-        self._subscribers.append(session.declare_subscriber(self._keys.device_status("*"), Callback(self._told, indirect=False)))
+        spoken = [
+            (m.name, p.name)
+            for m in wall
+            for p in m.ports
+            if p.causality == "output" and self._is_heard(m.name, p.name)
+        ]
+        self._subscribers = [
+            session.declare_subscriber(self._keys.output("device", *source), self._listener(*source))
+            for source in spoken
+        ]
+        self._subscribers.append(
+            session.declare_subscriber(self._keys.device_status("*"), Callback(self._told, indirect=False))
+        )
 
     def open(self, directory: Path) -> None:
         """Open the devices of this process, and begin to read those that live in wall time."""
@@ -126,7 +150,10 @@ class Intake:
             now_ns = monotonic_ns()
             try:
                 if not allowance.spend(now_ns):
-                    raise MessageError(f"device '{device}' sends more than {allowance.rate:g} messages/s on port '{port}' (rate_limit)")
+                    raise MessageError(
+                        f"device '{device}' sends more than {allowance.rate:g} messages/s on port '{port}'"
+                        " (rate_limit)"
+                    )
                 self._offer(device, port, sample.payload.to_bytes(), now_ns, Stamp.of(sample))
             except MessageError as error:
                 self._drops.count(sample, error)
@@ -138,12 +165,16 @@ class Intake:
             if not self._status_allowance.spend(monotonic_ns()):
                 raise MessageError("devices tell of themselves more often than they may")
             status = decode(DeviceStatus, sample.payload.to_bytes())
-            if str(sample.key_expr) != self._keys.device_status(status.device) or status.device not in self._plan.members:
+            if (
+                str(sample.key_expr) != self._keys.device_status(status.device)
+                or status.device not in self._plan.members
+            ):
                 raise MessageError(f"tells of '{status.device}', which is no device of this name here")
         except MessageError as error:
             self._drops.count(sample, error)
             return
-        self._statuses = {**self._statuses, status.device: status}  # a new one: others may be looking through the old one
+        # a new one: others may be looking through the old one
+        self._statuses = {**self._statuses, status.device: status}
         self._latencies = {**self._latencies, status.device: status.latencies}
         if status.round_trip_ns >= 0:
             self._inlets.offsets_ns[status.device] = status.offset_ns

@@ -25,14 +25,22 @@ Take = Callable[[str, Sample, bytes, int, Stamp], None]
 class SimulatedDevices:
     """The devices of the hub's process that follow the clock.
 
-    One that is written to, or sits behind a link, is met at every period of its own, wherever the participants are that feed it: first it is
-    written what they had computed by then, and then it is read. Any other is read whenever the hub looks.
+    One that is written to, or sits behind a link, is met at every period of its own, wherever the
+    participants are that feed it: first it is written what they had computed by then, and then it is read.
+    Any other is read whenever the hub looks.
     """
 
-    def __init__(self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, Feed], drops: Drops) -> None:
-        """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a link."""
+    def __init__(
+        self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, Feed], drops: Drops
+    ) -> None:
+        """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a
+        link.
+        """
         meetings = {member.name for member in plan.meetings()}
-        self._devices = [_Simulated(plan.members[n], device, feeds[n], n in meetings, drops) for n, device in devices.items()]
+        self._devices = [
+            _Simulated(plan.members[n], device, feeds[n], n in meetings, drops)
+            for n, device in devices.items()
+        ]
         self.links = {device.name: device.link for device in self._devices}
         self.latencies = Latencies()
         """From a value to the device."""
@@ -77,14 +85,20 @@ class _Simulated:
         for port, valid_ns, value in self._feed.due(step):
             self.link.line(self._ports[port]).send(valid_ns, (valid_ns, value))
         for port in self._ports.values():
-            for _, (valid_ns, value) in self.link.line(port).arrived(time_ns) if port.causality == "input" else ():
+            for _, (valid_ns, value) in (
+                self.link.line(port).arrived(time_ns) if port.causality == "input" else ()
+            ):
                 self._write_one(port.name, valid_ns, value)
                 latencies.add("state to force", f"{self.name}.{port.name}", time_ns - valid_ns)
 
     def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
         newest_ns = self._newest_ns[port]
         if valid_ns < newest_ns:
-            self._drops.refuse(f"{self.name}.{port}", f"the value of {valid_ns / 1e9:g} s comes late: that of {newest_ns / 1e9:g} s was here before it")
+            self._drops.refuse(
+                f"{self.name}.{port}",
+                f"the value of {valid_ns / 1e9:g} s comes late: that of {newest_ns / 1e9:g} s was here"
+                " before it",
+            )
             return
         self._newest_ns[port] = valid_ns
         self.device.write(port, value)
@@ -93,9 +107,13 @@ class _Simulated:
         """Yield the samples that have arrived at the hub: sample, its bytes, time of arrival, stamp."""
         for sample in self.device.read(time_ns):
             number = self._sequence[sample.port] = self._sequence[sample.port] + 1
-            self.link.line(self._ports[sample.port]).send(time_ns, (sample, encode(sample.message), Stamp(0, number, time_ns)))
+            self.link.line(self._ports[sample.port]).send(
+                time_ns, (sample, encode(sample.message), Stamp(0, number, time_ns))
+            )
         for port in self._ports.values():
-            for arrival_ns, (sample, payload, stamp) in self.link.line(port).arrived(time_ns) if port.causality == "output" else ():
+            for arrival_ns, (sample, payload, stamp) in (
+                self.link.line(port).arrived(time_ns) if port.causality == "output" else ()
+            ):
                 yield sample, payload, arrival_ns, stamp
 
 

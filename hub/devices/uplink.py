@@ -1,4 +1,6 @@
-"""A wall-time device's way to the hub and back in one run: its samples out, what the simulation has for it in, over its link."""
+"""A wall-time device's way to the hub and back in one run: its samples out, what the simulation has for it
+in, over its link.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,8 @@ __all__ = ["DeviceUplink", "Run"]
 
 _STATUS_NS = 1_000_000_000
 _MOST_WAITING = 8
-"""Bundles of signals; a host that is busy beyond that misses the oldest ones, as what it has should be new."""
+"""Bundles of signals; a host that is busy beyond that misses the oldest ones, as what it has should be new.
+"""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,15 @@ class Run:
 class DeviceUplink:
     """Publishes what a device says, and writes to it what its connections bring, until it is closed."""
 
-    def __init__(self, member: Member, run: Run, session: zenoh.Session, loop: DeviceLoop, drops: Drops, offset: ClockOffset | None = None) -> None:
+    def __init__(
+        self,
+        member: Member,
+        run: Run,
+        session: zenoh.Session,
+        loop: DeviceLoop,
+        drops: Drops,
+        offset: ClockOffset | None = None,
+    ) -> None:
         """Take the device's loop; `offset` stays away in the hub's own process, whose clock is the hub's."""
         self._member, self._run, self._loop, self._drops, self._offset = member, run, loop, drops, offset
         self._link = Link(member.link)
@@ -61,15 +72,25 @@ class DeviceUplink:
         self._told_ns = -_STATUS_NS
         self._sequence = {port.name: 0 for port in member.ports}
         outputs = [port for port in member.ports if port.causality == "output"]
-        self._publishers = {port.name: _publisher(session, run.keys.output("device", member.name, port.name), port) for port in outputs}
+        self._publishers = {
+            port.name: _publisher(session, run.keys.output("device", member.name, port.name), port)
+            for port in outputs
+        }
         self._lines = {port.name: self._link.line(port) for port in outputs}
-        self._status = session.declare_publisher(run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR)
+        self._status = session.declare_publisher(
+            run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR
+        )
         self._inflows: list[_Inflow] = []
         self._arrived: SimpleQueue[_Feed | None] = SimpleQueue()
         self._taker = Thread(target=self._take, name=f"inflow {member.name}", daemon=True)
         self._taker.start()
-        self._subscribers = [session.declare_subscriber(feed.key, Callback(partial(self._put, feed), indirect=False)) for feed in self._feeds()]
-        self._subscribers.append(session.declare_subscriber(run.keys.link(member.name), Callback(self._relink, indirect=True)))
+        self._subscribers = [
+            session.declare_subscriber(feed.key, Callback(partial(self._put, feed), indirect=False))
+            for feed in self._feeds()
+        ]
+        self._subscribers.append(
+            session.declare_subscriber(run.keys.link(member.name), Callback(self._relink, indirect=True))
+        )
 
     def _feeds(self) -> Iterator[_Feed]:
         """Yield what is to be listened to: the bundle of each participant's signals, and each event port."""
@@ -78,13 +99,17 @@ class DeviceUplink:
         for source in dict.fromkeys(outlet.source for outlet in outlets):
             signals = bundled(plan, source, name)
             if signals:
-                yield _Feed(keys.signals(source, name), [self._inflow(outlet) for outlet in signals], whole=False)
+                yield _Feed(
+                    keys.signals(source, name), [self._inflow(outlet) for outlet in signals], whole=False
+                )
             for outlet in outlets:
                 if outlet.source == source and outlet not in signals:
                     yield _Feed(keys.feed(source, outlet.source_port), [self._inflow(outlet)], whole=True)
 
     def _inflow(self, outlet: Outlet) -> _Inflow:
-        inflow = _Inflow(outlet, self._run, self._link, self._loop, self._drops, self._latencies, self._offset)
+        inflow = _Inflow(
+            outlet, self._run, self._link, self._loop, self._drops, self._latencies, self._offset
+        )
         self._inflows.append(inflow)
         return inflow
 
@@ -93,7 +118,9 @@ class DeviceUplink:
         self._arrived.put(feed)
 
     def _take(self) -> None:
-        """Take what arrives, all in one thread: with one for each of a hundred ports the simulation would wait for every one of them in turn."""
+        """Take what arrives, all in one thread: with one for each of a hundred ports the simulation would
+        wait for every one of them in turn.
+        """
         while (feed := self._arrived.get()) is not None:
             if feed.waiting:  # otherwise newer signals have taken its place
                 sample = feed.waiting.popleft()
@@ -103,7 +130,9 @@ class DeviceUplink:
                     self._drops.count(sample, error)
 
     def exchange(self, t: int, samples: list[Sample]) -> bool:
-        """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the link; return whether there is a link."""
+        """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the
+        link; return whether there is a link.
+        """
         self._link.settle(t)
         now_ns, idle = monotonic_ns(), self._link.idle
         for sample in samples:
@@ -131,11 +160,19 @@ class DeviceUplink:
         best = None if self._offset is None else self._offset.best
         offset_ns, round_trip_ns = (0, -1) if best is None else (best.offset_ns, best.round_trip_ns)
         latencies = self._latencies.messages()
-        return DeviceStatus(device=self._member.name, offset_ns=offset_ns, round_trip_ns=round_trip_ns, link=in_words(self._link.spec), latencies=latencies)
+        return DeviceStatus(
+            device=self._member.name,
+            offset_ns=offset_ns,
+            round_trip_ns=round_trip_ns,
+            link=in_words(self._link.spec),
+            latencies=latencies,
+        )
 
     def _relink(self, sample: zenoh.Sample) -> None:
         try:
-            self._link.order(LinkOrder.model_validate_json(decode(StringMessage, sample.payload.to_bytes()).data))
+            self._link.order(
+                LinkOrder.model_validate_json(decode(StringMessage, sample.payload.to_bytes()).data)
+            )
         except (MessageError, ValidationError) as error:
             self._drops.count(sample, error)
 
@@ -150,12 +187,20 @@ class DeviceUplink:
 
 
 def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
-    """Return a publisher of an output: signals go first, and are dropped where the way is choked; events wait in a queue of their own."""
+    """Return a publisher of an output: signals go first, and are dropped where the way is choked; events wait
+    in a queue of their own.
+    """
     if port.variability == "event":
         urgency, choked = zenoh.Priority.INTERACTIVE_HIGH, zenoh.CongestionControl.BLOCK
     else:
         urgency, choked = zenoh.Priority.REAL_TIME, zenoh.CongestionControl.DROP
-    return session.declare_publisher(key, encoding=zenoh.Encoding.APPLICATION_CDR, priority=urgency, congestion_control=choked, express=True)
+    return session.declare_publisher(
+        key,
+        encoding=zenoh.Encoding.APPLICATION_CDR,
+        priority=urgency,
+        congestion_control=choked,
+        express=True,
+    )
 
 
 class _Feed:
@@ -184,11 +229,34 @@ class _Feed:
 class _Inflow:
     """What one connection brings to the device."""
 
-    def __init__(self, outlet: Outlet, run: Run, link: Link, loop: DeviceLoop, drops: Drops, latencies: Latencies, offset: ClockOffset | None) -> None:
-        source, target = run.plan.members[outlet.source], run.plan.members[outlet.device].port(outlet.device_port)
-        self._codec = PortCodec(source.port(outlet.source_port).model_copy(update={"variability": target.variability}))
-        self._port, self._stream = target.name, f"{outlet.source}.{outlet.source_port} -> {outlet.device}.{target.name}"
-        self._link, self._loop, self._drops, self._latencies, self._offset = link, loop, drops, latencies, offset
+    def __init__(
+        self,
+        outlet: Outlet,
+        run: Run,
+        link: Link,
+        loop: DeviceLoop,
+        drops: Drops,
+        latencies: Latencies,
+        offset: ClockOffset | None,
+    ) -> None:
+        source, target = (
+            run.plan.members[outlet.source],
+            run.plan.members[outlet.device].port(outlet.device_port),
+        )
+        self._codec = PortCodec(
+            source.port(outlet.source_port).model_copy(update={"variability": target.variability})
+        )
+        self._port, self._stream = (
+            target.name,
+            f"{outlet.source}.{outlet.source_port} -> {outlet.device}.{target.name}",
+        )
+        self._link, self._loop, self._drops, self._latencies, self._offset = (
+            link,
+            loop,
+            drops,
+            latencies,
+            offset,
+        )
         self._line: Line = link.line(target)
         self._timed = not source.host.startswith("remote/")  # the clock of a third machine is nobody's here
         self._newest = (INITIAL - 1, 0)
@@ -209,7 +277,11 @@ class _Inflow:
     def _write(self, tag: Tag, value: Value) -> None:
         if (tag.step, tag.index) <= self._newest:
             if tag.step > INITIAL:  # the value at time 0 is repeated until every host has it
-                self._drops.refuse(self._stream, f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here before it")
+                self._drops.refuse(
+                    self._stream,
+                    f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here"
+                    " before it",
+                )
             return
         self._newest = tag.step, tag.index
         try:
@@ -220,4 +292,6 @@ class _Inflow:
         now_ns = monotonic_ns()
         best = None if self._offset is None else self._offset.best
         if self._timed and (self._offset is None or best is not None):
-            self._latencies.add("state to force", self._stream, now_ns + (0 if best is None else best.offset_ns) - tag.sent_ns)
+            self._latencies.add(
+                "state to force", self._stream, now_ns + (0 if best is None else best.offset_ns) - tag.sent_ns
+            )

@@ -1,6 +1,8 @@
-"""One process' share of a session: steps its participants in order, hands their values on, and books what they did.
+"""One process' share of a session: steps its participants in order, hands their values on, and books what
+they did.
 
-The host does not know whether a value comes from a neighbour in this process or from another one: both are cells.
+The host does not know whether a value comes from a neighbour in this process or from another one: both are
+cells.
 """
 
 from __future__ import annotations
@@ -75,20 +77,34 @@ class _Slot:
 
 
 _MANY = 32
-"""Values of one port that may wait for their reader: a socket of Linux holds some 160, and then the sender stands."""
+"""Values of one port that may wait for their reader: a socket of Linux holds some 160, and then the sender
+stands.
+"""
 
 
 class Host:
     """The stepped participants of one process."""
 
-    def __init__(self, name: str, plan: Plan, participants: Mapping[str, Stepped], *, wire: Wire | None = None, tap: Tap | None = None) -> None:
-        """Lay out the participants of host `name`; `wire` carries values to and from other processes, `tap` sees every output."""
+    def __init__(
+        self,
+        name: str,
+        plan: Plan,
+        participants: Mapping[str, Stepped],
+        *,
+        wire: Wire | None = None,
+        tap: Tap | None = None,
+    ) -> None:
+        """Lay out the participants of host `name`; `wire` carries values to and from other processes, `tap`
+        sees every output.
+        """
         self.name = name
         self.plan = plan
         self._step_s = plan.step_ns / 1e9
         self._wire = wire
         self._tap = tap
-        self._slots = [self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name]
+        self._slots = [
+            self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name
+        ]
         self._by_name = {slot.member.name: slot for slot in self._slots}
         self._remote: dict[tuple[str, str], RemoteCell] = {}
         self.step = INITIAL
@@ -103,28 +119,48 @@ class Host:
         fed = {m.name: self._readers(m) for m in plan.members.values() if m.follows_clock and m.host == name}
         self.feeds = {device: Feed(readers, plan.step_ns) for device, readers in fed.items()}
         """What the devices here that follow the clock are to be written."""
-        self._seldom_read = self._lay_seldom_read({reader.cell for readers in fed.values() for reader in readers})
+        self._seldom_read = self._lay_seldom_read(
+            {reader.cell for readers in fed.values() for reader in readers}
+        )
         self._lay_inlets()
 
-    # --- laying out ------------------------------------------------------------------------------------------------
+    # --- laying out
+    # ------------------------------------------------------------------------------------------------
 
     def _slot(self, member: Member, participant: Stepped) -> _Slot:
-        values = {port.name: _start_value(port) for port in member.ports if port.causality == "input" and port.variability == "signal"}
+        values = {
+            port.name: _start_value(port)
+            for port in member.ports
+            if port.causality == "input" and port.variability == "signal"
+        }
         inputs = Inputs(values)
-        rates, events, stale = inputs._rates, inputs._events, inputs._stale  # pyright: ignore[reportPrivateUsage]  # the host fills them
-        slot = _Slot(participant, member, member.period * self.plan.step_ns, inputs, values, rates, events, stale)
+        rates, events, stale = (
+            inputs._rates,
+            inputs._events,
+            inputs._stale,
+        )  # pyright: ignore[reportPrivateUsage]  # the host fills them
+        slot = _Slot(
+            participant, member, member.period * self.plan.step_ns, inputs, values, rates, events, stale
+        )
         slot.work_ports = tuple(f"{bond.name}/work" for bond in member.bonds)
         return slot
 
     def _depth(self, source: str, port: str, *, here: bool | None = None) -> int:
-        """Return how many values of an output readers look back: none in this process, one for the newest only, more for the last ones."""
+        """Return how many values of an output readers look back: none in this process, one for the newest
+        only, more for the last ones.
+        """
         depth = 0
         for link in self.plan.links:
             target = self.plan.members[link.target]
             if (link.source, link.source_port) != (source, port) or (here and target.host != self.name):
                 continue
             back = max(target.period // self.plan.stride(source, port), 1)
-            depth = max(depth, (1 if link.fresh else 2) + link.linear + (back if target.port(link.target_port).variability == "event" else 0))
+            depth = max(
+                depth,
+                (1 if link.fresh else 2)
+                + link.linear
+                + (back if target.port(link.target_port).variability == "event" else 0),
+            )
         return depth
 
     def _lay_sinks(self, slot: _Slot) -> None:
@@ -135,9 +171,22 @@ class Host:
                 continue
             stride = self.plan.stride(member.name, port.name)
             depth = self._depth(member.name, port.name, here=True)
-            readers = sorted({self.plan.members[k.target].host for k in self.plan.links if (k.source, k.source_port) == (member.name, port.name)} - {self.name})
-            feeds = port.variability == "event" and (member.name, port.name) in {(outlet.source, outlet.source_port) for outlet in self.plan.outlets}
-            publisher = wire.publisher(member, port, readers, feeds=feeds, bundles=places.get(port.name, ())) if wire is not None else None
+            readers = sorted(
+                {
+                    self.plan.members[k.target].host
+                    for k in self.plan.links
+                    if (k.source, k.source_port) == (member.name, port.name)
+                }
+                - {self.name}
+            )
+            feeds = port.variability == "event" and (member.name, port.name) in {
+                (outlet.source, outlet.source_port) for outlet in self.plan.outlets
+            }
+            publisher = (
+                wire.publisher(member, port, readers, feeds=feeds, bundles=places.get(port.name, ()))
+                if wire is not None
+                else None
+            )
             cell = Cell(member.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
             sink = _Sink(port, vector, () if vector is None else vector.neutral.shape, cell, publisher)
@@ -145,9 +194,13 @@ class Host:
             sinks.insert(0 if readers else len(sinks), sink)  # first what another host waits for
 
     def _places(self, slot: _Slot, wire: Wire) -> dict[str, list[tuple[Bundle, int]]]:
-        """Lay out the bundles for devices; return by output port in which of them its value goes along, and as which."""
+        """Lay out the bundles for devices; return by output port in which of them its value goes along, and
+        as which.
+        """
         places: dict[str, list[tuple[Bundle, int]]] = {}
-        for device in dict.fromkeys(outlet.device for outlet in self.plan.outlets if outlet.source == slot.member.name):
+        for device in dict.fromkeys(
+            outlet.device for outlet in self.plan.outlets if outlet.source == slot.member.name
+        ):
             bundle = slot.bundles[device] = wire.bundle(slot.member.name, device)
             for index, outlet in enumerate(bundled(self.plan, slot.member.name, device)):
                 places.setdefault(outlet.source_port, []).append((bundle, index))
@@ -158,14 +211,20 @@ class Host:
         for link in self.plan.links:
             if link.target != reading.name:
                 continue
-            source, target = self.plan.members[link.source].port(link.source_port), reading.port(link.target_port)
+            source, target = (
+                self.plan.members[link.source].port(link.source_port),
+                reading.port(link.target_port),
+            )
             stride_s = self.plan.stride(link.source, link.source_port) * self._step_s
             cell = self._cell(link.source, link.source_port)
-            readers.append(Reader(target.name, cell, link.fresh, link.linear, as_messages(source, target), stride_s))
+            readers.append(
+                Reader(target.name, cell, link.fresh, link.linear, as_messages(source, target), stride_s)
+            )
         return readers
 
     def _lay_seldom_read(self, fed: Collection[Cell]) -> list[tuple[RemoteCell, list[tuple[int, bool]]]]:
-        """Return the cells of other hosts' values of which many arrive between two readings, with period (steps) and freshness of all that read them.
+        """Return the cells of other hosts' values of which many arrive between two readings, with period
+        (steps) and freshness of all that read them.
 
         Those from which devices are `fed` are left to them.
         """
@@ -174,7 +233,11 @@ class Host:
             for reader in slot.readers:
                 if isinstance(reader.cell, RemoteCell):
                     read.setdefault(reader.cell, []).append((slot.member.period, reader.fresh))
-        return [(cell, by) for cell, by in read.items() if cell not in fed and min(period for period, _ in by) > _MANY * cell.stride]
+        return [
+            (cell, by)
+            for cell, by in read.items()
+            if cell not in fed and min(period for period, _ in by) > _MANY * cell.stride
+        ]
 
     def _cell(self, source: str, port: str) -> Cell:
         if source in self._by_name:
@@ -186,7 +249,11 @@ class Host:
             member = self.plan.members[source]
             declared = member.port(port)
             self._remote[source, port] = self._wire.cell(
-                member, declared, self.plan.stride(source, port), self._depth(source, port), self._listener(member, declared)
+                member,
+                declared,
+                self.plan.stride(source, port),
+                self._depth(source, port),
+                self._listener(member, declared),
             )
         return self._remote[source, port]
 
@@ -195,23 +262,33 @@ class Host:
         tap, step_ns = self._tap, self.plan.step_ns
         if tap is None:
             return None
-        return lambda tag, value: tap(member, port, tag, (tag + member.period) * step_ns if tag > INITIAL else 0, value)
+        return lambda tag, value: tap(
+            member, port, tag, (tag + member.period) * step_ns if tag > INITIAL else 0, value
+        )
 
     def _lay_inlets(self) -> None:
         for inlet in self.plan.inlets:
             if inlet.target in self._by_name:
-                slot, port = self._by_name[inlet.target], self.plan.members[inlet.target].port(inlet.target_port)
+                slot, port = (
+                    self._by_name[inlet.target],
+                    self.plan.members[inlet.target].port(inlet.target_port),
+                )
                 codec = PortCodec(port.filled_from(self.plan.members[inlet.device].port(inlet.device_port)))
-                self._inlets.setdefault((inlet.device, inlet.device_port), []).append((slot, port.name, codec))
+                self._inlets.setdefault((inlet.device, inlet.device_port), []).append(
+                    (slot, port.name, codec)
+                )
                 if port.variability == "signal":
                     slot.stale.add(port.name)
-        fed = {(link.target, link.target_port) for link in self.plan.links} | {(i.target, i.target_port) for i in self.plan.inlets}
+        fed = {(link.target, link.target_port) for link in self.plan.links} | {
+            (i.target, i.target_port) for i in self.plan.inlets
+        }
         for slot in self._slots:
             for port in slot.member.ports:
                 if port.causality == "input" and (slot.member.name, port.name) not in fed:
                     self._inlets[slot.member.name, port.name] = [(slot, port.name, PortCodec(port))]
 
-    # --- running ---------------------------------------------------------------------------------------------------
+    # --- running
+    # ---------------------------------------------------------------------------------------------------
 
     @property
     def members(self) -> Sequence[Member]:
@@ -219,7 +296,8 @@ class Host:
         return [slot.member for slot in self._slots]
 
     def configure(self, directory: Path) -> dict[str, tuple[BondSide, ...]]:
-        """Configure every participant and publish its outputs at time 0; returns the bonds with the numbers now known.
+        """Configure every participant and publish its outputs at time 0; returns the bonds with the numbers
+        now known.
 
         Raises ParticipantError naming the one that failed.
         """
@@ -234,7 +312,9 @@ class Host:
                 raise ParticipantError(slot.member.name, INITIAL, str(error)) from error
             except Exception as error:
                 log.exception("participant '%s' raised while it was configured", slot.member.name)
-                raise ParticipantError(slot.member.name, INITIAL, f"{type(error).__name__}: {error}") from error
+                raise ParticipantError(
+                    slot.member.name, INITIAL, f"{type(error).__name__}: {error}"
+                ) from error
             bonds[slot.member.name] = slot.participant.bonds
         return bonds
 
@@ -256,7 +336,9 @@ class Host:
 
     @property
     def awaited(self) -> str | None:
-        """Who keeps `run` from going on: the participant in its step, or the one elsewhere whose value it waits for."""
+        """Who keeps `run` from going on: the participant in its step, or the one elsewhere whose value it
+        waits for.
+        """
         return next((source for (source, _), cell in self._remote.items() if cell.waiting), self._stepping)
 
     def due(self, step: int, count: int) -> list[str]:
@@ -264,7 +346,8 @@ class Host:
         return [s.member.name for s in self._slots if -step % s.member.period < count]
 
     def run(self, grant: Permission, done: Done) -> None:
-        """Take what enters with `grant` and step to its horizon; `done` gets the report of each participant as soon as it is through.
+        """Take what enters with `grant` and step to its horizon; `done` gets the report of each participant
+        as soon as it is through.
 
         Raises ParticipantError.
         """
@@ -282,10 +365,17 @@ class Host:
                 if not step % period:
                     self._step(slot, step, step * step_ns)
                     if step + period >= end:
-                        done(slot.member, Report(grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j))
+                        done(
+                            slot.member,
+                            Report(
+                                grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j
+                            ),
+                        )
         self._stepping = None
         for cell, readers in self._seldom_read:
-            cell.take_until(min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers))
+            cell.take_until(
+                min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers)
+            )
 
     def _step(self, slot: _Slot, step: int, t: int) -> None:
         self._stepping = slot.member.name
@@ -316,7 +406,10 @@ class Host:
         cell = reader.cell
         if reader.messages is not None:
             if arrived := reader.events(step, self.plan.step_ns):
-                slot.events[reader.port] = (*slot.events.get(reader.port, ()), *(message for _, message in arrived))
+                slot.events[reader.port] = (
+                    *slot.events.get(reader.port, ()),
+                    *(message for _, message in arrived),
+                )
             return
         tag = cell.tag(step, fresh=reader.fresh)
         value = cell.get(tag)
@@ -332,9 +425,13 @@ class Host:
             for sink in sinks:
                 name = sink.port.name
                 if name not in outputs:
-                    raise ParticipantError(slot.member.name, step, f"output '{name}' is missing from what step() returned")
+                    raise ParticipantError(
+                        slot.member.name, step, f"output '{name}' is missing from what step() returned"
+                    )
                 value: Any = outputs[name]
-                if sink.vector is not None and (value.shape != sink.shape or not isfinite(value.dot(value)) or step == INITIAL):
+                if sink.vector is not None and (
+                    value.shape != sink.shape or not isfinite(value.dot(value)) or step == INITIAL
+                ):
                     sink.vector.checked(value)  # raises what is wrong, unless the numbers are only large
                 if sink.cell is not None:
                     sink.cell.put(step, value)

@@ -1,6 +1,8 @@
-"""A process that runs one host of a session: `python -P -m hub.hosting.host_process --connect ENDPOINT --session NAME --host NAME`.
+"""A process that runs one host of a session: `python -P -m hub.hosting.host_process --connect ENDPOINT
+--session NAME --host NAME`.
 
-It joins a hub, makes and configures its participants, steps them as grants come, and ends when the hub is gone.
+It joins a hub, makes and configures its participants, steps them as grants come, and ends when the hub is
+gone.
 """
 
 from __future__ import annotations
@@ -51,11 +53,20 @@ _PATIENCE_S = 2.0
 """How long a participant may go on computing after the hub is gone, before the process is ended under it."""
 
 
-def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | None = None, certificates: Path | None = None) -> None:
-    """Join session `session_name` (`*`: whatever there is) over `endpoint` and run host `host` until the hub ends.
+def run_host(
+    endpoint: str,
+    session_name: str,
+    host: str,
+    *,
+    directory: Path | None = None,
+    certificates: Path | None = None,
+) -> None:
+    """Join session `session_name` (`*`: whatever there is) over `endpoint` and run host `host` until the hub
+    ends.
 
-    A participant with `host: remote` is a host of its own, called `remote/<participant>`. Relative paths of the scenario
-    start at `directory`, by default where the hub has them. `certificates`: as `hub.remote.hub_connection.reach` has it.
+    A participant with `host: remote` is a host of its own, called `remote/<participant>`. Relative paths of
+    the scenario start at `directory`, by default where the hub has them. `certificates`: as
+    `hub.remote.hub_connection.reach` has it.
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
@@ -72,14 +83,24 @@ def run_host(endpoint: str, session_name: str, host: str, *, directory: Path | N
                 joined.close()
 
 
-def run_device(endpoint: str, session_name: str, name: str, *, directory: Path | None = None, certificates: Path | None = None) -> None:
-    """Join session `session_name` (`*`: whatever there is) over `endpoint` with the device `name`, and whatever comes after it, until Ctrl-C or SIGTERM.
+def run_device(
+    endpoint: str,
+    session_name: str,
+    name: str,
+    *,
+    directory: Path | None = None,
+    certificates: Path | None = None,
+) -> None:
+    """Join session `session_name` (`*`: whatever there is) over `endpoint` with the device `name`, and
+    whatever comes after it, until Ctrl-C or SIGTERM.
 
-    `directory` and `certificates` are as for `run_host`. Raises ConnectError if there is no such hub to begin with, MessageError if it has no place for
-    the device, and ParticipantError if the device fails.
+    `directory` and `certificates` are as for `run_host`. Raises ConnectError if there is no such hub to begin
+    with, MessageError if it has no place for the device, and ParticipantError if the device fails.
     """
     request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
-    host = DeviceHost(name, lambda: reach(endpoint, name, certificates), Keys(session_name), request, directory)
+    host = DeviceHost(
+        name, lambda: reach(endpoint, name, certificates), Keys(session_name), request, directory
+    )
     with Interrupt(), contextlib.suppress(KeyboardInterrupt):
         host.serve()
 
@@ -88,18 +109,42 @@ class _JoinedHost:
     """The participants of this process and their connection to the hub."""
 
     def __init__(
-        self, session: zenoh.Session, keys: Keys, request: JoinRequest, reply: JoinReply, directory: Path, connect: Callable[[], zenoh.Session]
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        request: JoinRequest,
+        reply: JoinReply,
+        directory: Path,
+        connect: Callable[[], zenoh.Session],
     ) -> None:
-        self._session, self._keys, self._request, self._run, self._directory = session, keys, request, reply.run, directory
+        self._session, self._keys, self._request, self._run, self._directory = (
+            session,
+            keys,
+            request,
+            reply.run,
+            directory,
+        )
         plan, host = reply.plan, request.host
         self._step_ns = plan.step_ns
         mine = {name: member for name, member in plan.members.items() if member.host == host}
         made = {name: make(member.kind, name, reply.params[name], directory) for name, member in mine.items()}
         first = next(iter(mine.values()))
-        refused = session.declare_publisher(keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR)
+        refused = session.declare_publisher(
+            keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
+        )
         self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
-        self._wire = Wire(session, keys, reply.run, self._drops, host, spin=may_spin(len(plan.hosts())), watched=reply.watched)
-        self._host = Host(host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire)
+        self._wire = Wire(
+            session,
+            keys,
+            reply.run,
+            self._drops,
+            host,
+            spin=may_spin(len(plan.hosts())),
+            watched=reply.watched,
+        )
+        self._host = Host(
+            host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire
+        )
         self._acks = {
             member.name: session.declare_publisher(
                 keys.ack(member.name),
@@ -116,15 +161,24 @@ class _JoinedHost:
         devices = {name: device for name, device in made.items() if isinstance(device, Device)}
         for device in devices.values():
             device.learn_hub(connect)
-        self._loops = {name: DeviceLoop(name, device, plan.members[name].read_ns, failed=self._device_failed) for name, device in devices.items()}
+        self._loops = {
+            name: DeviceLoop(name, device, plan.members[name].read_ns, failed=self._device_failed)
+            for name, device in devices.items()
+        }
         self._stack = contextlib.ExitStack()
         if devices:
-            clock, run = self._stack.enter_context(ClockWatch(session, keys)), Run(plan, keys, reply.run, reply.admission)
+            clock, run = (
+                self._stack.enter_context(ClockWatch(session, keys)),
+                Run(plan, keys, reply.run, reply.admission),
+            )
             for name, loop in self._loops.items():
                 uplink = DeviceUplink(plan.members[name], run, session, loop, self._drops, clock.offset)
                 self._stack.callback(uplink.close)
                 loop.attach(uplink)
-        self._tokens = [session.liveliness().declare_token(keys.alive(member.key_role, name)) for name, member in mine.items()]
+        self._tokens = [
+            session.liveliness().declare_token(keys.alive(member.key_role, name))
+            for name, member in mine.items()
+        ]
 
     def serve(self) -> None:
         """Configure, report ready, prime the links, and step until the hub says that the run is over."""
@@ -133,9 +187,19 @@ class _JoinedHost:
             for loop in self._loops.values():
                 loop.start(self._directory)
         except ParticipantError as error:
-            ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}), Empty)
+            ask(
+                self._session,
+                self._keys.join(self._request.host),
+                self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}),
+                Empty,
+            )
             raise
-        ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"ready": True, "bonds": bonds}), Empty)
+        ask(
+            self._session,
+            self._keys.join(self._request.host),
+            self._request.model_copy(update={"ready": True, "bonds": bonds}),
+            Empty,
+        )
         while not self._acks:  # devices alone, which live in threads of their own
             sleep(_IDLE_S)
         grant = self._first_grant()
@@ -143,7 +207,9 @@ class _JoinedHost:
             try:
                 self._host.run(grant, self._done)
             except ParticipantError as error:
-                self._acks[error.participant].put(pack_report(Report(self._run, 0, error.step, (), (), (), error.cause)))
+                self._acks[error.participant].put(
+                    pack_report(Report(self._run, 0, error.step, (), (), (), error.cause))
+                )
                 raise
             grant = self._next_grant()
 
@@ -173,8 +239,15 @@ class _JoinedHost:
             grant = unpack_permission(sample.payload.to_bytes())
             if grant.run != self._run:
                 raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
-            if grant.step != self._next_step or grant.start_ns != grant.step * self._step_ns or grant.horizon_ns <= grant.start_ns:
-                raise MessageError(f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step {self._next_step} is next")
+            if (
+                grant.step != self._next_step
+                or grant.start_ns != grant.step * self._step_ns
+                or grant.horizon_ns <= grant.start_ns
+            ):
+                raise MessageError(
+                    f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step"
+                    f" {self._next_step} is next"
+                )
         except MessageError as error:
             self._drops.count(sample, error)
             return None
@@ -185,7 +258,12 @@ class _JoinedHost:
         self._acks[member.name].put(pack_report(report))
 
     def _device_failed(self, name: str, cause: str) -> None:
-        ask(self._session, self._keys.join(self._request.host), self._request.model_copy(update={"failed": f"{name}: {cause}"}), Empty)
+        ask(
+            self._session,
+            self._keys.join(self._request.host),
+            self._request.model_copy(update={"failed": f"{name}: {cause}"}),
+            Empty,
+        )
 
     def close(self) -> None:
         """Close devices, participants and publishers."""
@@ -199,7 +277,9 @@ class _JoinedHost:
 
 @contextlib.contextmanager
 def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
-    """Interrupt the main thread when the hub's liveliness token is gone, and end the process if that does not help."""
+    """Interrupt the main thread when the hub's liveliness token is gone, and end the process if that does not
+    help.
+    """
     over, interrupt = threading.Event(), Interrupt()
 
     def gone(sample: zenoh.Sample) -> None:
@@ -212,7 +292,9 @@ def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
         if not over.wait(_PATIENCE_S):
             os._exit(1)
 
-    watch = session.liveliness().declare_subscriber(keys.alive("hub", "hub"), Callback(gone, indirect=True), history=True)
+    watch = session.liveliness().declare_subscriber(
+        keys.alive("hub", "hub"), Callback(gone, indirect=True), history=True
+    )
     try:
         with interrupt, contextlib.suppress(KeyboardInterrupt):
             yield
@@ -224,11 +306,16 @@ def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
 
 def main() -> None:
     """Run a host; exit code 1 if one of its participants failed."""
-    parser = argparse.ArgumentParser(prog="python -P -m hub.hosting.host_process", description=f"Host process of Trocar {version('trocar')}.")
+    parser = argparse.ArgumentParser(
+        prog="python -P -m hub.hosting.host_process",
+        description=f"Host process of Trocar {version('trocar')}.",
+    )
     for option in ("--connect", "--session", "--host"):
         parser.add_argument(option, required=True)
     arguments = parser.parse_args()
-    logging.basicConfig(level=logging.INFO, format=f"%(levelname)s [{arguments.host}] %(message)s", stream=sys.stderr)
+    logging.basicConfig(
+        level=logging.INFO, format=f"%(levelname)s [{arguments.host}] %(message)s", stream=sys.stderr
+    )
     try:
         run_host(arguments.connect, arguments.session, arguments.host)
     except TrocarError as error:

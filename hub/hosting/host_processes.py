@@ -33,15 +33,37 @@ class Fleet:
 
     def start(self, host: str, endpoint: str, session: str) -> None:
         """Start host `host`. It joins over `endpoint`; what it prints goes to stderr."""
-        command = [sys.executable, "-P", "-m", "hub.hosting.host_process", "--connect", endpoint, "--session", session, "--host", host]
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "hub.hosting.host_process",
+            "--connect",
+            endpoint,
+            "--session",
+            session,
+            "--host",
+            host,
+        ]
         environment = dict(os.environ)
         pin_blas(environment)
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env=environment, start_new_session=True)
-        self._processes = {**self._processes, host: process}  # a new one: the watchdog's thread may be looking through the old one
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=sys.stderr.fileno(),
+            env=environment,
+            start_new_session=True,
+        )
+        # a new one: the watchdog's thread may be looking through the old one
+        self._processes = {**self._processes, host: process}
 
     def dead(self) -> dict[str, str]:
         """Return how each host ended that is no longer there."""
-        return {host: _how(process.returncode) for host, process in self._processes.items() if process.poll() is not None}
+        return {
+            host: _how(process.returncode)
+            for host, process in self._processes.items()
+            if process.poll() is not None
+        }
 
     def end(self) -> None:
         """Wait for the hosts, which end by themselves once the hub's token is gone; kill what does not."""
@@ -67,8 +89,17 @@ def _how(code: int) -> str:
 class Watchdog:
     """Looks after processes and the time that answers take, in a thread of its own."""
 
-    def __init__(self, plan: Plan, fleet: Fleet, answer_limit_ns: int, awaited: Callable[[], str | None], failed: Callable[[str, str], None]) -> None:
-        """`awaited` says who keeps this process from going on; `failed` is called once, with a participant's name and the cause."""
+    def __init__(
+        self,
+        plan: Plan,
+        fleet: Fleet,
+        answer_limit_ns: int,
+        awaited: Callable[[], str | None],
+        failed: Callable[[str, str], None],
+    ) -> None:
+        """`awaited` says who keeps this process from going on; `failed` is called once, with a participant's
+        name and the cause.
+        """
         self._plan = plan
         self._fleet = fleet
         self._limit_ns = answer_limit_ns
@@ -81,7 +112,9 @@ class Watchdog:
         self._thread.start()
 
     def wait_for(self, participants: Sequence[str]) -> None:
-        """Say whose answers are waited for from now on, in step order; who answers may be removed from the list meanwhile."""
+        """Say whose answers are waited for from now on, in step order; who answers may be removed from the
+        list meanwhile.
+        """
         self._since_ns = monotonic_ns()
         self._waiting = participants
 
@@ -96,13 +129,24 @@ class Watchdog:
         for host, how in self._fleet.dead().items():
             names = [name for name in self._plan.members if self._plan.members[name].host == host]
             missing = [name for name in self._waiting if name in names] or names
-            others = f" (host '{host}' also ran {', '.join(n for n in names if n != missing[0])})" if len(names) > 1 else ""
+            others = (
+                f" (host '{host}' also ran {', '.join(n for n in names if n != missing[0])})"
+                if len(names) > 1
+                else ""
+            )
             return missing[0], f"{how}{others}"
         since_ns, waiting = self._since_ns, tuple(self._waiting)
         if waiting and monotonic_ns() - since_ns > self._limit_ns:
             awaited = self._awaited()
-            others = "" if awaited is not None or len(waiting) == 1 else f"; nor have {', '.join(waiting[1:])}, which may wait for it"
-            return awaited or waiting[0], f"it has not answered for {self._limit_ns / 1e9:g} s (answer_limit){others}"
+            others = (
+                ""
+                if awaited is not None or len(waiting) == 1
+                else f"; nor have {', '.join(waiting[1:])}, which may wait for it"
+            )
+            return (
+                awaited or waiting[0],
+                f"it has not answered for {self._limit_ns / 1e9:g} s (answer_limit){others}",
+            )
         return None
 
     def end(self) -> None:

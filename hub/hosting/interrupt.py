@@ -12,10 +12,11 @@ __all__ = ["Interrupt"]
 
 
 class Interrupt:
-    """While it is entered, SIGTERM raises KeyboardInterrupt in the main thread; calling it does the same from any thread.
+    """While it is entered, SIGTERM raises KeyboardInterrupt in the main thread; calling it does the same from
+    any thread.
 
-    SIGINT itself would not do: a shell lets the programs that it starts in the background ignore it. Entered in another
-    thread than the main one, it does nothing.
+    SIGINT itself would not do: a shell lets the programs that it starts in the background ignore it. Entered
+    in another thread than the main one, it does nothing.
     """
 
     def __init__(self) -> None:
@@ -30,7 +31,10 @@ class Interrupt:
         return self
 
     def disarm(self) -> None:
-        """Raise nothing any more: the main thread is closing what it has opened. No signal is on its way from other threads after that."""
+        """Raise nothing any more: the main thread is closing what it has opened.
+
+        No signal is on its way from other threads after that.
+        """
         with self._sending:
             self._armed = self._raised = False
 
@@ -51,11 +55,15 @@ class Interrupt:
             raise KeyboardInterrupt
 
     def check(self) -> None:
-        """Raise again what was raised and got lost: in a callback that Zenoh calls in the main thread nobody hears of it."""
+        """Raise again what was raised and got lost: in a callback that Zenoh calls in the main thread nobody
+        hears of it.
+        """
         if self._raised:
             raise KeyboardInterrupt
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._before is not None:
             self.disarm()
             signal.signal(signal.SIGTERM, self._before)

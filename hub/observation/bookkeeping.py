@@ -1,4 +1,6 @@
-"""What the hub knows of its run, and how it tells it: a status for consoles, a progress line, and a summary at the end."""
+"""What the hub knows of its run, and how it tells it: a status for consoles, a progress line, and a summary
+at the end.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,19 @@ __all__ = ["Account"]
 class Account:
     """The account of one run."""
 
-    def __init__(self, scenario: Scenario, plan: Plan, run: int, clock: Clock, drops: Drops, observers: Observers, intake: Intake) -> None:
-        """Take what is told of: `run` is its number; `drops` counts what the hub refuses beside what `observers` do."""
+    def __init__(
+        self,
+        scenario: Scenario,
+        plan: Plan,
+        run: int,
+        clock: Clock,
+        drops: Drops,
+        observers: Observers,
+        intake: Intake,
+    ) -> None:
+        """Take what is told of: `run` is its number; `drops` counts what the hub refuses beside what
+        `observers` do.
+        """
         self.phase = "starting"
         """`starting`, `running`, `paused`, `done` or `failed`."""
         self.detail = ""
@@ -58,7 +71,9 @@ class Account:
         self._answers.add(monotonic_ns() - granted_ns)
 
     def book(self, member: Member, report: Report) -> int:
-        """Book the hashes and the last step that a participant reports; return the simulated time (ns) at the end of that step."""
+        """Book the hashes and the last step that a participant reports; return the simulated time (ns) at the
+        end of that step.
+        """
         self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
         first = report.step + -report.step % member.period
         last = self._last_steps[member.name] = first + (len(report.state_hash) - 1) * member.period
@@ -68,12 +83,25 @@ class Account:
         """Return where the run is now."""
         sim_s, wall_ns = self._clock.time_ns / 1e9, self._wall_so_far_ns
         factor = sim_s / (wall_ns / 1e9) if wall_ns else 0.0
-        return Progress(self._clock.step, self._clock.steps, sim_s, factor, self._clock.late_steps, self._observers.measures.live())
+        return Progress(
+            self._clock.step,
+            self._clock.steps,
+            sim_s,
+            factor,
+            self._clock.late_steps,
+            self._observers.measures.live(),
+        )
 
     def status(self, pid: Callable[[str], int]) -> SessionStatus:
         """Return what the session is doing now; `pid` knows the process of a host."""
         members = [
-            ParticipantStatus(name=m.name, role=m.role, host=m.host, pid=pid(m.host), step=self._last_steps.get(m.name, self._clock.step))
+            ParticipantStatus(
+                name=m.name,
+                role=m.role,
+                host=m.host,
+                pid=pid(m.host),
+                step=self._last_steps.get(m.name, self._clock.step),
+            )
             for m in self._plan.members.values()
         ]
         progress = self.progress()

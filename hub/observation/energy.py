@@ -1,4 +1,6 @@
-"""The energy book of every bond: what the motion side gave, what the force side got, and what the coupling made or lost."""
+"""The energy book of every bond: what the motion side gave, what the force side got, and what the coupling
+made or lost.
+"""
 
 from __future__ import annotations
 
@@ -46,6 +48,12 @@ class EnergyBooks:
         """Return the state of every book."""
         header = Header(stamp=Time.from_ns(time_ns))
         return [
-            CouplingEnergy(header=header, bond=b.planned.bond.name, motion_work_j=b.motion_j, force_work_j=b.force_j, residual_j=b.force_j - b.motion_j)
+            CouplingEnergy(
+                header=header,
+                bond=b.planned.bond.name,
+                motion_work_j=b.motion_j,
+                force_work_j=b.force_j,
+                residual_j=b.force_j - b.motion_j,
+            )
             for b in self._books
         ]

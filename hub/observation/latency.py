@@ -1,4 +1,6 @@
-"""How long things take: bounded histograms of times, and the three ways of a device's messages through a session."""
+"""How long things take: bounded histograms of times, and the three ways of a device's messages through a
+session.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ _BITS = 5
 
 
 class Histogram:
-    """Counts of times in bins whose width grows with the time; memory is bounded by the number of bits of a time (64 x 32 bins at most)."""
+    """Counts of times in bins whose width grows with the time; memory is bounded by the number of bits of a
+    time (64 x 32 bins at most).
+    """
 
     def __init__(self) -> None:
         self._bins: dict[int, list[int]] = {}
@@ -40,7 +44,10 @@ class Histogram:
             self.largest_ns = time_ns
 
     def percentile(self, share: float) -> float:
-        """Return the time (ns) below which `share` of all times are: the mean of its bin. Raises ValueError of nothing."""
+        """Return the time (ns) below which `share` of all times are: the mean of its bin.
+
+        Raises ValueError of nothing.
+        """
         bins = self._bins.copy()
         rank, passed = share * sum(count for count, _ in bins.values()), 0
         for index in sorted(bins):
@@ -53,7 +60,14 @@ class Histogram:
     def message(self, way: str, stream: str) -> Latency:
         """Return what is told of a stream on its way; raises ValueError of nothing."""
         p50_s, p99_s = (self.percentile(share) / 1e9 for share in (0.5, 0.99))
-        return Latency(way=way, stream=stream, count=self.count, p50_s=p50_s, p99_s=p99_s, largest_s=self.largest_ns / 1e9)
+        return Latency(
+            way=way,
+            stream=stream,
+            count=self.count,
+            p50_s=p50_s,
+            p99_s=p99_s,
+            largest_s=self.largest_ns / 1e9,
+        )
 
 
 class Latencies:
@@ -80,5 +94,10 @@ def by_way(latencies: Iterable[Latency]) -> dict[str, dict[str, dict[str, float]
     """Return latencies as a summary has them: way, stream, and its numbers."""
     rows: dict[str, dict[str, dict[str, float]]] = {}
     for one in latencies:
-        rows.setdefault(one.way, {})[one.stream] = {"count": one.count, "p50_s": one.p50_s, "p99_s": one.p99_s, "largest_s": one.largest_s}
+        rows.setdefault(one.way, {})[one.stream] = {
+            "count": one.count,
+            "p50_s": one.p50_s,
+            "p99_s": one.p99_s,
+            "largest_s": one.largest_s,
+        }
     return rows

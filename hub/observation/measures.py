@@ -38,7 +38,9 @@ class _Meter:
 
     def take(self, value: Vector, time_ns: int) -> None:
         part = value[self._part]
-        self.now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
+        self.now = (
+            float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
+        )
         if time_ns < self._after:
             return
         self._least = min(self._least, self.now)
@@ -57,8 +59,21 @@ class _Meter:
     def result(self) -> float | None:
         if not self._count:
             return None
-        results = {"peak-norm": self._peak, "peak": self._peak, "least": self._least, "mean": self._sum / self._count, "final": self.now}
-        return (results | {"drop": self._drop, "swing": float(np.max(self._high - self._low)), "time-above": self._longest * self._period})[self._kind]
+        results = {
+            "peak-norm": self._peak,
+            "peak": self._peak,
+            "least": self._least,
+            "mean": self._sum / self._count,
+            "final": self.now,
+        }
+        return (
+            results
+            | {
+                "drop": self._drop,
+                "swing": float(np.max(self._high - self._low)),
+                "time-above": self._longest * self._period,
+            }
+        )[self._kind]
 
 
 class Measures:

@@ -42,7 +42,9 @@ class _Watched:
 class Observers:
     """Sees every grant, ack and output value of one run, from this process or from others."""
 
-    def __init__(self, plan: Plan, keys: Keys, run: int, measures: Measures, recorder: Recorder | None) -> None:
+    def __init__(
+        self, plan: Plan, keys: Keys, run: int, measures: Measures, recorder: Recorder | None
+    ) -> None:
         self.measures = measures
         self.energy = EnergyBooks(plan)
         self.drops = Drops()
@@ -57,7 +59,9 @@ class Observers:
             for port in member.ports:
                 if port.causality == "output":
                     key = keys.output(member.key_role, member.name, port.name)
-                    self._watched[key] = _Watched(member, port, PortCodec(port), self._channel(key, port.type))
+                    self._watched[key] = _Watched(
+                        member, port, PortCodec(port), self._channel(key, port.type)
+                    )
 
     def _channel(self, key: str, type_name: str) -> int:
         if self._recorder is None:
@@ -74,14 +78,26 @@ class Observers:
     @property
     def away(self) -> dict[str, tuple[str, str]]:
         """Participant and port of every output of another process that is to be watched, by key."""
-        away = {key: w for key, w in self._watched.items() if w.member.host != "hub" and w.member.role != "device" and not self._comes_by_lane(w)}
+        away = {
+            key: w
+            for key, w in self._watched.items()
+            if w.member.host != "hub" and w.member.role != "device" and not self._comes_by_lane(w)
+        }
         measured = set(self.measures.ports)
-        return {key: (w.member.name, w.port.name) for key, w in away.items() if self._recorder is not None or (w.member.name, w.port.name) in measured}
+        return {
+            key: (w.member.name, w.port.name)
+            for key, w in away.items()
+            if self._recorder is not None or (w.member.name, w.port.name) in measured
+        }
 
     def _comes_by_lane(self, watched: _Watched) -> bool:
         """Say whether the hub's own host reads the value anyway, past Zenoh, and shows it to `value`."""
         name, port = watched.member.name, watched.port
-        readers = {self._plan.members[link.target].host for link in self._plan.links if (link.source, link.source_port) == (name, port.name)}
+        readers = {
+            self._plan.members[link.target].host
+            for link in self._plan.links
+            if (link.source, link.source_port) == (name, port.name)
+        }
         return "hub" in readers and has_lane(port, watched.member.host, "hub")
 
     def linked(self) -> bool:
@@ -121,11 +137,16 @@ class Observers:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
     def watches(self, device: str, port: str) -> bool:
-        """Say whether anybody wants to see what a device says on a port, whether or not it enters the simulation."""
+        """Say whether anybody wants to see what a device says on a port, whether or not it enters the
+        simulation.
+        """
         return self._recorder is not None or (device, port) in self.measures.by_port
 
     def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
-        """Take what a device said; what enters the simulation is recorded with its grant. Raises MessageError if it is none of the port."""
+        """Take what a device said; what enters the simulation is recorded with its grant.
+
+        Raises MessageError if it is none of the port.
+        """
         watched = self._watched[self._keys.output("device", device, port)]
         measured = (device, port) in self.measures.by_port
         if measured or not enters:
@@ -163,10 +184,14 @@ class Observers:
         messages = self.energy.messages(time_ns)
         if self._recorder is not None:
             for message in messages:
-                self._recorder.write(self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message))
+                self._recorder.write(
+                    self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message)
+                )
         return messages
 
     def status(self, status: SessionStatus) -> None:
         """Record a status of the session."""
         if self._recorder is not None:
-            self._recorder.write(self._channel(self._keys.status, status.ros_type), status.sim_time_ns, encode(status))
+            self._recorder.write(
+                self._channel(self._keys.status, status.ros_type), status.sim_time_ns, encode(status)
+            )

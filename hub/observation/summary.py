@@ -36,13 +36,18 @@ class Summary:
     late_steps: int
     dropped_messages: int
     state_hash: str
-    """Over every state hash of every participant: equal for equal runs, whatever the placement or the grants' windows."""
+    """Over every state hash of every participant: equal for equal runs, whatever the placement or the grants'
+    windows.
+    """
     recording: str | None
     recording_complete: bool | None
     energy_residual_j: float
-    latency: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict[str, dict[str, dict[str, float]]])
-    """By way (`device to grant`, `grant to state`, `state to force`) and stream: count, p50_s, p99_s, largest_s. In the device's clock: one that
-    follows simulated time has simulated latencies."""
+    latency: dict[str, dict[str, dict[str, float]]] = field(
+        default_factory=dict[str, dict[str, dict[str, float]]]
+    )
+    """By way (`device to grant`, `grant to state`, `state to force`) and stream: count, p50_s, p99_s,
+    largest_s. In the device's clock: one that follows simulated time has simulated latencies.
+    """
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
 
     def as_dict(self) -> dict[str, Any]:

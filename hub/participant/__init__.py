@@ -7,4 +7,20 @@ from hub.participant.inputs import Inputs
 from hub.participant.state import restore_arrays, state_hash
 from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
 
-__all__ = ["BondPlan", "Correction", "Device", "ForceSide", "Inputs", "MotionSide", "Outputs", "Params", "Participant", "Sample", "Setup", "Stepped", "Value", "restore_arrays", "state_hash"]
+__all__ = [
+    "BondPlan",
+    "Correction",
+    "Device",
+    "ForceSide",
+    "Inputs",
+    "MotionSide",
+    "Outputs",
+    "Params",
+    "Participant",
+    "Sample",
+    "Setup",
+    "Stepped",
+    "Value",
+    "restore_arrays",
+    "state_hash",
+]

@@ -34,7 +34,10 @@ class Participant(ABC):
     """The pydantic model of the kind's parameters."""
 
     def __init__(self, name: str, params: Any) -> None:
-        """Take the participant's name and an instance of `params_model`. Cheap: no package of an extra is imported here."""
+        """Take the participant's name and an instance of `params_model`.
+
+        Cheap: no package of an extra is imported here.
+        """
         self.name = name
         self.params = params
 
@@ -50,6 +53,7 @@ class Participant(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
-

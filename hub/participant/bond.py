@@ -1,10 +1,10 @@
 """The two sides of a power bond inside an engine's step: prediction, virtual coupling forces and work.
 
-The force side goes through its sub-steps on the predicted motion of the other side and sums impulse and work; the
-motion side applies the wrench it was given and sums the work it does. Frames (dof 6) use the convention pose
-(x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's frame. In the shapes
-`size` and `linear` are those of the `BondSide`.
-Scheme and rules: docs/decisions/0004-coupling.md.
+The force side goes through its sub-steps on the predicted motion of the other side and sums impulse and work;
+the motion side applies the wrench it was given and sums the work it does. Frames (dof 6) use the convention
+pose (x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's
+frame. In the shapes `size` and `linear` are those of the `BondSide`. Scheme and rules:
+docs/decisions/0004-coupling.md.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class ForceSide:
     def begin(self, inputs: Inputs, h: float) -> None:
         """Take the motion at the start of a step of `h` seconds.
 
-        Where the motion that came out differs by d from the predicted one, the spring is displaced by d at once: it takes
-        the work F d + k d^2 / 2, with F its force at the end of the last step.
+        Where the motion that came out differs by d from the predicted one, the spring is displaced by d at
+        once: it takes the work F d + k d^2 / 2, with F its force at the end of the last step.
         """
         x, v = inputs[self._position][: self._linear], inputs[self._velocity]
         if self._started:
@@ -67,7 +67,9 @@ class ForceSide:
         return self._v + tau * self._a
 
     def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
-        """Count the forces (N, N m; shape (size,)) with which the other side pushes, in a sub-step of `dt` seconds around `tau`."""
+        """Count the forces (N, N m; shape (size,)) with which the other side pushes, in a sub-step of `dt`
+        seconds around `tau`.
+        """
         force = spring + damper
         self._impulse += dt * force
         self._summed += dt
@@ -75,7 +77,8 @@ class ForceSide:
         self._work[0] += dt * float(moved @ self.velocity(tau))
 
     def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond: the reaction on the other side (minus the mean force, or the one at the end), and the work.
+        """Return the outputs of the bond: the reaction on the other side (minus the mean force, or the one at
+        the end), and the work.
 
         `spring`, `damper`: forces (N, N m; shape (size,)) at the end of the step, on the predicted motion.
         """
@@ -86,12 +89,24 @@ class ForceSide:
     @property
     def state(self) -> Vector:
         """All that this side remembers between steps, for hash, save and restore."""
-        return np.concatenate([self._work, self._x, self._v, self._v_before, self._a, self._spring, [self._duration, float(self._started)]])
+        return np.concatenate(
+            [
+                self._work,
+                self._x,
+                self._v,
+                self._v_before,
+                self._a,
+                self._spring,
+                [self._duration, float(self._started)],
+            ]
+        )
 
     @state.setter
     def state(self, state: Vector) -> None:
         sizes = np.cumsum([1, self._linear, self._size, self._size, self._size, self._linear, 1])
-        self._work, self._x, self._v, self._v_before, self._a, self._spring, duration, started = np.split(state.copy(), sizes)
+        self._work, self._x, self._v, self._v_before, self._a, self._spring, duration, started = np.split(
+            state.copy(), sizes
+        )
         self._duration, self._started = float(duration[0]), bool(started[0])
 
 
@@ -113,12 +128,16 @@ class MotionSide:
             self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
     def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
-        """Return the force (N, N m; shape (size,)) on this side in the sub-step that begins `tau` seconds into the step, given where it is then."""
+        """Return the force (N, N m; shape (size,)) on this side in the sub-step that begins `tau` seconds
+        into the step, given where it is then.
+        """
         if self._correction is None:
             return self._reaction
         c, force = self._correction, self._reaction.copy()
         behind = self._x + tau * self._v - position[: self._linear]
-        force[: self._linear] += c.gain * (c.stiffness * behind + c.damping * (self._v - velocity[: self._linear]))
+        force[: self._linear] += c.gain * (
+            c.stiffness * behind + c.damping * (self._v - velocity[: self._linear])
+        )
         return force
 
     def add(self, force: Vector, displacement: Vector) -> None:
@@ -126,7 +145,9 @@ class MotionSide:
         self._work[0] -= force.dot(displacement)
 
     def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond at the end of the step; the work's array is the same one at every step."""
+        """Return the outputs of the bond at the end of the step; the work's array is the same one at every
+        step.
+        """
         return {self.position_port: position, self.velocity_port: velocity, self.work_port: self._work}
 
     @property

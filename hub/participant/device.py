@@ -16,6 +16,7 @@ from schemas.message import Message
 
 __all__ = ["Device", "Sample"]
 
+
 @dataclass(frozen=True)
 class Sample:
     """One message of a device, stamped in the clock of its port."""
@@ -28,15 +29,22 @@ class Device(Participant):
     """A participant that lives in wall time, or, if it can play by a script, in simulated time."""
 
     read_period_ns: ClassVar[int] = 1_000_000
-    """How often it is read in wall time where the scenario does not say; a haptic stylus moves and is felt at 1 kHz."""
+    """How often it is read in wall time where the scenario does not say; a haptic stylus moves and is felt at
+    1 kHz.
+    """
 
     @property
     def foreign_keys(self) -> tuple[str, ...]:
-        """Zenoh keys, none of Trocar's own, that programs and this device share at the hub's router: who has the certificate `console` may use them."""
+        """Zenoh keys, none of Trocar's own, that programs and this device share at the hub's router: who has
+        the certificate `console` may use them.
+        """
         return ()
 
     def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
-        """Take, before `open`, what opens a Zenoh session of one's own with the hub. Only a device with foreign keys needs one."""
+        """Take, before `open`, what opens a Zenoh session of one's own with the hub.
+
+        Only a device with foreign keys needs one.
+        """
 
     @abstractmethod
     def open(self, directory: Path) -> None:
@@ -47,10 +55,14 @@ class Device(Participant):
         """Return what is new up to time `t` (ns since the session's start, wall or simulated), oldest first."""
 
     def wait(self, seconds: float) -> bool:
-        """Wait in the thread that reads, until the next period; a device that knows when it has something new returns at once, True, and is read."""
+        """Wait in the thread that reads, until the next period; a device that knows when it has something new
+        returns at once, True, and is read.
+        """
         sleep(seconds)
         return False
 
     def write(self, port: str, value: Value) -> None:
-        """Take the newest value of a signal, or the next message of an event port. A device without inputs is never written to."""
+        """Take the newest value of a signal, or the next message of an event port.
 
+        A device without inputs is never written to.
+        """

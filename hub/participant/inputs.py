@@ -14,8 +14,9 @@ __all__ = ["Inputs"]
 class Inputs:
     """The inputs of one participant in one step.
 
-    `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the connection is
-    linear: between the source's last two values while it is ahead, beyond them while it is not. The arrays belong to whoever produced them: read, do not write.
+    `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the
+    connection is linear: between the source's last two values while it is ahead, beyond them while it is not.
+    The arrays belong to whoever produced them: read, do not write.
     """
 
     __slots__ = ("_events", "_rates", "_stale", "_values")
@@ -39,7 +40,9 @@ class Inputs:
         return cast("Message | None", self._values[port])
 
     def at(self, port: str, tau: float) -> Vector:
-        """Return the vector `tau` seconds after the start of the step: held, or extrapolated if the connection says so."""
+        """Return the vector `tau` seconds after the start of the step: held, or extrapolated if the
+        connection says so.
+        """
         rate = self._rates.get(port)
         return self[port] if rate is None else self._values[port] + tau * rate
 
@@ -57,5 +60,7 @@ class Inputs:
         return not self._events
 
     def stale(self, port: str) -> bool:
-        """Say whether the device behind this port has been silent for longer than the port allows, or never spoke."""
+        """Say whether the device behind this port has been silent for longer than the port allows, or never
+        spoke.
+        """
         return port in self._stale

@@ -12,6 +12,7 @@ from schemas.vectors import Vector
 
 __all__ = ["restore_arrays", "state_hash"]
 
+
 def state_hash(*parts: bytes | Vector) -> int:
     """Return a 64-bit hash of `parts`, the same on every machine that has the same bits."""
     digest = hashlib.blake2b(digest_size=8)
@@ -21,13 +22,18 @@ def state_hash(*parts: bytes | Vector) -> int:
 
 
 def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:
-    """Write `state`, the bytes of `arrays` one after the other, back into them. Raises StateError if it has another size."""
+    """Write `state`, the bytes of `arrays` one after the other, back into them.
+
+    Raises StateError if it has another size.
+    """
     held = tuple(arrays)
     size = sum(array.nbytes for array in held)
     if len(state) != size:
-        raise StateError(f"participant '{participant}': a saved state of {len(state)} bytes, expected {size}; was it saved elsewhere?")
+        raise StateError(
+            f"participant '{participant}': a saved state of {len(state)} bytes, expected {size}; was it saved"
+            " elsewhere?"
+        )
     values, at = np.frombuffer(state), 0
     for array in held:
         array[...] = values[at : at + array.size].reshape(array.shape)
         at += array.size
-

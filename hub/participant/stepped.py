@@ -14,9 +14,12 @@ from schemas.ports import BondSide
 
 __all__ = ["BondPlan", "Correction", "Setup", "Stepped"]
 
+
 @dataclass(frozen=True)
 class Correction:
-    """The motion side's share of `impulse-linearised`: F_tool = -F_mean - gain [k (x - x_pred) + b (v - v_pred)]."""
+    """The motion side's share of `impulse-linearised`: F_tool = -F_mean - gain [k (x - x_pred) + b (v -
+    v_pred)].
+    """
 
     gain: float
     stiffness: float
@@ -28,7 +31,9 @@ class BondPlan:
     """How one bond of this participant is coupled."""
 
     prediction: str
-    """What the force side assumes of the motion inside a step: `hold`, `velocity` (x + v t) or `slope` (x + v t + a t^2/2)."""
+    """What the force side assumes of the motion inside a step: `hold`, `velocity` (x + v t) or `slope` (x + v
+    t + a t^2/2).
+    """
     mean: bool
     """The force side returns its mean force over the step; otherwise the force at its end."""
     correction: Correction | None = None
@@ -61,7 +66,8 @@ class Stepped(Participant):
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance from `t` to `t + h`, both in nanoseconds, and return the outputs at `t + h`.
 
-        The work of a bond since the start (J) is returned as a float vector of one element under `<bond>/work`.
+        The work of a bond since the start (J) is returned as a float vector of one element under
+        `<bond>/work`.
         """
 
     @abstractmethod
@@ -75,4 +81,3 @@ class Stepped(Participant):
     def restore(self, state: bytes) -> None:  # noqa: ARG002
         """Return to a saved state, bit for bit. Raises StateError where the participant cannot."""
         raise StateError(f"participant '{self.name}' ({type(self).__name__}) cannot restore a state")
-

@@ -1,4 +1,6 @@
-"""Coupling algorithms of power bonds, and the stable-step rule. Derivation and figures: docs/decisions/0004-coupling.md."""
+"""Coupling algorithms of power bonds, and the stable-step rule. Derivation and figures:
+docs/decisions/0004-coupling.md.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +13,21 @@ from schemas.scenario import Bond
 __all__ = ["bond_plans", "is_fresh", "stable_step_problem"]
 
 _RULE_SHARE = 0.5
-"""With this factor the rules of impulse and impulse-linearised hold in all of 108 linear cases (`bench/stable_step.py`), those of held
-inputs in half: what held inputs create only the tool's own damping takes, which a bond does not know."""
+"""With this factor the rules of impulse and impulse-linearised hold in all of 108 linear cases
+(`bench/stable_step.py`), those of held inputs in half: what held inputs create only the tool's own damping
+takes, which a bond does not know.
+"""
 
 _ENERGY_SHARE = 0.25
-"""What a press and release makes of energy is 0.13 H^2 k_contact / m of what it exchanges (`tests/engines/bullet/press_and_release.py`): 0.8 % here."""
+"""What a press and release makes of energy is 0.13 H^2 k_contact / m of what it exchanges
+(`tests/engines/bullet/press_and_release.py`): 0.8 % here.
+"""
 
 
 def is_fresh(bond: Bond, source_side: str) -> bool:
-    """Say whether the other side gets the outputs of `source_side` (`motion` or `force`) within the same step."""
+    """Say whether the other side gets the outputs of `source_side` (`motion` or `force`) within the same
+    step.
+    """
     if bond.algorithm in ("impulse", "impulse-linearised"):
         return source_side == "force"
     if bond.algorithm == "gauss-seidel" and bond.order is not None:
@@ -29,23 +37,35 @@ def is_fresh(bond: Bond, source_side: str) -> bool:
 
 
 def bond_plans(bond: Bond, force: BondSide, step_s: float) -> tuple[BondPlan, BondPlan]:
-    """Return the plans of the motion side and of the force side, for a communication step of `step_s` seconds."""
+    """Return the plans of the motion side and of the force side, for a communication step of `step_s`
+    seconds.
+    """
     if bond.algorithm == "impulse":
         plan = BondPlan(prediction=bond.prediction, mean=True)
         return plan, plan
     if bond.algorithm == "impulse-linearised":
-        gain = linearised_gain(step_s, _number(force.stiffness), _number(force.damping), _number(force.proxy_mass), force.proxy_step)
+        gain = linearised_gain(
+            step_s,
+            _number(force.stiffness),
+            _number(force.damping),
+            _number(force.proxy_mass),
+            force.proxy_step,
+        )
         correction = Correction(gain=gain, stiffness=_number(force.stiffness), damping=_number(force.damping))
-        return BondPlan(prediction="velocity", mean=True, correction=correction), BondPlan(prediction="velocity", mean=True)
+        return BondPlan(prediction="velocity", mean=True, correction=correction), BondPlan(
+            prediction="velocity", mean=True
+        )
     plan = BondPlan(prediction="hold", mean=False)
     return plan, plan
 
 
-def linearised_gain(step_s: float, stiffness: float, damping: float, proxy_mass: float, proxy_step_s: float = 0.0) -> float:
+def linearised_gain(
+    step_s: float, stiffness: float, damping: float, proxy_mass: float, proxy_step_s: float = 0.0
+) -> float:
     """Return g = S / (k H^2/6 + b H/2) with S = m_p [1 - (1 - min(1, b h / m_p)) exp(-(H - h) sqrt(k/m_p))].
 
-    S is the mass that the proxy alone reflects to the tool within a step: light for short steps, all of m_p for long ones. An
-    explicit damper takes its share b h / m_p at once, in the first sub-step h of the proxy.
+    S is the mass that the proxy alone reflects to the tool within a step: light for short steps, all of m_p
+    for long ones. An explicit damper takes its share b h / m_p at once, in the first sub-step h of the proxy.
     """
     first = min(proxy_step_s, step_s)
     left = 1.0 - min(1.0, damping * first / proxy_mass)
@@ -56,16 +76,25 @@ def linearised_gain(step_s: float, stiffness: float, damping: float, proxy_mass:
 def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: float) -> str | None:
     """Return what breaks the stable-step rule of `bond` at a step of `step_s` seconds, or None.
 
-    impulse: H <= 0.5 m / b.  impulse-linearised: H <= 0.5 sqrt(m (1/k + 1/k_contact)) and m >= 0.5 m_proxy.  Both: H <= 0.25
+    impulse: H <= 0.5 m / b.  impulse-linearised: H <= 0.5 sqrt(m (1/k + 1/k_contact)) and m >= 0.5 m_proxy.
+    Both: H <= 0.25
     sqrt(m / k_contact), above which a press and release makes more than 1 % of the energy it exchanges
-    (docs/decisions/0015-contact-force.md).  gauss-seidel and jacobi with held inputs: H <= 0.5 m / b and H <= 0.5 sqrt(m / k), the
+    (docs/decisions/0015-contact-force.md).  gauss-seidel and jacobi with held inputs: H <= 0.5 m / b and H <=
+    0.5 sqrt(m / k), the
     sampling limits of a held damper and a held spring.
-    m: effective mass of the motion side; k, b: virtual coupling. A number that a side does not state is not checked.
+    m: effective mass of the motion side; k, b: virtual coupling. A number that a side does not state is not
+    checked.
     """
     mass = motion.effective_mass
     if mass is None:
         return None
-    numbers = {"m": mass, "k": force.stiffness, "b": force.damping, "k_contact": force.contact_stiffness, "m_proxy": force.proxy_mass}
+    numbers = {
+        "m": mass,
+        "k": force.stiffness,
+        "b": force.damping,
+        "k_contact": force.contact_stiffness,
+        "m_proxy": force.proxy_mass,
+    }
     known = ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items() if value is not None)
     if bond.algorithm == "impulse-linearised" and mass < _RULE_SHARE * _number(force.proxy_mass):
         return (
@@ -77,8 +106,9 @@ def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: f
         return None
     rule, limit = min(broken.items(), key=lambda item: item[1])
     return (
-        f"a step of {step_s * 1e3:.4g} ms breaks the rule {rule} of '{bond.algorithm}', which allows {limit * 1e3:.4g} ms ({known} in SI units). "
-        "Use a shorter step, a heavier tool, a softer virtual coupling, or 'impulse-linearised' for a light tool."
+        f"a step of {step_s * 1e3:.4g} ms breaks the rule {rule} of '{bond.algorithm}', which allows"
+        f" {limit * 1e3:.4g} ms ({known} in SI units). Use a shorter step, a heavier tool, a softer virtual"
+        " coupling, or 'impulse-linearised' for a light tool."
     )
 
 
@@ -88,7 +118,9 @@ def _limits(bond: Bond, force: BondSide, mass: float) -> dict[str, float]:
     limits: dict[str, float] = {}
     if bond.algorithm == "impulse-linearised":
         if stiffness:
-            limits["H <= 0.5 sqrt(m (1/k + 1/k_contact))"] = _RULE_SHARE * math.sqrt(mass * (1.0 / stiffness + 1.0 / (contact or stiffness)))
+            limits["H <= 0.5 sqrt(m (1/k + 1/k_contact))"] = _RULE_SHARE * math.sqrt(
+                mass * (1.0 / stiffness + 1.0 / (contact or stiffness))
+            )
     elif damping:
         limits["H <= 0.5 m/b"] = _RULE_SHARE * mass / damping
     if bond.algorithm in ("impulse", "impulse-linearised"):

@@ -1,4 +1,6 @@
-"""The files that a session reads, and their hashes: a recording names them, so that a re-simulation knows whether they are still the same."""
+"""The files that a session reads, and their hashes: a recording names them, so that a re-simulation knows
+whether they are still the same.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ __all__ = ["changed_files", "file_hashes"]
 
 
 def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
-    """Return the SHA-256 of every file that a `Path` in `params` names, by its full path; relative ones start at `directory`.
+    """Return the SHA-256 of every file that a `Path` in `params` names, by its full path; relative ones start
+    at `directory`.
 
     A path of a directory stands for all files right in it.
     """
@@ -28,7 +31,9 @@ def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
 
 def changed_files(recorded: Mapping[str, str]) -> list[str]:
     """Return which files of `recorded`, hashes by path, are gone or hold something else by now."""
-    return [path for path, digest in recorded.items() if not Path(path).is_file() or _hash(Path(path)) != digest]
+    return [
+        path for path, digest in recorded.items() if not Path(path).is_file() or _hash(Path(path)) != digest
+    ]
 
 
 def _hash(file: Path) -> str:

@@ -20,7 +20,9 @@ class _Part(BaseModel):
 
 
 class Member(_Part):
-    """One participant: where it runs, how often it steps, what goes in and out (the ports of its connected bonds included)."""
+    """One participant: where it runs, how often it steps, what goes in and out (the ports of its connected
+    bonds included).
+    """
 
     name: str
     kind: str
@@ -62,7 +64,8 @@ class Link(_Part):
     target: str
     target_port: str
     fresh: bool
-    """The target sees the source's output of the same step; otherwise that of the last communication point."""
+    """The target sees the source's output of the same step; otherwise that of the last communication point.
+    """
     linear: bool
     """The target extrapolates inside its step."""
 
@@ -112,17 +115,25 @@ class Plan(_Part):
         return max(member.period, member.port(port).period_ns // self.step_ns)
 
     def meetings(self) -> tuple[Member, ...]:
-        """Return the devices that must be met at each of their periods: that follow the clock, and are written to or sit behind a link."""
+        """Return the devices that must be met at each of their periods: that follow the clock, and are
+        written to or sit behind a link.
+        """
         written = {link.target for link in self.links}
-        return tuple(m for m in self.members.values() if m.follows_clock and (m.name in written or m.link is not None))
+        return tuple(
+            m for m in self.members.values() if m.follows_clock and (m.name in written or m.link is not None)
+        )
 
     def seen_from(self, host: str) -> Plan:
-        """Return what another machine needs to know that runs host `host`: its participants, and of the others the ports they share a connection with."""
+        """Return what another machine needs to know that runs host `host`: its participants, and of the
+        others the ports they share a connection with.
+        """
         own = {name for name, member in self.members.items() if member.host == host}
         links = tuple(k for k in self.links if {k.source, k.target} & own)
         inlets = tuple(k for k in self.inlets if {k.device, k.target} & own)
         outlets = tuple(k for k in self.outlets if {k.source, k.device} & own)
-        ends = {(k.source, k.source_port) for k in (*links, *outlets)} | {(k.target, k.target_port) for k in (*links, *inlets)}
+        ends = {(k.source, k.source_port) for k in (*links, *outlets)} | {
+            (k.target, k.target_port) for k in (*links, *inlets)
+        }
         ends |= {(k.device, k.device_port) for k in (*inlets, *outlets)}
         shared: dict[str, Member] = {}
         for name, member in self.members.items():
@@ -133,7 +144,15 @@ class Plan(_Part):
                 shared[name] = member.model_copy(update={"ports": ports, "bonds": (), "bond_plans": {}})
         bonds = tuple(b for b in self.bonds if {b.bond.motion.participant, b.bond.force.participant} & own)
         order = tuple(name for name in self.order if name in shared)
-        return Plan(step_ns=self.step_ns, order=order, members=shared, links=links, inlets=inlets, outlets=outlets, bonds=bonds)
+        return Plan(
+            step_ns=self.step_ns,
+            order=order,
+            members=shared,
+            links=links,
+            inlets=inlets,
+            outlets=outlets,
+            bonds=bonds,
+        )
 
     def hosts(self) -> tuple[str, ...]:
         """Return the names of all hosts, the hub's own first."""
@@ -142,6 +161,8 @@ class Plan(_Part):
 
 
 def plays_in_simulated_time(ports: Sequence[Port]) -> bool:
-    """Say whether a device with these ports follows the clock: it has outputs, and all are stamped with simulated time."""
+    """Say whether a device with these ports follows the clock: it has outputs, and all are stamped with
+    simulated time.
+    """
     outputs = [port for port in ports if port.causality == "output"]
     return bool(outputs) and all(port.clock == "simulated" for port in outputs)

@@ -1,7 +1,7 @@
 """The kinds of participants that are installed, found by entry points and loaded by name.
 
-A package brings its own kinds by an entry point in one of the groups `trocar.engines`, `trocar.controllers` and
-`trocar.devices`. If it has an extra of the same name as a kind, the kind needs that extra to run.
+A package brings its own kinds by an entry point in one of the groups `trocar.engines`, `trocar.controllers`
+and `trocar.devices`. If it has an extra of the same name as a kind, the kind needs that extra to run.
 """
 
 from __future__ import annotations
@@ -19,7 +19,20 @@ from pydantic import ValidationError
 from hub.participant import Device, Stepped
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 
-__all__ = ["GROUPS", "UNPACKAGED", "Kind", "Participant", "broken", "find", "installed_packages", "kinds", "load", "make", "missing_packages", "require_extra"]
+__all__ = [
+    "GROUPS",
+    "UNPACKAGED",
+    "Kind",
+    "Participant",
+    "broken",
+    "find",
+    "installed_packages",
+    "kinds",
+    "load",
+    "make",
+    "missing_packages",
+    "require_extra",
+]
 
 Participant = type[Stepped] | type[Device]
 
@@ -50,13 +63,17 @@ def kinds() -> dict[str, Kind]:
             kind = Kind(entry.name, role, entry.dist.name if entry.dist else "an unnamed distribution", entry)
             other = found.get(kind.name)
             if other:
-                raise ScenarioError(f"kind '{kind.name}' is brought by both '{other.distribution}' and '{kind.distribution}': uninstall one of them")
+                raise ScenarioError(
+                    f"kind '{kind.name}' is brought by both '{other.distribution}' and '{kind.distribution}':"
+                    " uninstall one of them"
+                )
             found[kind.name] = kind
     return found
 
 
 def find(name: str) -> Kind:
-    """Return the kind called `name`: an installed one, or `module:Class` for a class of one's own on PYTHONPATH.
+    """Return the kind called `name`: an installed one, or `module:Class` for a class of one's own on
+    PYTHONPATH.
 
     Raises ScenarioError if there is none, or if that class cannot be imported.
     """
@@ -65,17 +82,25 @@ def find(name: str) -> Kind:
     if ":" in name:
         kind = Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
         loaded = _import(kind)  # only the class itself says what it is
-        return replace(kind, role="device") if isinstance(loaded, type) and issubclass(loaded, Device) else kind
+        return (
+            replace(kind, role="device") if isinstance(loaded, type) and issubclass(loaded, Device) else kind
+        )
     raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}")
 
 
 @cache
 def load(name: str) -> Participant:
-    """Return the class of kind `name`. Raises ScenarioError if there is no such kind or its package cannot be imported."""
+    """Return the class of kind `name`.
+
+    Raises ScenarioError if there is no such kind or its package cannot be imported.
+    """
     kind = find(name)
     loaded = _import(kind)
     if not (isinstance(loaded, type) and issubclass(loaded, Device if kind.role == "device" else Stepped)):
-        raise ScenarioError(f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no {'Device' if kind.role == 'device' else 'Stepped'}")
+        raise ScenarioError(
+            f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no"
+            f" {'Device' if kind.role == 'device' else 'Stepped'}"
+        )
     return loaded
 
 
@@ -84,7 +109,8 @@ def _import(kind: Kind) -> Any:
         return kind.entry.load()
     except Exception as error:  # whatever a plugin's module does on import
         raise ScenarioError(
-            f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}: {type(error).__name__}: {error}"
+            f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}:"
+            f" {type(error).__name__}: {error}"
         ) from error
 
 

@@ -35,7 +35,8 @@ def installed_scenarios() -> dict[str, Path]:
 
 
 def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
-    """Return the scenario that is installed under a name or stands in a file, with `a.b.c=value` overrides applied.
+    """Return the scenario that is installed under a name or stands in a file, with `a.b.c=value` overrides
+    applied.
 
     Raises ScenarioError with one line for each thing that is wrong.
     """
@@ -66,7 +67,10 @@ def _find(name_or_path: str) -> Path:
         return path
     known = installed_scenarios()
     if name_or_path not in known:
-        raise ScenarioError(f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} A file of your own is named with its .yaml.")
+        raise ScenarioError(
+            f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} A file of your own is"
+            " named with its .yaml."
+        )
     return known[name_or_path]
 
 
@@ -85,7 +89,9 @@ def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
 
 
 def _params(at: Location, spec: dict[str, Any], source: Source) -> Params:
-    """Return the validated parameters of one participant, and see that what it needs is installed, if it runs here."""
+    """Return the validated parameters of one participant, and see that what it needs is installed, if it runs
+    here.
+    """
     kind = spec["kind"]
     try:
         model = registry.load(kind).params_model

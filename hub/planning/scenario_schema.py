@@ -1,4 +1,6 @@
-"""The JSON schema of a scenario with the parameters of every installed kind, for editors (yaml-language-server)."""
+"""The JSON schema of a scenario with the parameters of every installed kind, for editors
+(yaml-language-server).
+"""
 
 from __future__ import annotations
 
@@ -27,15 +29,32 @@ def scenario_schema() -> str:
 
 
 def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a participant, told apart by `kind`: an editor then reports against the one that is meant."""
+    """Return the schema of a participant, told apart by `kind`: an editor then reports against the one that
+    is meant.
+    """
     broken = registry.broken()
     kinds = [kind for name, kind in sorted(registry.kinds().items()) if name not in broken]
     branches: list[dict[str, Any]] = []
     for kind in kinds:
-        params = registry.load(kind.name).params_model.model_json_schema(ref_template=f"#/$defs/{kind.name}.{{model}}")
-        definitions.update({f"{kind.name}.{name}": definition for name, definition in params.pop("$defs", {}).items()})
-        properties = {key: value for key, value in common.items() if key in ParticipantSpec.RESERVED} | params.get("properties", {})
-        then = {"properties": properties, "required": params.get("required", []), "additionalProperties": False}
+        params = registry.load(kind.name).params_model.model_json_schema(
+            ref_template=f"#/$defs/{kind.name}.{{model}}"
+        )
+        definitions.update(
+            {f"{kind.name}.{name}": definition for name, definition in params.pop("$defs", {}).items()}
+        )
+        properties = {
+            key: value for key, value in common.items() if key in ParticipantSpec.RESERVED
+        } | params.get("properties", {})
+        then = {
+            "properties": properties,
+            "required": params.get("required", []),
+            "additionalProperties": False,
+        }
         branches.append({"if": {"properties": {"kind": {"const": kind.name}}}, "then": then})
     kind_schema = common["kind"] | {"enum": [kind.name for kind in kinds]}
-    return {"type": "object", "properties": common | {"kind": kind_schema}, "required": ["kind"], "allOf": branches}
+    return {
+        "type": "object",
+        "properties": common | {"kind": kind_schema},
+        "required": ["kind"],
+        "allOf": branches,
+    }

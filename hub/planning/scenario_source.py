@@ -1,4 +1,6 @@
-"""The text of a scenario: the YAML tree, where each value of it stands, and what the command line put over it."""
+"""The text of a scenario: the YAML tree, where each value of it stands, and what the command line put over
+it.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ class Source:
         return self.file.resolve().parent
 
     def line(self, path: Location, message: str, *, key: bool = False) -> str:
-        """Return `FILE:LINE:COL: path: message` for the value at `path` (or its key); what is missing is shown where it belongs."""
+        """Return `FILE:LINE:COL: path: message` for the value at `path` (or its key); what is missing is
+        shown where it belongs.
+        """
         return f"{self._where(path, key)}: {'.'.join(map(str, path)) or 'scenario'}: {message}"
 
     def override(self, text: str) -> None:
@@ -54,7 +58,9 @@ class Source:
         parent: Any = self.tree
         for depth, part in enumerate(path):
             if problem := _no_such_part(parent, part):
-                raise ScenarioError(f"--set {text}: {'.'.join(map(str, path[:depth])) or 'the scenario'} {problem}")
+                raise ScenarioError(
+                    f"--set {text}: {'.'.join(map(str, path[:depth])) or 'the scenario'} {problem}"
+                )
             last = depth == len(path) - 1
             if last or (isinstance(parent, dict) and part not in parent):
                 cast("dict[Any, Any]", parent)[part] = value if last else {}
@@ -73,7 +79,10 @@ class Source:
 
 
 def read(file: Path) -> Source:
-    """Return the scenario text in `file`. Raises ScenarioError if it cannot be read or is not one YAML mapping."""
+    """Return the scenario text in `file`.
+
+    Raises ScenarioError if it cannot be read or is not one YAML mapping.
+    """
     try:
         text = file.read_text(encoding="utf-8")
         tree: Any = _copied(_yaml().load(text))
@@ -83,13 +92,20 @@ def read(file: Path) -> Source:
         detail: Any = error
         mark = detail.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
-        raise ScenarioError(f"{file}{where}: not valid YAML: {detail.problem}{f' ({detail.context})' if detail.context else ''}") from error
+        raise ScenarioError(
+            f"{file}{where}: not valid YAML:"
+            f" {detail.problem}{f' ({detail.context})' if detail.context else ''}"
+        ) from error
     except (OSError, UnicodeDecodeError, YAMLError) as error:
         raise ScenarioError(f"{file}: cannot be read: {error}") from error
     except RecursionError:
-        raise ScenarioError(f"{file}: nested too deeply: does an alias (*name) stand inside what it is an alias of?") from None
+        raise ScenarioError(
+            f"{file}: nested too deeply: does an alias (*name) stand inside what it is an alias of?"
+        ) from None
     if not isinstance(tree, dict):
-        raise ScenarioError(f"{file}:1:1: a scenario is a mapping with at least the keys name, step and participants")
+        raise ScenarioError(
+            f"{file}:1:1: a scenario is a mapping with at least the keys name, step and participants"
+        )
     return Source(file, cast("dict[str, Any]", tree), marks)
 
 
@@ -98,11 +114,14 @@ def _yaml() -> Any:
 
 
 def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tuple[_Mark, _Mark]]]:
-    """Yield where each value below a YAML node stands, the place that counts last: a key of one's own goes before a merged one."""
+    """Yield where each value below a YAML node stands, the place that counts last: a key of one's own goes
+    before a merged one.
+    """
     if value.id == "mapping":
         for merged in _merged(value):
             yield from _marks(key, merged, path)
-    empty = value.start_mark.index == value.end_mark.index  # `key:` without a value: the parser is already on the next line
+    # `key:` without a value: the parser is already on the next line
+    empty = value.start_mark.index == value.end_mark.index
     yield path, (_mark(key), _mark(key if empty else value))
     if value.id == "mapping":
         for name, child in value.value:
@@ -114,14 +133,18 @@ def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tup
 
 
 def _merged(mapping: Any) -> Iterator[Any]:
-    """Yield the nodes that `<<` merges into a mapping; of several that have a key the first one counts, so it comes last."""
+    """Yield the nodes that `<<` merges into a mapping; of several that have a key the first one counts, so it
+    comes last.
+    """
     for name, child in mapping.value:
         if name.tag == _MERGE:
             yield from reversed(child.value) if child.id == "sequence" else (child,)
 
 
 def _copied(value: Any) -> Any:
-    """Return a YAML tree in which no part is shared: what an alias stands for can then be overridden in one place alone."""
+    """Return a YAML tree in which no part is shared: what an alias stands for can then be overridden in one
+    place alone.
+    """
     if isinstance(value, dict):
         return {key: _copied(part) for key, part in cast("dict[Any, Any]", value).items()}
     return [_copied(part) for part in cast("list[Any]", value)] if isinstance(value, list) else value
@@ -134,5 +157,9 @@ def _mark(node: Any) -> _Mark:
 def _no_such_part(parent: Any, part: str | int) -> str:
     if isinstance(parent, list):
         length = len(parent)  # pyright: ignore[reportUnknownArgumentType]
-        return "" if isinstance(part, int) and part < length else f"is a list of {length}, counted from 0; there is no '{part}' in it"
+        return (
+            ""
+            if isinstance(part, int) and part < length
+            else f"is a list of {length}, counted from 0; there is no '{part}' in it"
+        )
     return "" if isinstance(parent, dict) else f"is '{parent}', which has no parts"

@@ -14,7 +14,9 @@ from schemas.errors import did_you_mean
 __all__ = ["problems"]
 
 
-def problems(error: ValidationError, model: type[BaseModel], prefix: Location, source: Source) -> Iterator[str]:
+def problems(
+    error: ValidationError, model: type[BaseModel], prefix: Location, source: Source
+) -> Iterator[str]:
     """Yield one line for each thing that `model`, which stands at `prefix` in the scenario, found wrong."""
     for detail in error.errors(include_url=False):
         about_key = detail["type"] == "extra_forbidden" or detail["loc"][-1:] == ("[key]",)
@@ -29,7 +31,10 @@ def _message(detail: ErrorDetails, model: type[BaseModel]) -> str:
             return f"there is no '{name}' here.{did_you_mean(name, _known_keys(model, detail['loc'][:-1]))}"
         case "literal_error":
             expected = str(detail.get("ctx", {}).get("expected", "")).replace(" or ", ", ")
-            return f"'{detail['input']}' is not allowed.{did_you_mean(str(detail['input']), (word.strip(chr(39)) for word in expected.split(', ')))}"
+            return (
+                f"'{detail['input']}' is not"
+                f" allowed.{did_you_mean(str(detail['input']), (word.strip(chr(39)) for word in expected.split(', ')))}"
+            )
         case "missing":
             return "is required but not given"
         case "model_type" | "dict_type":
@@ -40,12 +45,15 @@ def _message(detail: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
-    """Return the keys that `model` allows at `loc`, read from its JSON schema, where unions and nested models are all alike."""
+    """Return the keys that `model` allows at `loc`, read from its JSON schema, where unions and nested models
+    are all alike.
+    """
     root = model.model_json_schema()
     here = list(_branches(root, root))
     for part in loc:
         children = [child for branch in here for child in _children(branch, part)]
-        here = [branch for child in children for branch in _branches(child, root)] or here  # no children: `part` names a branch of a union
+        # no children: `part` names a branch of a union
+        here = [branch for child in children for branch in _branches(child, root)] or here
     return {key for branch in here for key in branch.get("properties", {})}
 
 
@@ -53,7 +61,11 @@ def _children(branch: dict[str, Any], part: str | int) -> Iterator[dict[str, Any
     """Yield the schemas of what stands under `part` in a mapping or a list."""
     properties: dict[str, Any] = branch.get("properties", {})
     patterns: dict[str, Any] = branch.get("patternProperties", {})
-    candidates: list[Any] = [properties[part]] if part in properties else [branch.get("additionalProperties"), *patterns.values(), branch.get("items")]
+    candidates: list[Any] = (
+        [properties[part]]
+        if part in properties
+        else [branch.get("additionalProperties"), *patterns.values(), branch.get("items")]
+    )
     return (cast("dict[str, Any]", schema) for schema in candidates if isinstance(schema, dict))
 
 

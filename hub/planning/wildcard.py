@@ -11,8 +11,11 @@ from schemas.scenario import Connection
 __all__ = ["spelt_out"]
 
 
-def spelt_out(connection: Connection, ports: Mapping[str, Sequence[Port]], path: tuple[str | int, ...]) -> tuple[Connection, ...]:
-    """Return the single connections that `connection`, which stands at `path` in the scenario, means among the `ports` of each participant.
+def spelt_out(
+    connection: Connection, ports: Mapping[str, Sequence[Port]], path: tuple[str | int, ...]
+) -> tuple[Connection, ...]:
+    """Return the single connections that `connection`, which stands at `path` in the scenario, means among
+    the `ports` of each participant.
 
     Raises ScenarioError if a wildcard joins nothing.
     """
@@ -27,11 +30,19 @@ def spelt_out(connection: Connection, ports: Mapping[str, Sequence[Port]], path:
     here, there = one.port.removesuffix("*"), other.port.removesuffix("*")
     pairs = [(name, there + name.removeprefix(here)) for name in outputs if name.startswith(here)]
     joined = [
-        connection.model_copy(update={"source": one.model_copy(update={"port": source}), "target": other.model_copy(update={"port": target})})
+        connection.model_copy(
+            update={
+                "source": one.model_copy(update={"port": source}),
+                "target": other.model_copy(update={"port": target}),
+            }
+        )
         for source, target in pairs
         if target in inputs
     ]
     if not joined:
-        lists = f"outputs of '{one.participant}': {', '.join(outputs) or 'none'}; inputs of '{other.participant}': {', '.join(inputs) or 'none'}"
+        lists = (
+            f"outputs of '{one.participant}': {', '.join(outputs) or 'none'}; inputs of"
+            f" '{other.participant}': {', '.join(inputs) or 'none'}"
+        )
         raise ScenarioError(f"'{one} -> {other}' joins nothing ({lists})", path=path)
     return tuple(joined)

@@ -1,4 +1,6 @@
-"""The wiring of a session: every port, connection and bond of a scenario checked against what the participants declare."""
+"""The wiring of a session: every port, connection and bond of a scenario checked against what the
+participants declare.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,17 @@ _LEAST_READ_NS = 100_000
 """A loop in Python that is asked for more keeps a core busy for nothing."""
 
 
-def make_plan(scenario: Scenario, participants: Mapping[str, Stepped | Device], roles: Mapping[str, str]) -> Plan:
+def make_plan(
+    scenario: Scenario, participants: Mapping[str, Stepped | Device], roles: Mapping[str, str]
+) -> Plan:
     """Check the wiring of `scenario` against what its `participants` declare.
 
     Raises ScenarioError, with the place in the scenario, on the first thing that does not fit.
     """
     bonds = [_planned_bond(scenario, participants, i) for i in range(len(scenario.bonds))]
-    members = {name: _member(scenario, participants[name], roles[name], bonds) for name in scenario.participants}
+    members = {
+        name: _member(scenario, participants[name], roles[name], bonds) for name in scenario.participants
+    }
     wiring = _Wiring(scenario, members)
     ports = {name: member.ports for name, member in members.items()}
     for index, connection in enumerate(scenario.connections):
@@ -52,20 +58,41 @@ def make_plan(scenario: Scenario, participants: Mapping[str, Stepped | Device], 
 def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds: list[PlannedBond]) -> Member:
     name = participant.name
     spec, path = scenario.participants[name], ("participants", name)
-    sides = [(b.bond, s) for b in bonds for e, s in ((b.bond.motion, b.motion), (b.bond.force, b.force)) if e.participant == name]
+    sides = [
+        (b.bond, s)
+        for b in bonds
+        for e, s in ((b.bond.motion, b.motion), (b.bond.force, b.force))
+        if e.participant == name
+    ]
     ports = participant.ports + tuple(port for _, side in sides for port in bond_ports(side))
     in_wall_time = role == "device" and not plays_in_simulated_time(ports)
     period_ns = spec.period if spec.period is not None and not in_wall_time else scenario.step
-    read_ns = (spec.period if spec.period is not None else participant.read_period_ns) if in_wall_time and isinstance(participant, Device) else 0
+    read_ns = (
+        (spec.period if spec.period is not None else participant.read_period_ns)
+        if in_wall_time and isinstance(participant, Device)
+        else 0
+    )
     if period_ns <= 0 or period_ns % scenario.step:
-        raise ScenarioError(f"period {period_ns / 1e6:g} ms is no multiple of the step {scenario.step / 1e6:g} ms", path=(*path, "period"))
+        raise ScenarioError(
+            f"period {period_ns / 1e6:g} ms is no multiple of the step {scenario.step / 1e6:g} ms",
+            path=(*path, "period"),
+        )
     if in_wall_time and read_ns < _LEAST_READ_NS:
-        raise ScenarioError(f"period {read_ns / 1e6:g} ms: a device is read every {_LEAST_READ_NS / 1e6:g} ms at most", path=(*path, "period"))
+        raise ScenarioError(
+            f"period {read_ns / 1e6:g} ms: a device is read every {_LEAST_READ_NS / 1e6:g} ms at most",
+            path=(*path, "period"),
+        )
     if spec.link is not None and role != "device":
-        raise ScenarioError(f"a link lies between a device and the hub, but '{name}' is a {role}: leave it out", path=(*path, "link"))
+        raise ScenarioError(
+            f"a link lies between a device and the hub, but '{name}' is a {role}: leave it out",
+            path=(*path, "link"),
+        )
     for port in ports:
         if port.period_ns % period_ns and not in_wall_time:
-            problem = f"output '{port.name}' has a period of {port.period_ns / 1e6:g} ms, no multiple of the participant's {period_ns / 1e6:g} ms"
+            problem = (
+                f"output '{port.name}' has a period of {port.period_ns / 1e6:g} ms, no multiple of the"
+                f" participant's {period_ns / 1e6:g} ms"
+            )
             raise ScenarioError(problem, path=path)
     plans: dict[str, BondPlan] = {}
     for planned in bonds:
@@ -88,45 +115,80 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
         bond_plans=plans,
     )
     if member.follows_clock and member.host != "hub":
-        raise ScenarioError(f"device '{name}' plays in simulated time, which only the hub's process has: leave out its host", path=(*path, "host"))
+        raise ScenarioError(
+            f"device '{name}' plays in simulated time, which only the hub's process has: leave out its host",
+            path=(*path, "host"),
+        )
     return member
 
 
-def _planned_bond(scenario: Scenario, participants: Mapping[str, Stepped | Device], index: int) -> PlannedBond:
+def _planned_bond(
+    scenario: Scenario, participants: Mapping[str, Stepped | Device], index: int
+) -> PlannedBond:
     bond = scenario.bonds[index]
     sides: list[BondSide] = []
     for word, end in (("motion", bond.motion), ("force", bond.force)):
         path = ("bonds", index, word)
         participant = participants.get(end.participant)
         if participant is None:
-            raise ScenarioError(f"unknown participant '{end.participant}'.{did_you_mean(end.participant, participants)}", path=path)
+            raise ScenarioError(
+                f"unknown participant '{end.participant}'.{did_you_mean(end.participant, participants)}",
+                path=path,
+            )
         declared = {side.name: side for side in participant.bonds} if isinstance(participant, Stepped) else {}
         if end.port not in declared:
-            raise ScenarioError(f"participant '{end.participant}' has no bond '{end.port}'.{did_you_mean(end.port, declared)}", path=path)
+            raise ScenarioError(
+                f"participant '{end.participant}' has no bond"
+                f" '{end.port}'.{did_you_mean(end.port, declared)}",
+                path=path,
+            )
         side = declared[end.port]
         if side.side != word:
             raise ScenarioError(f"'{end}' is a {side.side} side, here the {word} side is wanted", path=path)
         sides.append(side)
     motion, force = sides
     if motion.dof != force.dof:
-        raise ScenarioError(f"'{bond.motion}' has {motion.dof} degrees of freedom, '{bond.force}' has {force.dof}", path=("bonds", index))
+        raise ScenarioError(
+            f"'{bond.motion}' has {motion.dof} degrees of freedom, '{bond.force}' has {force.dof}",
+            path=("bonds", index),
+        )
     if motion.points != force.points:
-        raise ScenarioError(f"'{bond.motion}' bonds {motion.points} points, '{bond.force}' bonds {force.points}", path=("bonds", index))
+        raise ScenarioError(
+            f"'{bond.motion}' bonds {motion.points} points, '{bond.force}' bonds {force.points}",
+            path=("bonds", index),
+        )
     if motion.frame and force.frame and motion.frame != force.frame:
-        raise ScenarioError(f"'{bond.motion}' is in frame '{motion.frame}', '{bond.force}' in frame '{force.frame}'", path=("bonds", index))
+        raise ScenarioError(
+            f"'{bond.motion}' is in frame '{motion.frame}', '{bond.force}' in frame '{force.frame}'",
+            path=("bonds", index),
+        )
     _check_algorithm(scenario, bond, force, index)
     return PlannedBond(bond=bond, motion=motion, force=force)
 
 
 def _check_algorithm(scenario: Scenario, bond: Bond, force: BondSide, index: int) -> None:
     names = {bond.motion.participant, bond.force.participant}
-    if bond.algorithm == "gauss-seidel" and (bond.order is None or set(bond.order) != names or len(bond.order) != 2):
-        raise ScenarioError(f"gauss-seidel needs the order of its two participants, such as 'order: [{', '.join(sorted(names))}]'", path=("bonds", index))
+    if bond.algorithm == "gauss-seidel" and (
+        bond.order is None or set(bond.order) != names or len(bond.order) != 2
+    ):
+        raise ScenarioError(
+            "gauss-seidel needs the order of its two participants, such as 'order:"
+            f" [{', '.join(sorted(names))}]'",
+            path=("bonds", index),
+        )
     if bond.algorithm == "impulse-linearised" and None in (force.stiffness, force.damping, force.proxy_mass):
-        raise ScenarioError(f"impulse-linearised needs stiffness, damping and proxy mass, which '{bond.force}' does not state", path=("bonds", index))
-    periods = [scenario.participants[end.participant].period or scenario.step for end in (bond.motion, bond.force)]
+        raise ScenarioError(
+            f"impulse-linearised needs stiffness, damping and proxy mass, which '{bond.force}' does not"
+            " state",
+            path=("bonds", index),
+        )
+    periods = [
+        scenario.participants[end.participant].period or scenario.step for end in (bond.motion, bond.force)
+    ]
     if periods[1] % periods[0]:
-        raise ScenarioError("the force side's period must be a multiple of the motion side's", path=("bonds", index))
+        raise ScenarioError(
+            "the force side's period must be a multiple of the motion side's", path=("bonds", index)
+        )
 
 
 class _Wiring:
@@ -143,7 +205,10 @@ class _Wiring:
         for index, name in enumerate(scenario.order or ()):
             if name not in members or members[name].role == "device":
                 stepped = [n for n, m in members.items() if m.role != "device"]
-                raise ScenarioError(f"unknown stepped participant '{name}'.{did_you_mean(name, stepped)}", path=("order", index))
+                raise ScenarioError(
+                    f"unknown stepped participant '{name}'.{did_you_mean(name, stepped)}",
+                    path=("order", index),
+                )
 
     def connect(self, connection: Connection, path: Path) -> None:
         source = self._resolve(connection.source, "output", path)
@@ -151,37 +216,81 @@ class _Wiring:
         _check_fit(connection.source, source, connection.target, target, path)
         self._feed(connection.target, str(connection.source), path, shared=target.variability == "event")
         one, other = connection.source, connection.target
-        if connection.extrapolation == "linear" and (target.variability == "event" or not has_vector(target.type)):
+        if connection.extrapolation == "linear" and (
+            target.variability == "event" or not has_vector(target.type)
+        ):
             values = f"values of {target.type}" if target.variability == "signal" else "events"
-            raise ScenarioError(f"{values} cannot be extrapolated, as '{connection.source} -> {connection.target}' would", path=path)
+            raise ScenarioError(
+                f"{values} cannot be extrapolated, as '{connection.source} -> {connection.target}' would",
+                path=path,
+            )
         from_device, to_device = (self._members[end.participant].role == "device" for end in (one, other))
         if to_device and connection.extrapolation == "linear":
-            raise ScenarioError(f"'{other.participant}' is a device, which is written what is there: 'extrapolation' is for participants that step", path=path)
+            raise ScenarioError(
+                f"'{other.participant}' is a device, which is written what is there: 'extrapolation' is for"
+                " participants that step",
+                path=path,
+            )
         if from_device and to_device:
-            raise ScenarioError("a device cannot feed a device: only the simulation lies between them", path=path)
+            raise ScenarioError(
+                "a device cannot feed a device: only the simulation lies between them", path=path
+            )
         if from_device:
             age = min((a for a in (source.max_age_ns, target.max_age_ns) if a), default=0)
-            self.inlets.append(Inlet(device=one.participant, device_port=one.port, target=other.participant, target_port=other.port, max_age_ns=age))
+            self.inlets.append(
+                Inlet(
+                    device=one.participant,
+                    device_port=one.port,
+                    target=other.participant,
+                    target_port=other.port,
+                    max_age_ns=age,
+                )
+            )
         elif self._members[other.participant].follows_clock:
             self._link(one, other, fresh=False, linear=False)
         elif to_device:
-            self.outlets.append(Outlet(source=one.participant, source_port=one.port, device=other.participant, device_port=other.port))
+            self.outlets.append(
+                Outlet(
+                    source=one.participant,
+                    source_port=one.port,
+                    device=other.participant,
+                    device_port=other.port,
+                )
+            )
         else:
-            self._link(one, other, fresh=self._in_order(one.participant, other.participant), linear=connection.extrapolation == "linear")
+            self._link(
+                one,
+                other,
+                fresh=self._in_order(one.participant, other.participant),
+                linear=connection.extrapolation == "linear",
+            )
 
     def couple(self, index: int, planned: PlannedBond) -> None:
         bond = planned.bond
         *moving, force = zip(bond_ports(planned.motion), bond_ports(planned.force), strict=True)
         for here, there in moving:
-            self._bond_link(index, _end(bond.motion, here), _end(bond.force, there), fresh=is_fresh(bond, "motion"))
-        self._bond_link(index, _end(bond.force, force[1]), _end(bond.motion, force[0]), fresh=is_fresh(bond, "force"))
+            self._bond_link(
+                index, _end(bond.motion, here), _end(bond.force, there), fresh=is_fresh(bond, "motion")
+            )
+        self._bond_link(
+            index, _end(bond.force, force[1]), _end(bond.motion, force[0]), fresh=is_fresh(bond, "force")
+        )
 
     def _bond_link(self, index: int, one: Endpoint, other: Endpoint, *, fresh: bool) -> None:
         self._feed(other, str(one), ("bonds", index))
         self._link(one, other, fresh=fresh, linear=False)
 
     def _link(self, one: Endpoint, other: Endpoint, *, fresh: bool, linear: bool) -> None:
-        self.links.append(Link(source=one.participant, source_port=one.port, target=other.participant, target_port=other.port, fresh=fresh, linear=linear))
+        self.links.append(
+            Link(
+                source=one.participant,
+                source_port=one.port,
+                target=other.participant,
+                target_port=other.port,
+                fresh=fresh,
+                linear=linear,
+            )
+        )
 
     def _in_order(self, source: str, target: str) -> bool:
         if self._scenario.algorithm == "jacobi" or source == target:
@@ -193,13 +302,22 @@ class _Wiring:
     def _resolve(self, end: Endpoint, causality: str, path: Path) -> Port:
         member = self._members.get(end.participant)
         if member is None:
-            raise ScenarioError(f"unknown participant '{end.participant}'.{did_you_mean(end.participant, self._members)}", path=path)
+            raise ScenarioError(
+                f"unknown participant '{end.participant}'.{did_you_mean(end.participant, self._members)}",
+                path=path,
+            )
         ports = {port.name: port for port in member.ports}
         if end.port not in ports:
             allowed = [name for name, port in ports.items() if port.causality == causality]
-            raise ScenarioError(f"participant '{end.participant}' has no {causality} '{end.port}'.{did_you_mean(end.port, allowed)}", path=path)
+            raise ScenarioError(
+                f"participant '{end.participant}' has no {causality}"
+                f" '{end.port}'.{did_you_mean(end.port, allowed)}",
+                path=path,
+            )
         if ports[end.port].causality != causality:
-            raise ScenarioError(f"'{end}' is an {ports[end.port].causality}, here an {causality} is wanted", path=path)
+            raise ScenarioError(
+                f"'{end}' is an {ports[end.port].causality}, here an {causality} is wanted", path=path
+            )
         return ports[end.port]
 
     def _feed(self, end: Endpoint, source: str, path: Path, *, shared: bool = False) -> None:
@@ -213,20 +331,36 @@ class _Wiring:
         """Refuse an input that has neither a source nor a start value."""
         for name, member in self._members.items():
             for port in member.ports:
-                needs = port.causality == "input" and port.variability == "signal" and port.start is None and member.role != "device"
+                needs = (
+                    port.causality == "input"
+                    and port.variability == "signal"
+                    and port.start is None
+                    and member.role != "device"
+                )
                 if needs and (name, port.name) not in self._fed:
-                    raise ScenarioError(f"input '{name}.{port.name}' ({port.type}) is not connected and has no start value", path=("participants", name))
+                    raise ScenarioError(
+                        f"input '{name}.{port.name}' ({port.type}) is not connected and has no start value",
+                        path=("participants", name),
+                    )
 
     def step_order(self) -> tuple[str, ...]:
-        """Return the stepped participants such that every fresh link goes forward; ties as `order` has them, then in the scenario's order."""
-        stepped = sorted((name for name, m in self._members.items() if m.role != "device"), key=lambda name: self._rank.get(name, len(self._rank)))
+        """Return the stepped participants such that every fresh link goes forward; ties as `order` has them,
+        then in the scenario's order.
+        """
+        stepped = sorted(
+            (name for name, m in self._members.items() if m.role != "device"),
+            key=lambda name: self._rank.get(name, len(self._rank)),
+        )
         waiting = {name: {k.source for k in self.links if k.fresh and k.target == name} for name in stepped}
         order: list[str] = []
         while waiting:
             free = next((name for name in waiting if not waiting[name] & waiting.keys()), None)
             if free is None:
                 cycle = ", ".join(waiting)
-                problem = f"connections form a cycle among {cycle}: say in which order they step, such as 'order: [{cycle}]', or use 'algorithm: jacobi'"
+                problem = (
+                    f"connections form a cycle among {cycle}: say in which order they step, such as 'order:"
+                    f" [{cycle}]', or use 'algorithm: jacobi'"
+                )
                 raise ScenarioError(problem, path=("order",) if self._scenario.order else ("connections",))
             order.append(free)
             del waiting[free]
@@ -241,17 +375,24 @@ def _check_fit(one: Endpoint, source: Port, other: Endpoint, target: Port, path:
     if source.type != target.type:
         raise ScenarioError(f"'{one}' gives {source.type}, '{other}' takes {target.type}", path=path)
     if (source.variability, target.variability) == ("event", "signal"):
-        raise ScenarioError(f"'{one}' gives events, '{other}' takes a signal, which has a value at all times", path=path)
+        raise ScenarioError(
+            f"'{one}' gives events, '{other}' takes a signal, which has a value at all times", path=path
+        )
     if not same_unit(source.unit, target.unit):
         raise ScenarioError(f"'{one}' is in '{source.unit}', '{other}' takes '{target.unit}'", path=path)
     if source.frame and target.frame and source.frame != target.frame:
-        raise ScenarioError(f"'{one}' is in frame '{source.frame}', '{other}' takes frame '{target.frame}'", path=path)
+        raise ScenarioError(
+            f"'{one}' is in frame '{source.frame}', '{other}' takes frame '{target.frame}'", path=path
+        )
     if has_vector(source.type) and source.variability == "signal":
         sizes = VectorCodec(source).size, VectorCodec(target).size
         if sizes[0] != sizes[1] and target.variability == "signal":
             raise ScenarioError(f"'{one}' has {sizes[0]} numbers, '{other}' takes {sizes[1]}", path=path)
         if source.names and target.names and source.names != target.names:
-            raise ScenarioError(f"'{one}' names {', '.join(source.names)}; '{other}' takes {', '.join(target.names)}", path=path)
+            raise ScenarioError(
+                f"'{one}' names {', '.join(source.names)}; '{other}' takes {', '.join(target.names)}",
+                path=path,
+            )
 
 
 def _check_measures(scenario: Scenario, members: Mapping[str, Member]) -> None:
@@ -259,17 +400,30 @@ def _check_measures(scenario: Scenario, members: Mapping[str, Member]) -> None:
         path = ("measure", name, "of")
         member = members.get(measure.of.participant)
         if member is None:
-            raise ScenarioError(f"unknown participant '{measure.of.participant}'.{did_you_mean(measure.of.participant, members)}", path=path)
+            raise ScenarioError(
+                "unknown participant"
+                f" '{measure.of.participant}'.{did_you_mean(measure.of.participant, members)}",
+                path=path,
+            )
         measured_port(member, measure.of.port, path)
 
 
 def measured_port(member: Member, text: str, path: Path = ()) -> tuple[Port, slice]:
     """Return the output port and the part of its vector that `port` or `port.field` means."""
-    outputs = {p.name: p for p in member.ports if p.causality == "output" and p.variability == "signal" and has_vector(p.type)}
+    outputs = {
+        p.name: p
+        for p in member.ports
+        if p.causality == "output" and p.variability == "signal" and has_vector(p.type)
+    }
     name, _, field = text.partition(".")
     if name not in outputs:
-        raise ScenarioError(f"participant '{member.name}' has no output '{name}' to measure.{did_you_mean(name, outputs)}", path=path)
+        raise ScenarioError(
+            f"participant '{member.name}' has no output '{name}' to measure.{did_you_mean(name, outputs)}",
+            path=path,
+        )
     codec = VectorCodec(outputs[name])
     if field and field not in codec.fields:
-        raise ScenarioError(f"'{member.name}.{name}' has no field '{field}'.{did_you_mean(field, codec.fields)}", path=path)
+        raise ScenarioError(
+            f"'{member.name}.{name}' has no field '{field}'.{did_you_mean(field, codec.fields)}", path=path
+        )
     return outputs[name], codec.fields[field] if field else slice(0, codec.size)

@@ -23,7 +23,17 @@ from schemas.errors import RecordingError, did_you_mean
 from schemas.ports import Port
 from schemas.vectors import has_vector
 
-__all__ = ["MAX_RECORD_BYTES", "MESSAGE_HEADER_BYTES", "Bag", "BagMessage", "bag_file", "chunk_records", "located_messages", "output_port", "reading"]
+__all__ = [
+    "MAX_RECORD_BYTES",
+    "MESSAGE_HEADER_BYTES",
+    "Bag",
+    "BagMessage",
+    "bag_file",
+    "chunk_records",
+    "located_messages",
+    "output_port",
+    "reading",
+]
 
 MAX_RECORD_BYTES = 64 * 2**20
 """A longer MCAP record is refused unread: chunks have 64 KiB, or one image."""
@@ -32,7 +42,9 @@ _RECORD = struct.Struct("<BQ")
 """Opcode and length of a record."""
 
 _MESSAGE = struct.Struct("<BQHIQQ")
-"""Opcode, length, channel, sequence, log time, publish time; the payload follows (https://mcap.dev/spec#message-op0x05)."""
+"""Opcode, length, channel, sequence, log time, publish time; the payload follows
+(https://mcap.dev/spec#message-op0x05).
+"""
 
 MESSAGE_HEADER_BYTES = _MESSAGE.size
 
@@ -47,11 +59,17 @@ class BagMessage(NamedTuple):
 
 
 def bag_file(path: Path) -> Path:
-    """Return the MCAP file that `path`, itself one or a rosbag2 directory, stands for. Raises RecordingError if there is not exactly one."""
+    """Return the MCAP file that `path`, itself one or a rosbag2 directory, stands for.
+
+    Raises RecordingError if there is not exactly one.
+    """
     if path.is_dir():
         files = sorted(path.glob("*.mcap"))
         if len(files) != 1:
-            raise RecordingError(f"'{path}' holds {len(files)} .mcap files; name a recording's directory, which holds one, or a file")
+            raise RecordingError(
+                f"'{path}' holds {len(files)} .mcap files; name a recording's directory, which holds one, or"
+                " a file"
+            )
         return files[0]
     if not path.is_file():
         raise RecordingError(f"no recording at '{path}'; name a recording's directory or an .mcap file")
@@ -67,15 +85,22 @@ def reading(file: Path) -> Generator[None]:
         raise
     except OSError as error:
         raise RecordingError(f"cannot read '{file}': {error.strerror}") from error
-    except Exception as error:  # mcap lets struct.error, KeyError, ValueError, zstd's and lz4's errors through
-        raise RecordingError(f"'{file}' is damaged ({type(error).__name__}: {error}); `trocar recover {file}` saves what is whole") from error
+    except (
+        Exception
+    ) as error:  # mcap lets struct.error, KeyError, ValueError, zstd's and lz4's errors through
+        raise RecordingError(
+            f"'{file}' is damaged ({type(error).__name__}: {error}); `trocar recover {file}` saves what is"
+            " whole"
+        ) from error
 
 
 class Bag:
     """A finished recording: its topics, messages and attachments."""
 
     def __init__(self, path: Path) -> None:
-        """Open a rosbag2 directory or an MCAP file. Raises RecordingError if it is none, cut short, or not in CDR."""
+        """Open a rosbag2 directory or an MCAP file. Raises RecordingError if it is none, cut short, or not in
+        CDR.
+        """
         self.file = bag_file(path)
         with reading(self.file):
             self._summary = self._read_summary()
@@ -83,7 +108,10 @@ class Bag:
         """Type of each topic."""
         for channel in self._summary.channels.values():
             if channel.message_encoding != "cdr":
-                raise RecordingError(f"'{self.file}': topic '{channel.topic}' is encoded as '{channel.message_encoding}'; only 'cdr' (ROS 2) can be read")
+                raise RecordingError(
+                    f"'{self.file}': topic '{channel.topic}' is encoded as '{channel.message_encoding}'; only"
+                    " 'cdr' (ROS 2) can be read"
+                )
             self.topics[channel.topic] = self._summary.schemas[channel.schema_id].name
 
     @property
@@ -103,22 +131,34 @@ class Bag:
     def attachments(self) -> dict[str, bytes]:
         """The attachments by name."""
         with reading(self.file), self.file.open("rb") as stream:
-            return {a.name: a.data for a in SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).iter_attachments()}
+            return {
+                a.name: a.data
+                for a in SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).iter_attachments()
+            }
 
     def messages(self, *topics: str) -> Iterator[BagMessage]:
-        """Yield the messages of `topics`, or all, in the order in which they were written. Raises RecordingError for a topic that is not there."""
+        """Yield the messages of `topics`, or all, in the order in which they were written.
+
+        Raises RecordingError for a topic that is not there.
+        """
         for topic in topics:
             if topic not in self.topics:
-                raise RecordingError(f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}")
+                raise RecordingError(
+                    f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}"
+                )
         with reading(self.file):
-            wanted = {c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics}
+            wanted = {
+                c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics
+            }
         for chunk in self._chunks(set(wanted)):
             with reading(self.file):
                 records = chunk_records(chunk)
                 found = [m for m in located_messages(records) if m.channel in wanted]
             for m in found:
                 topic = wanted[m.channel]
-                yield BagMessage(topic, self.topics[topic], m.time_ns, records[m.offset + MESSAGE_HEADER_BYTES : m.end])
+                yield BagMessage(
+                    topic, self.topics[topic], m.time_ns, records[m.offset + MESSAGE_HEADER_BYTES : m.end]
+                )
 
     def _read_summary(self) -> Summary:
         with self.file.open("rb") as stream:
@@ -128,10 +168,14 @@ class Bag:
                 raise RecordingError(f"'{self.file}' is no MCAP file")
             stream.seek(max(0, size - len(MCAP0_MAGIC)))
             if size < 2 * len(MCAP0_MAGIC) or stream.read() != MCAP0_MAGIC:
-                raise RecordingError(f"'{self.file}' was cut short; `trocar recover {self.file}` saves what is whole")
+                raise RecordingError(
+                    f"'{self.file}' was cut short; `trocar recover {self.file}` saves what is whole"
+                )
             stream.seek(0)
             summary = SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).get_summary()
-        if summary is None or (not summary.chunk_indexes and summary.statistics is not None and summary.statistics.message_count):
+        if summary is None or (
+            not summary.chunk_indexes and summary.statistics is not None and summary.statistics.message_count
+        ):
             raise RecordingError(f"'{self.file}' has no chunk index; `trocar recover {self.file}` writes one")
         return summary
 
@@ -159,13 +203,19 @@ class LocatedMessage(NamedTuple):
 
 
 def chunk_records(chunk: Chunk) -> bytes:
-    """Return the uncompressed records of `chunk`, checked against its checksum. Raises whatever the decompressors raise."""
+    """Return the uncompressed records of `chunk`, checked against its checksum.
+
+    Raises whatever the decompressors raise.
+    """
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     return stream.read(length)
 
 
 def located_messages(records: bytes) -> Iterator[LocatedMessage]:
-    """Find the messages in the records of a chunk. Raises ValueError or struct.error if records do not end where they say."""
+    """Find the messages in the records of a chunk.
+
+    Raises ValueError or struct.error if records do not end where they say.
+    """
     at = 0
     while at < len(records):
         opcode, length = _RECORD.unpack_from(records, at)
@@ -181,7 +231,8 @@ def located_messages(records: bytes) -> Iterator[LocatedMessage]:
 def output_port(name: str, type_name: str, payload: bytes) -> Port:
     """Return the output port that would write messages such as `payload`.
 
-    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all others events. Raises MessageError.
+    Types with a fixed layout are signals, with frame, joint names and sizes as in `payload`; all others
+    events. Raises MessageError.
     """
     model = message_type(type_name)
     if not has_vector(type_name):
@@ -190,7 +241,11 @@ def output_port(name: str, type_name: str, payload: bytes) -> Port:
     known: dict[str, Any] = {}
     if isinstance(message, ros.JointState):
         sizes = {field: getattr(message, field).size for field in ("position", "velocity", "effort")}
-        known = {"names": tuple(message.name), "fields": tuple(field for field in sizes if sizes[field]) or ("position",), "size": max(1, *sizes.values())}
+        known = {
+            "names": tuple(message.name),
+            "fields": tuple(field for field in sizes if sizes[field]) or ("position",),
+            "size": max(1, *sizes.values()),
+        }
     elif isinstance(message, ros.Float64MultiArray):
         known = {"size": max(1, message.data.size)}
     header = getattr(message, "header", None)

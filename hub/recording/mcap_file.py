@@ -1,9 +1,9 @@
 """Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside them.
 
-The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three times
-the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so the many message
-headers and index entries of a chunk are laid out here by numpy.
-Format: https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
+The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three
+times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so
+the many message headers and index entries of a chunk are laid out here by numpy. Format:
+https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 """
 
 from __future__ import annotations
@@ -41,14 +41,25 @@ from schemas.errors import RecordingError
 
 __all__ = ["ChunkData", "McapFile", "chunk_data", "create_bag", "write_rosbag2_metadata"]
 
-_MESSAGE = np.dtype([("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
+_MESSAGE = np.dtype(
+    [
+        ("opcode", "<u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+    ]
+)
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _RECORD_HEADER_BYTES = 9
 
 
 @dataclass(frozen=True)
 class ChunkData:
-    """The records of one chunk, uncompressed, and where its messages stand in them; arrays of shape (messages,)."""
+    """The records of one chunk, uncompressed, and where its messages stand in them; arrays of shape
+    (messages,).
+    """
 
     records: bytes
     channels: NDArray[np.int64]
@@ -69,11 +80,19 @@ def chunk_data(messages: Sequence[tuple[int, int, bytes]]) -> ChunkData:
     parts[0::2] = headers.view(f"V{_MESSAGE.itemsize}").tolist()
     parts[1::2] = payloads
     ends = np.cumsum(sizes + _MESSAGE.itemsize)
-    return ChunkData(b"".join(parts), np.asarray(channels, np.int64), np.asarray(times, np.int64), ends - sizes - _MESSAGE.itemsize)
+    return ChunkData(
+        b"".join(parts),
+        np.asarray(channels, np.int64),
+        np.asarray(times, np.int64),
+        ends - sizes - _MESSAGE.itemsize,
+    )
 
 
 class McapFile:
-    """An MCAP file being written. Every append is whole or not at all, so the file can be recovered whenever writing stops."""
+    """An MCAP file being written.
+
+    Every append is whole or not at all, so the file can be recovered whenever writing stops.
+    """
 
     def __init__(self, path: Path) -> None:
         """Create the file. Raises OSError if it exists or cannot be written."""
@@ -95,7 +114,9 @@ class McapFile:
         self._attachments.append(index)
 
     def declare(self, schema: Schema, channel: Channel) -> None:
-        """Add a channel and, if it is new, its schema; both must stand before the first message that uses them."""
+        """Add a channel and, if it is new, its schema; both must stand before the first message that uses
+        them.
+        """
         new = schema not in self.schemas
         self._append(_bytes_of(schema, channel) if new else _bytes_of(channel))
         self.schemas += [schema] if new else []
@@ -119,7 +140,11 @@ class McapFile:
             index += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(group), channel, len(group)) + group
             at += int(counts[channel])
         offset = self._append(chunk + bytes(index))
-        self._chunks.append(ChunkIndex(len(chunk), offset, "lz4", len(compressed), end, len(index), offsets, start, len(data.records)))
+        self._chunks.append(
+            ChunkIndex(
+                len(chunk), offset, "lz4", len(compressed), end, len(index), offsets, start, len(data.records)
+            )
+        )
         for channel in offsets:
             self._counts[channel] = self._counts.get(channel, 0) + int(counts[channel])
 
@@ -129,7 +154,17 @@ class McapFile:
         start = min((chunk.message_start_time for chunk in self._chunks), default=0)
         end = max((chunk.message_end_time for chunk in self._chunks), default=0)
         messages = sum(self._counts.values())
-        return Statistics(len(self._attachments), len(self.channels), self._counts, len(self._chunks), messages, end, start, 0, len(self.schemas))
+        return Statistics(
+            len(self._attachments),
+            len(self.channels),
+            self._counts,
+            len(self._chunks),
+            messages,
+            end,
+            start,
+            0,
+            len(self.schemas),
+        )
 
     def finish(self) -> None:
         """Append summary and footer. Raises OSError with nothing appended."""
@@ -180,14 +215,22 @@ def _bytes_of(*records: McapRecord) -> bytes:
 
 
 def create_bag(directory: Path) -> McapFile:
-    """Create `directory` and in it the file of a one-file bag. Raises RecordingError if it holds something or cannot be written."""
+    """Create `directory` and in it the file of a one-file bag.
+
+    Raises RecordingError if it holds something or cannot be written.
+    """
     try:
         directory.mkdir(parents=True, exist_ok=True)
         if any(directory.iterdir()):
-            raise RecordingError(f"'{directory}' is not empty, and a recording overwrites nothing: name a new directory, or remove this one")
+            raise RecordingError(
+                f"'{directory}' is not empty, and a recording overwrites nothing: name a new directory, or"
+                " remove this one"
+            )
         return McapFile(directory / f"{directory.resolve().name}_0.mcap")
     except OSError as error:
-        raise RecordingError(f"cannot record to '{directory}': {error.strerror}; name a directory that can be written") from error
+        raise RecordingError(
+            f"cannot record to '{directory}': {error.strerror}; name a directory that can be written"
+        ) from error
 
 
 def write_rosbag2_metadata(file: McapFile) -> None:

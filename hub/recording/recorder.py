@@ -1,8 +1,8 @@
 """Records a session to a rosbag2 directory without slowing its steps.
 
-`write` puts a message into a bounded queue; a thread takes a chunk's worth at a time, lays it out, compresses and writes
-it (docs/decisions/0005-recorder.md). Nothing is lost silently: what does not fit, or comes after the disk
-is full, is counted, logged once and marks the recording as incomplete.
+`write` puts a message into a bounded queue; a thread takes a chunk's worth at a time, lays it out, compresses
+and writes it (docs/decisions/0005-recorder.md). Nothing is lost silently: what does not fit, or comes after
+the disk is full, is counted, logged once and marks the recording as incomplete.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from schemas.errors import RecordingError, did_you_mean
 __all__ = ["Recorder", "RecorderSummary"]
 
 CHUNK_BYTES = 64 * 2**10
-"""A killed process loses about this much; small, so that laying it out does not keep the interpreter from the step loop for long
-(docs/decisions/0005-recorder.md)."""
+"""A killed process loses about this much; small, so that laying it out does not keep the interpreter from the
+step loop for long (docs/decisions/0005-recorder.md).
+"""
 
 CHUNK_AGE_S = 1.0
 """Or, where little is recorded, the messages of this much wall time."""
@@ -88,9 +89,15 @@ class Recorder:
         self._thread.start()
 
     def channel(self, topic: str, type_name: str) -> int:
-        """Return the number under which messages of `topic` are written. Raises RecordingError for a type nobody knows."""
+        """Return the number under which messages of `topic` are written.
+
+        Raises RecordingError for a type nobody knows.
+        """
         if type_name not in typestore().types:
-            raise RecordingError(f"cannot record '{topic}': unknown message type '{type_name}'.{did_you_mean(type_name, typestore().types)}")
+            raise RecordingError(
+                f"cannot record '{topic}': unknown message type"
+                f" '{type_name}'.{did_you_mean(type_name, typestore().types)}"
+            )
         with self._lock:
             if (topic, type_name) not in self._channels:
                 self._channels.append((topic, type_name))
@@ -123,13 +130,17 @@ class Recorder:
             self._file.close()
             complete = self._error is None and not self._dropped
             messages = self._file.statistics.message_count
-            self._summary = RecorderSummary(self.directory, complete, messages, self._dropped, self._file.size, self._error)
+            self._summary = RecorderSummary(
+                self.directory, complete, messages, self._dropped, self._file.size, self._error
+            )
         return self._summary
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     def _run(self) -> None:
@@ -151,23 +162,46 @@ class Recorder:
 
     def _declare(self, channels: Sequence[tuple[str, str]]) -> None:
         """Write the channels that are not in the file yet."""
-        for number, (topic, type_name) in enumerate(channels[len(self._file.channels) :], len(self._file.channels) + 1):
+        for number, (topic, type_name) in enumerate(
+            channels[len(self._file.channels) :], len(self._file.channels) + 1
+        ):
             names = [schema.name for schema in self._file.schemas]
             schema_id = names.index(type_name) + 1 if type_name in names else len(names) + 1
             schema = Schema(schema_id, ros2msg_definition(type_name).encode(), "ros2msg", type_name)
-            self._file.declare(schema, Channel(number, topic, "cdr", {"offered_qos_profiles": "", "topic_type_hash": rihs01(type_name)}, schema_id))
+            self._file.declare(
+                schema,
+                Channel(
+                    number,
+                    topic,
+                    "cdr",
+                    {"offered_qos_profiles": "", "topic_type_hash": rihs01(type_name)},
+                    schema_id,
+                ),
+            )
 
     def _drop(self) -> None:
         self._dropped += 1
         if self._dropped == 1 and not self._error:
             why = "it is closed" if self._closing else f"{len(self._queue)} messages wait for the disk"
-            _log.error("recorder of '%s' drops messages, because %s: the recording is incomplete", self.directory, why)
+            _log.error(
+                "recorder of '%s' drops messages, because %s: the recording is incomplete",
+                self.directory,
+                why,
+            )
 
     def _fail(self, error: Exception) -> None:
         self._refusing = True
         if self._error is None:
-            self._error = error.strerror if isinstance(error, OSError) and error.strerror else f"{type(error).__name__}: {error}"
-            _log.error("recording to '%s' has stopped: %s. The session goes on; its recording is incomplete", self.directory, self._error)
+            self._error = (
+                error.strerror
+                if isinstance(error, OSError) and error.strerror
+                else f"{type(error).__name__}: {error}"
+            )
+            _log.error(
+                "recording to '%s' has stopped: %s. The session goes on; its recording is incomplete",
+                self.directory,
+                self._error,
+            )
 
 
 def _chunks(queue: Sequence[_Queued]) -> Iterator[Sequence[_Queued]]:

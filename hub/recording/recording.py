@@ -1,4 +1,7 @@
-"""A recorded session: its scenario, grants, acks and values. Topics are the session's keys without `trocar/<session>`."""
+"""A recorded session: its scenario, grants, acks and values.
+
+Topics are the session's keys without `trocar/<session>`.
+"""
 
 from __future__ import annotations
 
@@ -39,11 +42,15 @@ class Recording(Bag):
         try:
             return Scenario.model_validate_json(self.attachments["scenario.json"])
         except KeyError:
-            raise RecordingError(f"'{self.file}' holds no scenario: it was not recorded by `trocar run`") from None
+            raise RecordingError(
+                f"'{self.file}' holds no scenario: it was not recorded by `trocar run`"
+            ) from None
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             path = ".".join(str(part) for part in first["loc"])
-            raise RecordingError(f"'{self.file}': the scenario in it is none that this version reads: {path}: {first['msg']}") from error
+            raise RecordingError(
+                f"'{self.file}': the scenario in it is none that this version reads: {path}: {first['msg']}"
+            ) from error
 
     def versions(self) -> dict[str, str]:
         """Return the versions of the packages that recorded; empty if they are not stated."""
@@ -65,12 +72,20 @@ class Recording(Bag):
         try:
             return Plan.model_validate_json(self.attachments["plan.json"])
         except KeyError:
-            raise RecordingError(f"'{self.file}' holds no plan.json: it was not recorded by `trocar run`") from None
+            raise RecordingError(
+                f"'{self.file}' holds no plan.json: it was not recorded by `trocar run`"
+            ) from None
         except ValidationError as error:
-            raise RecordingError(f"'{self.file}': the plan in it is none that this version reads: {error.errors(include_url=False)[0]['msg']}") from error
+            raise RecordingError(
+                f"'{self.file}': the plan in it is none that this version reads:"
+                f" {error.errors(include_url=False)[0]['msg']}"
+            ) from error
 
     def directory(self) -> Path:
-        """Return where relative paths of the scenario started. Raises RecordingError if the recording is not one of a session."""
+        """Return where relative paths of the scenario started.
+
+        Raises RecordingError if the recording is not one of a session.
+        """
         origin = self._table("origin.json")
         if "directory" not in origin:
             raise RecordingError(f"'{self.file}' holds no origin.json: it was not recorded by `trocar run`")
@@ -102,9 +117,14 @@ class Recording(Bag):
         return self._decoded(STATUS_TOPIC, SessionStatus)
 
     def series(self, topic_name: str) -> tuple[Vector, NDArray[np.float64]]:
-        """Return times in s, shape (n,), and values, shape (n, size), of a topic whose type has a vector layout."""
+        """Return times in s, shape (n,), and values, shape (n, size), of a topic whose type has a vector
+        layout.
+        """
         if not has_vector(self.topics.get(topic_name, "")) and topic_name in self.topics:
-            raise RecordingError(f"'{self.file}': topic '{topic_name}' is of type {self.topics[topic_name]}, which has no vector form")
+            raise RecordingError(
+                f"'{self.file}': topic '{topic_name}' is of type {self.topics[topic_name]}, which has no"
+                " vector form"
+            )
         times: list[int] = []
         values: list[Vector] = []
         codec: VectorCodec | None = None
@@ -113,7 +133,9 @@ class Recording(Bag):
                 codec = codec or VectorCodec(output_port(topic_name, message.type, message.payload))
                 values.append(_vector(codec, message.payload))
             except MessageError as error:
-                raise RecordingError(f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}") from error
+                raise RecordingError(
+                    f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}"
+                ) from error
             times.append(message.time_ns)
         size = 0 if codec is None else codec.size
         return np.asarray(times, np.float64) * 1e-9, np.asarray(values, np.float64).reshape(len(times), size)
@@ -125,7 +147,9 @@ class Recording(Bag):
             try:
                 yield message.time_ns, decode(model, message.payload)
             except MessageError as error:
-                raise RecordingError(f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}") from error
+                raise RecordingError(
+                    f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}"
+                ) from error
 
 
 def _vector(codec: VectorCodec, payload: bytes) -> Vector:

@@ -41,15 +41,17 @@ class RecoverSummary:
 def recover(path: Path, output: Path | None = None) -> RecoverSummary:
     """Write what is whole of the recording at `path` to the new rosbag2 directory `output`.
 
-    Without `output` it is called as the recording is, with `-recovered` behind. Raises RecordingError if `path` is no recording, or if
-    `output` holds something already or cannot be written.
+    Without `output` it is called as the recording is, with `-recovered` behind. Raises RecordingError if
+    `path` is no recording, or if `output` holds something already or cannot be written.
     """
     source = bag_file(path)
     with reading(source), source.open("rb") as stream:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordingError(f"'{source}' is no MCAP file")
     named = path.resolve()
-    target = create_bag(output or named.with_name(f"{named.name if named.is_dir() else named.stem}-recovered"))
+    target = create_bag(
+        output or named.with_name(f"{named.name if named.is_dir() else named.stem}-recovered")
+    )
     try:
         copy = _Copy(target)
         with source.open("rb") as stream:
@@ -96,13 +98,20 @@ class _Copy:
             self.target.attach(record.name, record.data)
         elif isinstance(record, Schema):
             self._schemas[record.id] = record
-        elif isinstance(record, Channel) and record.id not in self._declared and record.schema_id in self._schemas:
+        elif (
+            isinstance(record, Channel)
+            and record.id not in self._declared
+            and record.schema_id in self._schemas
+        ):
             self._declared.add(record.id)
             self.target.declare(self._schemas[record.schema_id], record)
         elif isinstance(record, Chunk):
             self._add_chunk(record)
         elif isinstance(record, Message):
-            raise RecordingError("messages that stand outside chunks: not a recording of Trocar; use `mcap recover` of the MCAP project")
+            raise RecordingError(
+                "messages that stand outside chunks: not a recording of Trocar; use `mcap recover` of the"
+                " MCAP project"
+            )
         elif isinstance(record, Footer):
             self.footer = True
 

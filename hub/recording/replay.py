@@ -33,35 +33,64 @@ class ReplaySummary:
 
 
 def is_replayed(topic: str) -> bool:
-    """Say whether `topic` is republished: outputs, energy books and the status, but no grants and acks, which would drive participants."""
+    """Say whether `topic` is republished: outputs, energy books and the status, but no grants and acks, which
+    would drive participants.
+    """
     role, _, rest = topic[1:].partition("/")
-    return topic == STATUS_TOPIC or topic.startswith(ENERGY_PREFIX) or (role in ("engine", "device") and "/out/" in rest)
+    return (
+        topic == STATUS_TOPIC
+        or topic.startswith(ENERGY_PREFIX)
+        or (role in ("engine", "device") and "/out/" in rest)
+    )
 
 
-def replay(recording: Recording, session: zenoh.Session, rate: float = 1.0, *, name: str | None = None, stop: Event | None = None) -> ReplaySummary:
+def replay(
+    recording: Recording,
+    session: zenoh.Session,
+    rate: float = 1.0,
+    *,
+    name: str | None = None,
+    stop: Event | None = None,
+) -> ReplaySummary:
     """Publish the recorded values on the keys of session `name`, by default the recorded one.
 
-    `rate` is simulated seconds per wall second; 0 is as fast as it goes. Ctrl-C, or `stop` set by another thread, ends it early.
-    Raises RecordingError if nothing in the recording can be republished, or if `name` is no session name.
+    `rate` is simulated seconds per wall second; 0 is as fast as it goes. Ctrl-C, or `stop` set by another
+    thread, ends it early. Raises RecordingError if nothing in the recording can be republished, or if `name`
+    is no session name.
     """
     name = recording.session() if name is None else name
     if not valid_name(name):
         raise RecordingError(f"'{name}' is no session name: a letter, then letters, digits and underscores")
     topics = [topic for topic in recording.topics if is_replayed(topic)]
     if not topics:
-        raise RecordingError(f"'{recording.file}' holds no outputs of a session; its topics: {', '.join(sorted(recording.topics)) or 'none'}")
+        raise RecordingError(
+            f"'{recording.file}' holds no outputs of a session; its topics:"
+            f" {', '.join(sorted(recording.topics)) or 'none'}"
+        )
     player = _Player(recording, rate, stop or Event())
     begin = time.monotonic()
     with ExitStack() as stack:
         encoding, reliable = zenoh.Encoding.APPLICATION_CDR, zenoh.CongestionControl.BLOCK
         publishers = {
-            topic: stack.enter_context(session.declare_publisher(f"{ROOT}/{name}{topic}", encoding=encoding, congestion_control=reliable)) for topic in topics
+            topic: stack.enter_context(
+                session.declare_publisher(
+                    f"{ROOT}/{name}{topic}", encoding=encoding, congestion_control=reliable
+                )
+            )
+            for topic in topics
         }
         try:
             interrupted = not player.play(publishers)
         except KeyboardInterrupt:
             interrupted = True
-    return ReplaySummary(name, sum(player.by_topic.values()), player.by_topic, player.sim_time_ns * 1e-9, time.monotonic() - begin, interrupted)
+    return ReplaySummary(
+        name,
+        sum(player.by_topic.values()),
+        player.by_topic,
+        player.sim_time_ns * 1e-9,
+        time.monotonic() - begin,
+        interrupted,
+    )
 
 
 class _Player:
@@ -81,7 +110,11 @@ class _Player:
         for message in self._recording.messages(*publishers):
             start_ns = message.time_ns if start_ns is None else start_ns
             self.sim_time_ns = max(self.sim_time_ns, message.time_ns - start_ns)
-            ahead = begin + (message.time_ns - start_ns) * 1e-9 / self._rate - time.monotonic() if self._rate else 0.0
+            ahead = (
+                begin + (message.time_ns - start_ns) * 1e-9 / self._rate - time.monotonic()
+                if self._rate
+                else 0.0
+            )
             if self._stop.wait(ahead) if ahead > 0 else self._stop.is_set():
                 return False
             tag = Tag.pack(self._run, 0, message.time_ns // self._step_ns, message.time_ns)

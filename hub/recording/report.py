@@ -35,7 +35,8 @@ _KEYS = Keys("any")
 def report(recording: Recording, output: Path) -> None:
     """Write the page about `recording` to the file `output`; it loads nothing from anywhere.
 
-    Raises MissingExtraError without matplotlib, RecordingError if the recording is not one of a session or `output` cannot be written.
+    Raises MissingExtraError without matplotlib, RecordingError if the recording is not one of a session or
+    `output` cannot be written.
     """
     scenario = recording.scenario()
     traces = [trace for bond in scenario.bonds if (trace := _trace(recording, bond)) is not None]
@@ -60,7 +61,9 @@ def report(recording: Recording, output: Path) -> None:
 
 
 def _trace(recording: Recording, bond: Bond) -> BondTrace | None:
-    """Return what is recorded of both sides of `bond`, at the times of the force; None if a side is not recorded."""
+    """Return what is recorded of both sides of `bond`, at the times of the force; None if a side is not
+    recorded.
+    """
     motion = _first(recording, f"{bond.motion.participant}", bond.motion.port, ("pose", "position"))
     force = _first(recording, f"{bond.force.participant}", bond.force.port, ("wrench", "force"))
     if motion is None or force is None:
@@ -80,12 +83,17 @@ def _first(recording: Recording, participant: str, bond: str, names: Iterable[st
 
 def _book(recording: Recording, bond: Bond) -> tuple[Vector, Vector, Vector]:
     """Return times (s), work given and work taken (J) of the energy book, each of shape (n,)."""
-    rows = [(time_ns * 1e-9, entry.motion_work_j, entry.force_work_j) for time_ns, entry in recording.energy(bond.name)]
+    rows = [
+        (time_ns * 1e-9, entry.motion_work_j, entry.force_work_j)
+        for time_ns, entry in recording.energy(bond.name)
+    ]
     table = np.array(rows, np.float64).reshape(-1, 3)
     return table[:, 0], table[:, 1], table[:, 2]
 
 
-def _bond_figures(traces: Iterable[BondTrace], books: dict[str, tuple[Vector, Vector, Vector]]) -> Iterator[Figure]:
+def _bond_figures(
+    traces: Iterable[BondTrace], books: dict[str, tuple[Vector, Vector, Vector]]
+) -> Iterator[Figure]:
     for trace in traces:
         yield from (press_figure(trace), force_figure(trace), motion_figure(trace))
     for bond, (times_s, given, taken) in books.items():
@@ -93,23 +101,36 @@ def _bond_figures(traces: Iterable[BondTrace], books: dict[str, tuple[Vector, Ve
             yield from energy_figures(bond, times_s, given, taken)
 
 
-def _step_figures(recording: Recording, scenario: Scenario, statuses: list[tuple[int, SessionStatus]]) -> Iterator[Figure]:
+def _step_figures(
+    recording: Recording, scenario: Scenario, statuses: list[tuple[int, SessionStatus]]
+) -> Iterator[Figure]:
     compute: dict[str, tuple[Vector, Vector]] = {}
     for name, spec in scenario.participants.items():
         period_ns = spec.period or scenario.step
-        rows = [(ack.step * scenario.step + i * period_ns, spent) for ack in recording.acks(name) for i, spent in enumerate(ack.compute_ns.tolist())]
+        rows = [
+            (ack.step * scenario.step + i * period_ns, spent)
+            for ack in recording.acks(name)
+            for i, spent in enumerate(ack.compute_ns.tolist())
+        ]
         if rows:
             times_ns, spent_ns = np.array(rows, np.float64).T
             compute[name] = (times_ns * 1e-9, spent_ns * 1e-9)
     if compute:
         yield from step_time_figures(compute, scenario.step * 1e-9)
-    pace = np.array([(time_ns * 1e-9, status.real_time_factor) for time_ns, status in statuses if status.step > 0], np.float64).reshape(-1, 2)
+    pace = np.array(
+        [(time_ns * 1e-9, status.real_time_factor) for time_ns, status in statuses if status.step > 0],
+        np.float64,
+    ).reshape(-1, 2)
     if len(pace) > 1:
         yield pace_figure(pace[:, 0], pace[:, 1])
 
 
 def _numbers(
-    recording: Recording, scenario: Scenario, status: SessionStatus | None, traces: list[BondTrace], books: dict[str, tuple[Vector, Vector, Vector]]
+    recording: Recording,
+    scenario: Scenario,
+    status: SessionStatus | None,
+    traces: list[BondTrace],
+    books: dict[str, tuple[Vector, Vector, Vector]],
 ) -> str:
     """Return the summary as a definition list."""
     rows: list[tuple[str, str]] = []
@@ -124,8 +145,15 @@ def _numbers(
         ]
     rows.append(("communication step", f"{scenario.step * 1e-6:g} ms"))
     rows += [(f"peak force, {trace.name}", f"{trace.magnitude.max(initial=0):.3f} N") for trace in traces]
-    rows += [(f"energy residual, {bond}", f"{(taken[-1] - given[-1]) * 1e6:.3g} µJ") for bond, (_, given, taken) in books.items() if len(given)]
-    rows += [("messages", f"{sum(recording.counts.values()):,}"), ("recording", f"{recording.file.stat().st_size / 1e6:.1f} MB")]
+    rows += [
+        (f"energy residual, {bond}", f"{(taken[-1] - given[-1]) * 1e6:.3g} µJ")
+        for bond, (_, given, taken) in books.items()
+        if len(given)
+    ]
+    rows += [
+        ("messages", f"{sum(recording.counts.values()):,}"),
+        ("recording", f"{recording.file.stat().st_size / 1e6:.1f} MB"),
+    ]
     return "\n".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in rows)
 
 
@@ -136,7 +164,10 @@ def _ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _sections(figures: Iterable[Figure]) -> str:
-    return "\n".join(f"<figure><h3>{escape(f.title)}</h3>{f.svg}<figcaption>{escape(f.caption)}</figcaption></figure>" for f in figures)
+    return "\n".join(
+        f"<figure><h3>{escape(f.title)}</h3>{f.svg}<figcaption>{escape(f.caption)}</figcaption></figure>"
+        for f in figures
+    )
 
 
 def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:

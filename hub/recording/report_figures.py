@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from schemas.errors import MissingExtraError
 from schemas.vectors import Vector
 
-__all__ = ["BondTrace", "Figure", "energy_figures", "force_figure", "motion_figure", "pace_figure", "press_figure", "step_time_figures"]
+__all__ = [
+    "BondTrace",
+    "Figure",
+    "energy_figures",
+    "force_figure",
+    "motion_figure",
+    "pace_figure",
+    "press_figure",
+    "step_time_figures",
+]
 
 CONTACT_SHARE = 0.05
 """In contact is where the force exceeds this share of its peak; a virtual coupling that is moved through air
@@ -27,7 +36,11 @@ _POINTS = 1200
 
 _INK, _GRID = "#101112", "#d0d1d2"
 _SERIES = ("#c00001", "#c00002", "#c00003", "#c00004")
-_VARIABLES = {_INK: "var(--ink)", _GRID: "var(--grid)", **{colour: f"var(--series-{i})" for i, colour in enumerate(_SERIES)}}
+_VARIABLES = {
+    _INK: "var(--ink)",
+    _GRID: "var(--grid)",
+    **{colour: f"var(--series-{i})" for i, colour in enumerate(_SERIES)},
+}
 """Colours that stand for the page's own, which follow the reader's light or dark theme."""
 
 
@@ -65,7 +78,9 @@ class BondTrace:
 
     @property
     def depth(self) -> Vector:
-        """Displacement since first contact, m, shape (n,), against the mean force on the motion side; zeros if there was no contact."""
+        """Displacement since first contact, m, shape (n,), against the mean force on the motion side; zeros
+        if there was no contact.
+        """
         contact = self.contact
         if not contact.any():
             return np.zeros(len(self.times_s))
@@ -91,14 +106,21 @@ def press_figure(trace: BondTrace) -> Figure:
         for i, part in enumerate(episodes):
             label = f"{trace.times_s[part.start]:.1f}–{trace.times_s[part.stop - 1]:.1f} s"
             every = slice(part.start, part.stop, 1 + (part.stop - part.start) // _POINTS)
-            axes.plot(depth_mm[every], magnitude[every], linewidth=1, color=_SERIES[i % len(_SERIES)], label=label if len(episodes) <= len(_SERIES) else None)
+            axes.plot(
+                depth_mm[every],
+                magnitude[every],
+                linewidth=1,
+                color=_SERIES[i % len(_SERIES)],
+                label=label if len(episodes) <= len(_SERIES) else None,
+            )
         if 1 <= len(episodes) <= len(_SERIES):
             _legend(axes)
         axes.set_ylim(bottom=0)
     caption = (
-        "Depth is the displacement of the motion side since first contact, against the mean direction of the force on it; "
-        f"contact is where the force exceeds {CONTACT_SHARE:.0%} of its peak of {magnitude.max(initial=0):.3g} N. "
-        f"{len(episodes)} contact{'s' if len(episodes) != 1 else ''}, deepest {depth_mm.max(initial=0):.2f} mm."
+        "Depth is the displacement of the motion side since first contact, against the mean direction of the"
+        f" force on it; contact is where the force exceeds {CONTACT_SHARE:.0%} of its peak of"
+        f" {magnitude.max(initial=0):.3g} N. {len(episodes)} contact{'s' if len(episodes) != 1 else ''},"
+        f" deepest {depth_mm.max(initial=0):.2f} mm."
     )
     return Figure(f"{trace.name}: force against depth", result.svg(caption), caption)
 
@@ -106,7 +128,9 @@ def press_figure(trace: BondTrace) -> Figure:
 def force_figure(trace: BondTrace) -> Figure:
     """Force over time, by component."""
     with _axes("time (s)", "force (N)") as (axes, result):
-        axes.plot(*_thin(trace.times_s, trace.magnitude), color=_INK, alpha=0.3, linewidth=3.5, label="magnitude")
+        axes.plot(
+            *_thin(trace.times_s, trace.magnitude), color=_INK, alpha=0.3, linewidth=3.5, label="magnitude"
+        )
         for i, name in zip(range(trace.force.shape[1]), "xyz", strict=False):
             axes.plot(*_thin(trace.times_s, trace.force[:, i]), color=_SERIES[i], label=name)
         _legend(axes)
@@ -121,7 +145,10 @@ def motion_figure(trace: BondTrace) -> Figure:
         for i, name in zip(range(moved_mm.shape[1]), "xyz", strict=False):
             axes.plot(*_thin(trace.times_s, moved_mm[:, i]), color=_SERIES[i], label=name)
         _legend(axes)
-    caption = f"Displacement of the motion side from its start, in the bond's frame. Largest {np.abs(moved_mm).max(initial=0):.3g} mm."
+    caption = (
+        "Displacement of the motion side from its start, in the bond's frame. Largest"
+        f" {np.abs(moved_mm).max(initial=0):.3g} mm."
+    )
     return Figure(f"{trace.name}: motion", result.svg(caption), caption)
 
 
@@ -129,23 +156,37 @@ def energy_figures(bond: str, times_s: Vector, motion_j: Vector, force_j: Vector
     """The energy book of a bond: works (J, since the start), and what the coupling created or lost."""
     residual_uj = (force_j - motion_j) * 1e6
     with _axes("time (s)", "work (mJ)") as (axes, book):
-        for i, (label, values, style) in enumerate((("motion side", motion_j, "-"), ("force side", force_j, "--"))):
+        for i, (label, values, style) in enumerate(
+            (("motion side", motion_j, "-"), ("force side", force_j, "--"))
+        ):
             axes.plot(*_thin(times_s, values * 1e3), color=_SERIES[i], linestyle=style, label=label)
         _legend(axes)
     with _axes("time (s)", "residual (µJ)") as (axes, residual):
         axes.plot(*_thin(times_s, residual_uj), color=_SERIES[2])
         axes.axhline(0.0, color=_INK, linestyle=":", linewidth=1)
     largest_uj = 1e6 * max(np.abs(motion_j).max(), np.abs(force_j).max())
-    book_caption = f"Work that the motion side gave and the force side took, since the start. Largest {largest_uj * 1e-3:.3g} mJ."
+    book_caption = (
+        "Work that the motion side gave and the force side took, since the start. Largest"
+        f" {largest_uj * 1e-3:.3g} mJ."
+    )
     share = f", {abs(residual_uj[-1]) / largest_uj:.2g} of the largest work" if largest_uj else ""
-    caption = f"Energy that the coupling created (positive) or lost: work taken less work given. At the end {residual_uj[-1]:.3g} µJ{share}."
-    return [Figure(f"{bond}: energy book", book.svg(book_caption), book_caption), Figure(f"{bond}: energy residual", residual.svg(caption), caption)]
+    caption = (
+        "Energy that the coupling created (positive) or lost: work taken less work given. At the end"
+        f" {residual_uj[-1]:.3g} µJ{share}."
+    )
+    return [
+        Figure(f"{bond}: energy book", book.svg(book_caption), book_caption),
+        Figure(f"{bond}: energy residual", residual.svg(caption), caption),
+    ]
 
 
 def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) -> list[Figure]:
-    """Compute times per step, of each participant (times in s, compute times in s): how they are spread, and over time."""
+    """Compute times per step, of each participant (times in s, compute times in s): how they are spread, and
+    over time.
+    """
     caption = "Time a participant computes per step of its own, by the wall clock. " + "; ".join(
-        f"{name}: median {np.median(spent) * 1e6:.0f} µs, 99 % below {np.percentile(spent, 99) * 1e6:.0f} µs" for name, (_, spent) in compute.items()
+        f"{name}: median {np.median(spent) * 1e6:.0f} µs, 99 % below {np.percentile(spent, 99) * 1e6:.0f} µs"
+        for name, (_, spent) in compute.items()
     )
     low = max(1e-9, min(float(spent.min()) for _, spent in compute.values())) * 1e6
     high = max(float(spent.max()) for _, spent in compute.values()) * 1e6
@@ -164,10 +205,19 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
             middle = [float(times[part].mean()) for part in parts]
             for percentile, width in ((50, 1.4), (99, 0.6)):
                 line = [float(np.percentile(spent[part], percentile)) * 1e6 for part in parts]
-                axes.plot(middle, line, color=_SERIES[i % len(_SERIES)], linewidth=width, label=name if percentile == 50 else None)
+                axes.plot(
+                    middle,
+                    line,
+                    color=_SERIES[i % len(_SERIES)],
+                    linewidth=width,
+                    label=name if percentile == 50 else None,
+                )
         axes.set_yscale("log")
         _legend(axes)
-    return [Figure("Compute time per step", spread.svg(caption), caption + "."), Figure("Compute time over the session", over_time.svg(over), over)]
+    return [
+        Figure("Compute time per step", spread.svg(caption), caption + "."),
+        Figure("Compute time over the session", over_time.svg(over), over),
+    ]
 
 
 def pace_figure(times_s: Vector, factor: Vector) -> Figure:
@@ -176,7 +226,10 @@ def pace_figure(times_s: Vector, factor: Vector) -> Figure:
         axes.plot(*_thin(times_s, factor), color=_SERIES[0])
         axes.axhline(1.0, color=_INK, linestyle=":", linewidth=1)
         axes.set_ylim(bottom=0)
-    caption = f"Simulated seconds per wall second, as the session stated it; 1 is real time. Median {np.median(factor):.2f}."
+    caption = (
+        "Simulated seconds per wall second, as the session stated it; 1 is real time. Median"
+        f" {np.median(factor):.2f}."
+    )
     return Figure("Pace", result.svg(caption), caption)
 
 
@@ -239,7 +292,16 @@ def _axes(x: str, y: str) -> Generator[tuple[Any, _Result]]:
 
 
 def _legend(axes: Any) -> None:
-    axes.legend(frameon=False, fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=4, borderaxespad=0, handlelength=1, columnspacing=1)
+    axes.legend(
+        frameon=False,
+        fontsize=9,
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
+        ncols=4,
+        borderaxespad=0,
+        handlelength=1,
+        columnspacing=1,
+    )
 
 
 def _thin(x: Vector, y: Vector) -> Sequence[Vector]:

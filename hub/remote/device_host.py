@@ -1,4 +1,6 @@
-"""A process that holds one device and stays: it joins a session, waits when the hub is gone, and joins again, also a later session."""
+"""A process that holds one device and stays: it joins a session, waits when the hub is gone, and joins again,
+also a later session.
+"""
 
 from __future__ import annotations
 
@@ -38,12 +40,26 @@ _LOOK_S = 0.2
 class DeviceHost:
     """Keeps one device open, and takes part with it in whatever run of its session there is."""
 
-    def __init__(self, name: str, connect: Callable[[], zenoh.Session], keys: Keys, request: JoinRequest, directory: Path | None) -> None:
-        """Take the device's name, what opens a Zenoh session with the hub, and where relative paths start (None: where the hub has them).
+    def __init__(
+        self,
+        name: str,
+        connect: Callable[[], zenoh.Session],
+        keys: Keys,
+        request: JoinRequest,
+        directory: Path | None,
+    ) -> None:
+        """Take the device's name, what opens a Zenoh session with the hub, and where relative paths start
+        (None: where the hub has them).
 
         `keys`: of the session to join, or of `*` for whatever the hub has.
         """
-        self._name, self._connect, self._keys, self._request, self._directory = name, connect, keys, request, directory
+        self._name, self._connect, self._keys, self._request, self._directory = (
+            name,
+            connect,
+            keys,
+            request,
+            directory,
+        )
         self._loop: DeviceLoop | None = None
         self._held: tuple[Any, ...] = ()
         self._failure: ParticipantError | None = None
@@ -53,7 +69,8 @@ class DeviceHost:
     def serve(self) -> None:
         """Take part in one run after the other, for ever.
 
-        Raises ConnectError or MessageError if the first one cannot be joined, and ParticipantError if the device fails.
+        Raises ConnectError or MessageError if the first one cannot be joined, and ParticipantError if the
+        device fails.
         """
         joined, told = False, ""
         try:
@@ -63,7 +80,11 @@ class DeviceHost:
                         reply = present(session, self._keys, self._request)
                         joined, told = True, ""
                         self._take_part(session, reply)
-                    log.warning("device '%s': the hub is gone; nothing is written to it any more, and it joins again when the hub is back", self._name)
+                    log.warning(
+                        "device '%s': the hub is gone; nothing is written to it any more, and it joins again"
+                        " when the hub is back",
+                        self._name,
+                    )
                 except (ConnectError, MessageError) as error:
                     if not joined:
                         raise
@@ -81,14 +102,21 @@ class DeviceHost:
         self._over.clear()
         run = Run(reply.plan, keys, reply.run, reply.admission)
         with ExitStack() as stack:
-            gone = session.liveliness().declare_subscriber(keys.alive("hub", "hub"), Callback(self._hub_came_or_went, indirect=True), history=True)
+            gone = session.liveliness().declare_subscriber(
+                keys.alive("hub", "hub"), Callback(self._hub_came_or_went, indirect=True), history=True
+            )
             stack.callback(gone.undeclare)
-            refused = session.declare_publisher(keys.refused("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR)
+            refused = session.declare_publisher(
+                keys.refused("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR
+            )
             drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
             try:
                 loop = self._device_loop(reply)
             except ParticipantError as error:
-                self._say(session, self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}))
+                self._say(
+                    session,
+                    self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}),
+                )
                 raise
             clock = stack.enter_context(ClockWatch(session, keys))
             uplink = DeviceUplink(member, run, session, loop, drops, clock.offset)
@@ -101,11 +129,18 @@ class DeviceHost:
             while not self._over.wait(_LOOK_S):
                 pass
             if self._failure is not None:
-                self._say(session, self._request.model_copy(update={"failed": f"{self._failure.participant}: {self._failure.cause}"}))
+                self._say(
+                    session,
+                    self._request.model_copy(
+                        update={"failed": f"{self._failure.participant}: {self._failure.cause}"}
+                    ),
+                )
                 raise self._failure
 
     def _device_loop(self, reply: JoinReply) -> DeviceLoop:
-        """Return the loop of the device, which stays open from one run to the next unless the scenario wants another one."""
+        """Return the loop of the device, which stays open from one run to the next unless the scenario wants
+        another one.
+        """
         member, params = reply.plan.members[self._name], reply.params[self._name]
         wanted = (member.kind, params, member.read_ns, reply.directory)
         if self._loop is None or self._held != wanted:
@@ -116,7 +151,10 @@ class DeviceHost:
             if not isinstance(device, Device):
                 raise ParticipantError(self._name, -1, f"'{member.kind}' is no device here")
             device.learn_hub(self._connect)
-            self._loop, self._held = DeviceLoop(self._name, device, member.read_ns, failed=self._device_failed), wanted
+            self._loop, self._held = (
+                DeviceLoop(self._name, device, member.read_ns, failed=self._device_failed),
+                wanted,
+            )
             self._loop.start(directory)
         return self._loop
 

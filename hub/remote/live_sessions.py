@@ -34,18 +34,30 @@ ANSWER_S = 2.0
 def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) -> list[SessionStatus]:
     """Return the status of every session whose hub listens on one of `endpoints`.
 
-    On another machine that needs the certificate `observer`, which is looked for in `certificates`; raises ConnectError if there is no hub.
-    On this machine whoever else listens there is passed over.
+    On another machine that needs the certificate `observer`, which is looked for in `certificates`; raises
+    ConnectError if there is no hub. On this machine whoever else listens there is passed over.
     """
     found: dict[str, SessionStatus] = {}
     for endpoint in endpoints:
-        with suppress(*_OTHERS) if is_loopback(endpoint) else nullcontext(), reach(endpoint, OBSERVER, certificates) as session:
+        with (
+            suppress(*_OTHERS) if is_loopback(endpoint) else nullcontext(),
+            reach(endpoint, OBSERVER, certificates) as session,
+        ):
             found |= {status.session: status for status in _statuses(session)}
     return [found[name] for name in sorted(found)]
 
 
-def ask_about(participant: str, endpoints: Iterable[str], verb: str, request: BaseModel, reply_model: type[R], *, session: str | None = None) -> R:
-    """Ask the hub of the session that has `participant` (and is called `session`, if that is given) something.
+def ask_about(
+    participant: str,
+    endpoints: Iterable[str],
+    verb: str,
+    request: BaseModel,
+    reply_model: type[R],
+    *,
+    session: str | None = None,
+) -> R:
+    """Ask the hub of the session that has `participant` (and is called `session`, if that is given)
+    something.
 
     Raises ConnectError if there is none on these endpoints, and MessageError if it refuses.
     """
@@ -54,10 +66,14 @@ def ask_about(participant: str, endpoints: Iterable[str], verb: str, request: Ba
         with open_session("client", connect=[endpoint]) as client:
             for status in _statuses(client):
                 seen.append(status.session)
-                if session in (None, status.session) and any(p.name == participant for p in status.participants):
+                if session in (None, status.session) and any(
+                    p.name == participant for p in status.participants
+                ):
                     return ask(client, Keys(status.session).control(verb), request, reply_model)
     where = f"session '{session}'" if session else "any session"
-    raise ConnectError(f"there is no '{participant}' in {where} that runs here; running: {', '.join(sorted(seen)) or 'none'}")
+    raise ConnectError(
+        f"there is no '{participant}' in {where} that runs here; running: {', '.join(sorted(seen)) or 'none'}"
+    )
 
 
 def _statuses(session: zenoh.Session) -> Iterator[SessionStatus]:

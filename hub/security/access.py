@@ -1,7 +1,9 @@
-"""Who may say and hear what from another machine: rules made of the plan, by which all that they do not name is refused.
+"""Who may say and hear what from another machine: rules made of the plan, by which all that they do not name
+is refused.
 
-A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of it (egress). Whom it is for, the name in the
-certificate says. The hub's own machine, which reaches the gate by TCP over loopback, may do everything, as it may without a gate.
+A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of it
+(egress). Whom it is for, the name in the certificate says. The hub's own machine, which reaches the gate by
+TCP over loopback, may do everything, as it may without a gate.
 """
 
 from __future__ import annotations
@@ -36,14 +38,23 @@ _MOST_BYTES = 2**25
 Rule = dict[str, Any]
 
 
-def access_settings(plan: Plan, session: str, foreign: Mapping[str, Sequence[str]] | None = None) -> dict[str, Any]:
-    """Return Zenoh's settings by which each remote participant of `plan` may do its part in `session`, and nothing else.
+def access_settings(
+    plan: Plan, session: str, foreign: Mapping[str, Sequence[str]] | None = None
+) -> dict[str, Any]:
+    """Return Zenoh's settings by which each remote participant of `plan` may do its part in `session`, and
+    nothing else.
 
-    `foreign`: by the device, the keys that it shares with programs, which connect with the certificate `console`.
+    `foreign`: by the device, the keys that it shares with programs, which connect with the certificate
+    `console`.
     """
     keys = Keys(session)
-    rights = {member.name: _part(plan, keys, member) for member in plan.members.values() if member.host.startswith("remote/")}
-    rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]  # all that `trocar ls` needs
+    rights = {
+        member.name: _part(plan, keys, member)
+        for member in plan.members.values()
+        if member.host.startswith("remote/")
+    }
+    # all that `trocar ls` needs
+    rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]
     everything = ["**"]  # but what has a chunk that begins with @, as some foreign keys have
     for name, shared in (foreign or {}).items():
         everything += shared
@@ -53,11 +64,20 @@ def access_settings(plan: Plan, session: str, foreign: Mapping[str, Sequence[str
     access = {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [{"id": "local", **_allow("both", _ALL, *everything)}, *({"id": name, **rule} for name, rule in rules.items())],
-        "subjects": [{"id": "local", "link_protocols": ["tcp"]}, *({"id": name, "cert_common_names": [name]} for name in rights)],
+        "rules": [
+            {"id": "local", **_allow("both", _ALL, *everything)},
+            *({"id": name, **rule} for name, rule in rules.items()),
+        ],
+        "subjects": [
+            {"id": "local", "link_protocols": ["tcp"]},
+            *({"id": name, "cert_common_names": [name]} for name in rights),
+        ],
         "policies": [
             {"subjects": ["local"], "rules": ["local"]},
-            *({"subjects": [name], "rules": [f"{name} {index}" for index in range(len(its))]} for name, its in rights.items()),
+            *(
+                {"subjects": [name], "rules": [f"{name} {index}" for index in range(len(its))]}
+                for name, its in rights.items()
+            ),
         ],
     }
     size = {
@@ -69,16 +89,20 @@ def access_settings(plan: Plan, session: str, foreign: Mapping[str, Sequence[str
         "size_limit": _DEVICE_BYTES,
     }
     limits = {"low_pass_filter": [size], "transport/link/rx/max_message_size": _MOST_BYTES}
-    return {"access_control": access, **limits, "scouting/gossip/enabled": False}  # who else is here, and at which address, is nobody's business
+    # who else is here, and at which address, is nobody's business
+    return {"access_control": access, **limits, "scouting/gossip/enabled": False}
 
 
 def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
     """Return the rights of one remote participant."""
     name, role, hub = member.name, member.key_role, keys.alive("hub", "hub")
-    links = [keys.output("engine", link.source, link.source_port) for link in plan.links if link.target == name]
+    links = [
+        keys.output("engine", link.source, link.source_port) for link in plan.links if link.target == name
+    ]
     feeds = [_feed(plan, keys, outlet) for outlet in plan.outlets if outlet.device == name]
     heard = list(dict.fromkeys(links + feeds))
-    listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]  # as the hub does, to all participants at once
+    # as the hub does, to all participants at once
+    listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]
     return [
         _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
         _allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *listens),

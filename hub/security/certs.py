@@ -1,4 +1,5 @@
-"""The authority of a hub: it makes the certificates by which hub and participants know each other (docs/decisions/0027-remote-hosts.md).
+"""The authority of a hub: it makes the certificates by which hub and participants know each other
+(docs/decisions/0027-remote-hosts.md).
 
 Keys are of the elliptic curve P-256, which every TLS library has. Needs the extra `certs`.
 """
@@ -37,21 +38,31 @@ _SKEW = timedelta(hours=1)
 
 
 def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
-    """Make an authority in `directory`, and the hub's certificate for the names and addresses `hosts`; return the file of the latter.
+    """Make an authority in `directory`, and the hub's certificate for the names and addresses `hosts`; return
+    the file of the latter.
 
     Raises ScenarioError if there is an authority already: what it has issued would be worth nothing.
     """
     key_file, certificate_file = directory / "ca.key", directory / "ca.pem"
     if key_file.exists() or certificate_file.exists():
         raise ScenarioError(
-            f"{directory} has an authority already, and the certificates in use are of it. For a new certificate of the hub alone: "
-            "trocar certs renew. To begin anew, move that directory away"
+            f"{directory} has an authority already, and the certificates in use are of it. For a new"
+            " certificate of the hub alone: trocar certs renew. To begin anew, move that directory away"
         )
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
     key = ec.generate_private_key(ec.SECP256R1())
-    name = _named(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])  # longer ones are refused (RFC 5280, ub-common-name)
+    # longer ones are refused (RFC 5280, ub-common-name)
+    name = _named(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])
     signs = dict.fromkeys(("key_cert_sign", "crl_sign"), True)
-    other = ("digital_signature", "content_commitment", "key_encipherment", "data_encipherment", "key_agreement", "encipher_only", "decipher_only")
+    other = (
+        "digital_signature",
+        "content_commitment",
+        "key_encipherment",
+        "data_encipherment",
+        "key_agreement",
+        "encipher_only",
+        "decipher_only",
+    )
     builder = _builder(name, name, key, datetime.now(UTC) + timedelta(days=_AUTHORITY_DAYS))
     builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
     builder = builder.add_extension(x509.KeyUsage(**signs, **dict.fromkeys(other, False)), critical=True)
@@ -69,17 +80,24 @@ def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
         try:
             hosts = examine(load(HUB, directory)).hosts
         except ConnectError as error:
-            raise ConnectError(f"the hub's names cannot be taken from its present certificate; give them: trocar certs renew HOST ... ({error})") from error
+            raise ConnectError(
+                "the hub's names cannot be taken from its present certificate; give them: trocar certs renew"
+                f" HOST ... ({error})"
+            ) from error
     return _issue(directory, HUB, days, hosts)
 
 
 def issue(directory: Path, name: str, days: float) -> Path:
-    """Make a certificate for the participant `name`, `observer` or `console`, in place of an older one; return its file, which is all the other machine needs.
+    """Make a certificate for the participant `name`, `observer` or `console`, in place of an older one;
+    return its file, which is all the other machine needs.
 
     Raises ScenarioError if nobody can have that name, ConnectError if `directory` has no authority.
     """
     if not valid_name(name) or name in (HUB, "ca"):
-        whose = f"the name of a participant that the scenario places with 'host: remote', '{OBSERVER}', or '{CONSOLE}' for ROS programs"
+        whose = (
+            f"the name of a participant that the scenario places with 'host: remote', '{OBSERVER}', or"
+            f" '{CONSOLE}' for ROS programs"
+        )
         raise ScenarioError(f"'{name}' cannot have a certificate: give {whose}")
     return _issue(directory, name, days)
 
@@ -90,9 +108,11 @@ def names_of_this_machine() -> list[str]:
     with suppress(OSError):
         names |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None)}
     with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect(("192.0.2.1", 9))  # an address of nobody (RFC 5737): nothing is sent, only which of ours is on the way there is wanted
+        # an address of nobody (RFC 5737): nothing is sent, only which of ours is on the way there is wanted
+        probe.connect(("192.0.2.1", 9))
         names.add(probe.getsockname()[0])
-    return sorted(name for name in names if "%" not in name)  # an address that holds for one network card only
+    # an address that holds for one network card only
+    return sorted(name for name in names if "%" not in name)
 
 
 def _issue(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -> Path:
@@ -104,7 +124,9 @@ def _issue(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
     builder = builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
     if hosts:
-        builder = builder.add_extension(x509.SubjectAlternativeName([_host(host) for host in hosts]), critical=False)
+        builder = builder.add_extension(
+            x509.SubjectAlternativeName([_host(host) for host in hosts]), critical=False
+        )
     file = directory / f"{name}.pem"
     file.unlink(missing_ok=True)
     chain = builder.sign(authority_key, hashes.SHA256()), authority
@@ -117,14 +139,21 @@ def _authority(directory: Path) -> tuple[ec.EllipticCurvePrivateKey, x509.Certif
         key = load_pem_private_key((directory / "ca.key").read_bytes(), None)
         certificate = x509.load_pem_x509_certificate((directory / "ca.pem").read_bytes())
     except (OSError, ValueError) as error:
-        raise ConnectError(f"{directory} has no authority that can be read ({error}). To make one, on the hub's machine: trocar certs init") from error
+        raise ConnectError(
+            f"{directory} has no authority that can be read ({error}). To make one, on the hub's machine:"
+            " trocar certs init"
+        ) from error
     if not isinstance(key, ec.EllipticCurvePrivateKey) or certificate.public_key() != key.public_key():
         raise ConnectError(f"{directory / 'ca.key'} is not the key of {directory / 'ca.pem'}")
     return key, certificate
 
 
-def _builder(subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, until: datetime) -> x509.CertificateBuilder:
-    return x509.CertificateBuilder(issuer, subject, key.public_key(), x509.random_serial_number(), datetime.now(UTC) - _SKEW, until)
+def _builder(
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, until: datetime
+) -> x509.CertificateBuilder:
+    return x509.CertificateBuilder(
+        issuer, subject, key.public_key(), x509.random_serial_number(), datetime.now(UTC) - _SKEW, until
+    )
 
 
 def _named(name: str) -> x509.Name:

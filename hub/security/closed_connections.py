@@ -1,4 +1,6 @@
-"""From where TCP connections came that have ended: Linux tells it of every one (sock_diag(7), linux/inet_diag.h), to whoever asks."""
+"""From where TCP connections came that have ended: Linux tells it of every one (sock_diag(7),
+linux/inet_diag.h), to whoever asks.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,17 @@ _TCP_DESTROY = 1 << 0
 """The group SKNLGRP_INET_TCP_DESTROY, as a bit of the address."""
 
 _FAMILY, _PORTS, _SOURCE_BYTES, _TARGET_BYTES = 16, struct.Struct(">HH"), 24, 40
-"""Offsets behind the header of 16 bytes: struct inet_diag_msg begins with the family, its sockid with both ports and both addresses."""
+"""Offsets behind the header of 16 bytes: struct inet_diag_msg begins with the family, its sockid with both
+ports and both addresses.
+"""
 
 
 def ended_connections(ports: Collection[int], look_s: float) -> Iterator[str | None]:
-    """Yield address and port of the other end of each connection to one of this machine's `ports` that has ended.
+    """Yield address and port of the other end of each connection to one of this machine's `ports` that has
+    ended.
 
-    Yields None whenever none has for `look_s`. Raises OSError where the system does not tell it: on any but Linux, or without its module inet_diag.
+    Yields None whenever none has for `look_s`. Raises OSError where the system does not tell it: on any but
+    Linux, or without its module inet_diag.
     """
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, _SOCK_DIAG) as told:
         told.bind((0, _TCP_DESTROY))

@@ -1,4 +1,6 @@
-"""Who this machine is to another one: a key, the certificate of it and the authority that both sides trust, together in one PEM file."""
+"""Who this machine is to another one: a key, the certificate of it and the authority that both sides trust,
+together in one PEM file.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ HUB = "hub"
 """Name of the certificate with which a hub listens."""
 
 CONSOLE = "console"
-"""Name of the certificate with which programs reach the devices of a session that share keys with them, such as gateways to ROS, and nothing else."""
+"""Name of the certificate with which programs reach the devices of a session that share keys with them, such
+as gateways to ROS, and nothing else.
+"""
 
 OBSERVER = "observer"
 """Name of the certificate with which anybody may read the status of a session, and nothing else."""
@@ -45,16 +49,27 @@ class Credentials:
         return self.file.stem
 
     def listening(self) -> dict[str, Any]:
-        """Return Zenoh's settings with which a hub demands a certificate of whoever connects, and hangs up when it expires."""
+        """Return Zenoh's settings with which a hub demands a certificate of whoever connects, and hangs up
+        when it expires.
+        """
         return self._settings("listen") | {"transport/link/tls/close_link_on_expiration": True}
 
     def connecting(self) -> dict[str, Any]:
-        """Return Zenoh's settings with which to reach a hub that has a certificate of the same authority for the name in the endpoint."""
+        """Return Zenoh's settings with which to reach a hub that has a certificate of the same authority for
+        the name in the endpoint.
+        """
         return self._settings("connect") | {"transport/link/tls/verify_name_on_connect": True}
 
     def _settings(self, side: str) -> dict[str, Any]:
-        parts = {"root_ca_certificate": self.authority, f"{side}_private_key": self.key, f"{side}_certificate": self.certificate}
-        encoded = {f"transport/link/tls/{part}_base64": base64.b64encode(text.encode()).decode() for part, text in parts.items()}
+        parts = {
+            "root_ca_certificate": self.authority,
+            f"{side}_private_key": self.key,
+            f"{side}_certificate": self.certificate,
+        }
+        encoded = {
+            f"transport/link/tls/{part}_base64": base64.b64encode(text.encode()).decode()
+            for part, text in parts.items()
+        }
         return {"transport/link/tls/enable_mtls": True, **encoded}
 
 
@@ -69,27 +84,40 @@ class Certificate:
 
 
 def default_directory() -> Path:
-    """Return where certificates are looked for: `~/.config/trocar/certs`, on Windows `trocar/certs` in `%APPDATA%`."""
+    """Return where certificates are looked for: `~/.config/trocar/certs`, on Windows `trocar/certs` in
+    `%APPDATA%`.
+    """
     return Path(typer.get_app_dir("trocar")) / "certs"
 
 
 def load(name: str, where: Path | None = None) -> Credentials:
-    """Return the credentials called `name` of a directory, or those of a file; by default of this user's directory.
+    """Return the credentials called `name` of a directory, or those of a file; by default of this user's
+    directory.
 
     Raises ConnectError if there are none or the file is something else.
     """
     place = default_directory() if where is None else where
     file = place if place.is_file() else place / f"{name}.pem"
-    mends = "trocar certs init" if name == HUB else f"trocar certs issue {name}, on the hub's machine; then copy the file that it names to {place}"
+    mends = (
+        "trocar certs init"
+        if name == HUB
+        else f"trocar certs issue {name}, on the hub's machine; then copy the file that it names to {place}"
+    )
     try:
         text = file.read_text(encoding="ascii")
     except FileNotFoundError as error:
-        raise ConnectError(f"there is no certificate {file}, without which nothing goes from machine to machine. To make it: {mends}") from error
+        raise ConnectError(
+            f"there is no certificate {file}, without which nothing goes from machine to machine. To make it:"
+            f" {mends}"
+        ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConnectError(f"the certificate {file} cannot be read: {error}") from error
     keys, certificates = _KEY.findall(text), _CERTIFICATE.findall(text)
     if (len(keys), len(certificates)) != (1, 2):
-        raise ConnectError(f"{file} is no file of `trocar certs`, which hold a key, its certificate and its authority. To make one: {mends}")
+        raise ConnectError(
+            f"{file} is no file of `trocar certs`, which hold a key, its certificate and its authority. To"
+            f" make one: {mends}"
+        )
     return Credentials(file, keys[0], *certificates)
 
 
@@ -101,16 +129,27 @@ def examine(credentials: Credentials) -> Certificate:
     try:
         shown = _shown_to_authority(credentials)
     except ssl.SSLError as error:
-        reason = error.verify_message if isinstance(error, ssl.SSLCertVerificationError) else error.reason or str(error)
+        reason = (
+            error.verify_message
+            if isinstance(error, ssl.SSLCertVerificationError)
+            else error.reason or str(error)
+        )
         again = "renew" if credentials.name == HUB else f"issue {credentials.name}"
-        raise ConnectError(f"{credentials.file} is not valid: {reason}. To mend it, on the hub's machine: trocar certs {again}") from error
+        raise ConnectError(
+            f"{credentials.file} is not valid: {reason}. To mend it, on the hub's machine: trocar certs"
+            f" {again}"
+        ) from error
     subject: dict[str, str] = {key: value for ((key, value),) in shown["subject"]}
     until = datetime.fromtimestamp(ssl.cert_time_to_seconds(shown["notAfter"]), UTC)
-    return Certificate(subject["commonName"], until, tuple(value for _, value in shown.get("subjectAltName", ())))
+    return Certificate(
+        subject["commonName"], until, tuple(value for _, value in shown.get("subjectAltName", ()))
+    )
 
 
 def _shown_to_authority(credentials: Credentials) -> dict[str, Any]:
-    """Return the certificate as the other side of a connection sees it, from a handshake in memory; raises SSLError if it is refused."""
+    """Return the certificate as the other side of a connection sees it, from a handshake in memory; raises
+    SSLError if it is refused.
+    """
     contexts = {side: ssl.SSLContext(side) for side in (ssl.PROTOCOL_TLS_SERVER, ssl.PROTOCOL_TLS_CLIENT)}
     for context in contexts.values():
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
@@ -122,7 +161,9 @@ def _shown_to_authority(credentials: Credentials) -> dict[str, Any]:
     to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
     ends = {
         ssl.PROTOCOL_TLS_CLIENT: contexts[ssl.PROTOCOL_TLS_CLIENT].wrap_bio(to_client, to_server),
-        ssl.PROTOCOL_TLS_SERVER: contexts[ssl.PROTOCOL_TLS_SERVER].wrap_bio(to_server, to_client, server_side=True),
+        ssl.PROTOCOL_TLS_SERVER: (
+            contexts[ssl.PROTOCOL_TLS_SERVER].wrap_bio(to_server, to_client, server_side=True)
+        ),
     }
     for _ in range(3):  # hello, the server's part, the client's part
         for end in ends.values():

@@ -1,7 +1,7 @@
 """The gate of a hub: the one process that listens to other machines (docs/decisions/0027-remote-hosts.md).
 
-It shows them the hub's certificate, demands theirs and holds them to the access rules. What it lets through goes to the hub's router over loopback;
-what it refuses, it tells the hub, which logs it.
+It shows them the hub's certificate, demands theirs and holds them to the access rules. What it lets through
+goes to the hub's router over loopback; what it refuses, it tells the hub, which logs it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ class Gate:
     """The gate as its hub has it."""
 
     def __init__(self, endpoints: Sequence[str], security: Mapping[str, Any]) -> None:
-        """`endpoints`: where to listen, such as tls/0.0.0.0:7447; `security`: Zenoh's settings of TLS and of access."""
+        """`endpoints`: where to listen, such as tls/0.0.0.0:7447; `security`: Zenoh's settings of TLS and of
+        access.
+        """
         self.endpoints = list(endpoints)
         self._security = dict(security)
         self._closing = threading.Event()
@@ -49,18 +51,26 @@ class Gate:
 
     def _start(self) -> subprocess.Popen[str]:
         command = [sys.executable, "-P", "-m", "hub.security.gate_process"]
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
         orders, answers = _ends(process)
-        orders.write(json.dumps({"listen": self.endpoints, "connect": [self._hub], "security": self._security}) + "\n")
+        orders.write(
+            json.dumps({"listen": self.endpoints, "connect": [self._hub], "security": self._security}) + "\n"
+        )
         orders.flush()
         answer = answers.readline().strip()
         if answer != OPEN:
             process.communicate()
-            raise ConnectError(answer or f"the gate at {', '.join(self.endpoints)} ended with exit code {process.returncode}")
+            raise ConnectError(
+                answer or f"the gate at {', '.join(self.endpoints)} ended with exit code {process.returncode}"
+            )
         return process
 
     def _read(self) -> None:
-        """Log what the process tells; start it again if it ends by itself: its clients come back by themselves."""
+        """Log what the process tells; start it again if it ends by itself: its clients come back by
+        themselves.
+        """
         while True:
             answers = _ends(self._process)[1]
             for line in answers:

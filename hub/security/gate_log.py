@@ -1,6 +1,7 @@
 """What Zenoh's log says of who came to the gate and what was refused to them, in our words.
 
-Written after the lines of Zenoh 1.10: an access rule that refuses says so at level trace alone, and a handshake that fails does not say with whom.
+Written after the lines of Zenoh 1.10: an access rule that refuses says so at level trace alone, and a
+handshake that fails does not say with whom.
 """
 
 from __future__ import annotations
@@ -49,7 +50,9 @@ _REASONS = {
 
 @dataclass
 class _List:
-    """The verdicts that Zenoh passes beforehand on every kind of message in both directions, as soon as somebody at the other end names a key."""
+    """The verdicts that Zenoh passes beforehand on every kind of message in both directions, as soon as
+    somebody at the other end names a key.
+    """
 
     key: str
     peer: str = ""
@@ -78,7 +81,9 @@ class GateLog:
         if came := _CAME.search(text):
             yield self._greet(came["name"], came["address"])
         elif failed := _FAILED.search(text):
-            reason = next((words for sign, words in _REASONS.items() if sign in failed["reason"]), failed["reason"])
+            reason = next(
+                (words for sign, words in _REASONS.items() if sign in failed["reason"]), failed["reason"]
+            )
             yield logging.WARNING, f"refused a connection: {reason}"
         elif begun := _LIST.search(text):
             if self._lists.get(begun["thread"], _List("")).key != begun["key"]:
@@ -100,7 +105,13 @@ class GateLog:
         self._told.pop(name, None)
         if name in self._known:
             return logging.INFO, f"'{name}' connects from {address}"
-        return logging.WARNING, f"'{name}' connects from {address}, but no remote participant of this session has that name: it gets nothing"
+        return (
+            logging.WARNING,
+            (
+                f"'{name}' connects from {address}, but no remote participant of this session has that name:"
+                " it gets nothing"
+            ),
+        )
 
     def _judge(self, verdict: re.Match[str]) -> Iterator[Told]:
         """Tell of a refusal, unless it stands in a list."""
@@ -132,4 +143,7 @@ class GateLog:
             return
         told.add(deed)
         more = "; what else is refused to it is not told any more" if len(told) > _MOST_TOLD else ""
-        yield logging.WARNING, f"refused to '{name}' at {self._addresses.get(name, 'an unknown address')}: to {deed}{more}"
+        yield (
+            logging.WARNING,
+            f"refused to '{name}' at {self._addresses.get(name, 'an unknown address')}: to {deed}{more}",
+        )

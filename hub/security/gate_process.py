@@ -1,4 +1,6 @@
-"""The process of a gate: `python -P -m hub.security.gate_process`; what it is to do it reads from its input, and it ends when that ends."""
+"""The process of a gate: `python -P -m hub.security.gate_process`; what it is to do it reads from its input,
+and it ends when that ends.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ _MOST_PER_SECOND = 200
 """So much is told of whoever knocks, however often."""
 
 _LATER_S = 0.3
-"""That a connection has ended may be known before the line of the log is read which says that it was let in."""
+"""That a connection has ended may be known before the line of the log is read which says that it was let in.
+"""
 
 
 def main() -> None:
@@ -39,12 +42,18 @@ def main() -> None:
     zenoh.init_log_from_env_or("error")
     security = orders["security"]
     try:
-        session = open_session("router", listen=orders["listen"], connect=orders["connect"], security=security)
+        session = open_session(
+            "router", listen=orders["listen"], connect=orders["connect"], security=security
+        )
     except ConnectError as error:
         answers.write(f"{error}\n")
         sys.exit(1)
     answers.write(f"{OPEN}\n")
-    known = [name for subject in security["access_control"]["subjects"] for name in subject.get("cert_common_names", ())]
+    known = [
+        name
+        for subject in security["access_control"]["subjects"]
+        for name in subject.get("cert_common_names", ())
+    ]
     gate_log, tell = GateLog(known), _Telling(answers)
     ports = {address(endpoint)[1] for endpoint in orders["listen"]}
     for task in (lambda: _read(zenohs_log, gate_log, tell), lambda: _look(ports, gate_log, tell)):
@@ -54,7 +63,9 @@ def main() -> None:
 
 
 def _parted_outputs() -> tuple[TextIO, TextIO]:
-    """Return the output of this process to write to, and to read what Zenoh believes to write to it: its log always goes there."""
+    """Return the output of this process to write to, and to read what Zenoh believes to write to it: its log
+    always goes there.
+    """
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
     reading, writing = os.pipe()
     os.dup2(writing, sys.stdout.fileno())

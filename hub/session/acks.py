@@ -31,19 +31,25 @@ class Acks:
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
     def receive(self, waiting: Sequence[str], grant: Permission, steps: Mapping[str, int]) -> Accepted | None:
-        """Wait for a message, and return it if it is a valid report of one of `waiting` on `grant`, in which participants take `steps`.
+        """Wait for a message, and return it if it is a valid report of one of `waiting` on `grant`, in which
+        participants take `steps`.
 
-        Raises ParticipantError if it reports a failure. Returns None for anything else, and when `wake` was called.
+        Raises ParticipantError if it reports a failure. Returns None for anything else, and when `wake` was
+        called.
         """
         return self._accept(self._subscriber.recv(), waiting, grant.step, steps)
 
     def ready(self, waiting: Sequence[str]) -> str | None:
-        """Return which of `waiting` has reported to be ready, if a message of one is here; raises ParticipantError."""
+        """Return which of `waiting` has reported to be ready, if a message of one is here; raises
+        ParticipantError.
+        """
         sample = self._subscriber.try_recv()
         accepted = None if sample is None else self._accept(sample, waiting, -1, _NO_STEPS)
         return None if accepted is None else accepted[0].name
 
-    def _accept(self, sample: zenoh.Sample, waiting: Sequence[str], step: int, steps: Mapping[str, int]) -> Accepted | None:
+    def _accept(
+        self, sample: zenoh.Sample, waiting: Sequence[str], step: int, steps: Mapping[str, int]
+    ) -> Accepted | None:
         key = str(sample.key_expr)
         if key == self._key and not sample.payload:
             return None
@@ -66,7 +72,9 @@ class Acks:
         return member, report, payload
 
     def raise_failure(self) -> None:
-        """Raise the failure that a participant has reported in its own words, if there is one among what is here."""
+        """Raise the failure that a participant has reported in its own words, if there is one among what is
+        here.
+        """
         while (sample := self._subscriber.try_recv()) is not None:
             member = self._members.get(str(sample.key_expr))
             with suppress(MessageError):

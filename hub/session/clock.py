@@ -9,21 +9,28 @@ from hub.planning.plan import Plan
 __all__ = ["Clock"]
 
 _WINDOW_NS = 10_000_000
-"""Simulated time that a grant covers where nothing enters and the scenario does not say: what is asked of the hub then takes effect at
-100 Hz of simulated time, and turning round costs a step of 1 ms a tenth."""
+"""Simulated time that a grant covers where nothing enters and the scenario does not say: what is asked of the
+hub then takes effect at 100 Hz of simulated time, and turning round costs a step of 1 ms a tenth.
+"""
 
 _CAUGHT_UP_NS = 50_000_000
-"""By how much a step may come late before simulated time slips (docs/decisions/0034): two pictures of the endoscope drawn without a GPU take 22 ms."""
+"""By how much a step may come late before simulated time slips (docs/decisions/0034): two pictures of the
+endoscope drawn without a GPU take 22 ms.
+"""
 
 
 class Clock:
-    """Hands out horizons in steps. Pace `fast` never waits; `realtime` follows the wall clock and counts what comes late."""
+    """Hands out horizons in steps.
+
+    Pace `fast` never waits; `realtime` follows the wall clock and counts what comes late.
+    """
 
     def __init__(self, plan: Plan, *, window: int | None, realtime: bool, steps: int | None) -> None:
-        """Take the most steps of a grant (None: as many as are of use), the pace, and the number of steps of the whole run (None: until stopped).
+        """Take the most steps of a grant (None: as many as are of use), the pace, and the number of steps of
+        the whole run (None: until stopped).
 
-        A window has to be asked for in real time, where every step waits for the wall clock, and with several hosts, of whose steps inside a
-        grant nothing is heard if one of them dies.
+        A window has to be asked for in real time, where every step waits for the wall clock, and with several
+        hosts, of whose steps inside a grant nothing is heard if one of them dies.
         """
         self.step_ns = plan.step_ns
         self.step = 0
@@ -33,7 +40,10 @@ class Clock:
         self.realtime = realtime
         """Whether steps follow the wall clock."""
         self.steps = steps
-        self._periods = sorted({plan.members[inlet.target].period for inlet in plan.inlets} | {device.period for device in plan.meetings()})
+        self._periods = sorted(
+            {plan.members[inlet.target].period for inlet in plan.inlets}
+            | {device.period for device in plan.meetings()}
+        )
         self._wall_zero_ns = monotonic_ns()
 
     @property
@@ -49,8 +59,8 @@ class Clock:
     def horizon(self, most: int | None = None) -> int:
         """Return how many steps the next grant covers.
 
-        No participant that listens to a device may start a step inside a grant, or it would miss the newest samples; and no device may be
-        due inside it that is to be written what the others have computed.
+        No participant that listens to a device may start a step inside a grant, or it would miss the newest
+        samples; and no device may be due inside it that is to be written what the others have computed.
         """
         count = self._window if most is None else min(self._window, most)
         if self.steps is not None:
@@ -64,7 +74,10 @@ class Clock:
         self._wall_zero_ns = monotonic_ns() - self.time_ns
 
     def advance(self, count: int) -> None:
-        """Go on by `count` steps; in real time wait for the wall clock. What comes late is caught up by the next steps; what is too late for that slips."""
+        """Go on by `count` steps; in real time wait for the wall clock.
+
+        What comes late is caught up by the next steps; what is too late for that slips.
+        """
         self.step += count
         if not self.realtime:
             return

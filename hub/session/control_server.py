@@ -38,15 +38,33 @@ class Joins(Protocol):
 class ControlServer:
     """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, state: RunState, inlets: Inlets, relink: Relink, joins: Joins, drops: Drops) -> None:
-        """Steer `state`, write into `inlets`, change links and let hosts join; what is refused is counted in `drops`."""
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        state: RunState,
+        inlets: Inlets,
+        relink: Relink,
+        joins: Joins,
+        drops: Drops,
+    ) -> None:
+        """Steer `state`, write into `inlets`, change links and let hosts join; what is refused is counted in
+        `drops`.
+        """
         self._drops = drops
         self._inlets = inlets
         self._queryables = [
-            self._declare(session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)),
+            self._declare(
+                session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)
+            ),
             self._declare(session, keys.control("pause"), Empty, lambda _: self._done(state.pause())),
             self._declare(session, keys.control("resume"), Empty, lambda _: self._done(state.resume())),
-            self._declare(session, keys.control("step"), StepRequest, lambda request: self._done(state.step(request.steps))),
+            self._declare(
+                session,
+                keys.control("step"),
+                StepRequest,
+                lambda request: self._done(state.step(request.steps)),
+            ),
             self._declare(session, keys.control("set"), SetRequest, self._set),
             self._declare(session, keys.control("link"), LinkRequest, relink.change),
             self._declare(session, keys.control("clock"), Empty, self._clock),
@@ -54,7 +72,12 @@ class ControlServer:
         ]
 
     def _declare(
-        self, session: zenoh.Session, key: str, model: type[Q], handler: Callable[[Q], BaseModel], key_of: Callable[[Q], str] | None = None
+        self,
+        session: zenoh.Session,
+        key: str,
+        model: type[Q],
+        handler: Callable[[Q], BaseModel],
+        key_of: Callable[[Q], str] | None = None,
     ) -> zenoh.Queryable[None]:
         """Answer on `key`; where that stands for several, `key_of` says on which of them a request may come."""
 
@@ -67,14 +90,20 @@ class ControlServer:
                     request = model.model_validate_json(text)
                     if key_of is not None:
                         if not query.key_expr.intersects(key_of(request)):
-                            raise MessageError(f"this request belongs on {key_of(request)}, and came on {query.key_expr}")
+                            raise MessageError(
+                                f"this request belongs on {key_of(request)}, and came on {query.key_expr}"
+                            )
                         at = key_of(request)
                     reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
                     reason = _reason(error)
                     self._drops.refuse(key, reason)
                     reply = Refusal(refused=reason)
-                query.reply(at, encode(StringMessage(data=reply.model_dump_json())), encoding=zenoh.Encoding.APPLICATION_CDR)
+                query.reply(
+                    at,
+                    encode(StringMessage(data=reply.model_dump_json())),
+                    encoding=zenoh.Encoding.APPLICATION_CDR,
+                )
 
         return session.declare_queryable(key, Callback(answer))
 
@@ -91,7 +120,9 @@ class ControlServer:
         port = self._inlets.settable(request.participant, request.port)
         codec = PortCodec(port)
         if codec.vector is not None:
-            message = codec.vector.to_message(codec.vector.checked(np.atleast_1d(np.asarray(request.value, np.float64))), 0)
+            message = codec.vector.to_message(
+                codec.vector.checked(np.atleast_1d(np.asarray(request.value, np.float64))), 0
+            )
         else:
             message = message_type(port.type).model_validate(request.value)
         self._inlets.offer(request.participant, request.port, encode(message), monotonic_ns())
@@ -108,5 +139,8 @@ def _reason(error: Exception) -> str:
     if not isinstance(error, ValidationError):
         return str(error)
     found = error.errors(include_url=False)
-    return "; ".join(f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].removeprefix('Value error, ')} (got {detail['input']!r})" for detail in found)
-
+    return "; ".join(
+        f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].removeprefix('Value error, ')} (got"
+        f" {detail['input']!r})"
+        for detail in found
+    )

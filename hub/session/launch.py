@@ -29,12 +29,17 @@ def plan_of(scenario: Scenario, params: Mapping[str, Params]) -> tuple[Plan, dic
     """Return the wiring of `scenario`, and its participants as they declare themselves; raises ScenarioError."""
     kinds = {name: spec.kind for name, spec in scenario.participants.items()}
     participants = {name: registry.load(kind)(name, params[name]) for name, kind in kinds.items()}
-    return make_plan(scenario, participants, {name: registry.find(kind).role for name, kind in kinds.items()}), participants
+    return (
+        make_plan(scenario, participants, {name: registry.find(kind).role for name, kind in kinds.items()}),
+        participants,
+    )
 
 
 def in_one_host(scenario: Scenario) -> Scenario:
     """Return `scenario` with every participant in the hub's own process."""
-    participants = {name: spec.model_copy(update={"host": "hub"}) for name, spec in scenario.participants.items()}
+    participants = {
+        name: spec.model_copy(update={"host": "hub"}) for name, spec in scenario.participants.items()
+    }
     return scenario.model_copy(update={"participants": participants})
 
 
@@ -49,16 +54,21 @@ def launch(
 ) -> Session:
     """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
 
-    `outside`: where other machines may join by TLS, with the hub's certificate; that is looked for in `certificates`, by default in this user's directory.
+    `outside`: where other machines may join by TLS, with the hub's certificate; that is looked for in
+    `certificates`, by default in this user's directory.
     """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
     plan, participants = plan_of(scenario, loaded.params)
     here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
     directory = loaded.source.directory
     attachments = {} if record is None else _attachments(scenario, plan, loaded)
-    foreign = {name: p.foreign_keys for name, p in participants.items() if isinstance(p, Device) and p.foreign_keys}
+    foreign = {
+        name: p.foreign_keys for name, p in participants.items() if isinstance(p, Device) and p.foreign_keys
+    }
     gate = _gate(outside, certificates, access_settings(plan, scenario.name, foreign)) if outside else None
-    return Session(scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments)
+    return Session(
+        scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments
+    )
 
 
 def _gate(endpoints: Sequence[str], certificates: Path | None, access: dict[str, Any]) -> Gate:
@@ -73,8 +83,14 @@ def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[s
     source = loaded.source
     versions = {"python": platform.python_version(), "platform": platform.platform()}
     versions |= {d.name: d.version for d in sorted(distributions(), key=lambda d: d.name.lower())}
-    read_here = [params for name, params in loaded.params.items() if scenario.participants[name].host != "remote"]
-    origin = {"directory": str(source.directory), "overrides": sorted(set(source.overrides.values())), "started_ns": time_ns()}
+    read_here = [
+        params for name, params in loaded.params.items() if scenario.participants[name].host != "remote"
+    ]
+    origin = {
+        "directory": str(source.directory),
+        "overrides": sorted(set(source.overrides.values())),
+        "started_ns": time_ns(),
+    }
     return {
         "scenario.yaml": source.file.read_bytes(),
         "scenario.json": scenario.model_dump_json(indent=2).encode(),

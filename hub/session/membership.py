@@ -1,4 +1,6 @@
-"""Who belongs to a session: hosts join, report ready or failed, and may be lost; the first failure ends the run."""
+"""Who belongs to a session: hosts join, report ready or failed, and may be lost; the first failure ends the
+run.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ class Failures:
         self.first: ParticipantError | None = None
 
     def report(self, participant: str, step: int, cause: str) -> None:
-        """Report that `participant` failed in `step`; only the first report counts, the others are its consequences."""
+        """Report that `participant` failed in `step`; only the first report counts, the others are its
+        consequences.
+        """
         with self._lock:
             if self.first is not None:
                 return
@@ -43,9 +47,17 @@ class Membership:
     """The hosts of a session other than the hub's own."""
 
     def __init__(
-        self, scenario: Scenario, plan: Plan, directory: Path, run: int, watched: Sequence[tuple[str, str]], failed: Callable[[str, str], None]
+        self,
+        scenario: Scenario,
+        plan: Plan,
+        directory: Path,
+        run: int,
+        watched: Sequence[tuple[str, str]],
+        failed: Callable[[str, str], None],
     ) -> None:
-        """`watched`: outputs that the hub listens to; `failed` is told the participant and the cause that a host reports."""
+        """`watched`: outputs that the hub listens to; `failed` is told the participant and the cause that a
+        host reports.
+        """
         self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
@@ -60,13 +72,20 @@ class Membership:
         """Answer a host that presents itself, is ready or has failed; raises MessageError to refuse it."""
         names = [name for name, member in self._plan.members.items() if member.host == request.host]
         if not names or request.host == "hub":
-            hosts = ", ".join(host for host in self._plan.hosts() if host != "hub") or "none but the hub's own"
-            raise MessageError(f"session '{self._scenario.name}' has no host '{request.host}'; it has {hosts}")
+            hosts = (
+                ", ".join(host for host in self._plan.hosts() if host != "hub") or "none but the hub's own"
+            )
+            raise MessageError(
+                f"session '{self._scenario.name}' has no host '{request.host}'; it has {hosts}"
+            )
         with self._changed:
             known = self._hosts.get(request.host)
             if known is not None and known.pid != request.pid:
                 lease_s = LEASE_MS / 1e3
-                raise MessageError(f"host '{request.host}' is here already, as process {known.pid}: end that one, or wait {lease_s:g} s if it is cut off")
+                raise MessageError(
+                    f"host '{request.host}' is here already, as process {known.pid}: end that one, or wait"
+                    f" {lease_s:g} s if it is cut off"
+                )
             self._hosts[request.host] = request
             self._admissions += 1
             self._changed.notify_all()
@@ -101,7 +120,9 @@ class Membership:
             return waiting
 
     def bonds(self) -> Mapping[str, tuple[BondSide, ...]]:
-        """Return the bonds of all hosts' participants, with the numbers that are known once they are configured."""
+        """Return the bonds of all hosts' participants, with the numbers that are known once they are
+        configured.
+        """
         return {name: sides for request in self._hosts.values() for name, sides in request.bonds.items()}
 
     def pid(self, host: str) -> int:

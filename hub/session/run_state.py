@@ -6,6 +6,7 @@ import threading
 
 __all__ = ["RunState"]
 
+
 class RunState:
     """Whether the session runs, is paused or is to end; shared by the clock loop and the control threads."""
 
@@ -60,4 +61,3 @@ class RunState:
         with self._changed:
             if self._budget is not None:
                 self._budget = max(self._budget - steps, 0)
-

@@ -69,10 +69,12 @@ class Session:
         grants: Iterator[Grant] | None = None,
         on_report: Callable[[Member, Report], None] | None = None,
     ) -> None:
-        """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this process.
+        """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this
+        process.
 
-        `directory`: where relative paths of the scenario start. `gate`: lets other machines in. `grants`: re-simulate these instead of listening to devices.
-        `on_report` sees what every participant reports of every grant.
+        `directory`: where relative paths of the scenario start. `gate`: lets other machines in. `grants`:
+        re-simulate these instead of listening to devices. `on_report` sees what every participant reports of
+        every grant.
         """
         self.scenario = scenario
         self.plan = plan
@@ -98,21 +100,33 @@ class Session:
         self._reports: list[tuple[Member, Report, bytes | None]] = []
         self._interrupt = Interrupt()
 
-    # --- the run ---------------------------------------------------------------------------------------------------
+    # --- the run
+    # ---------------------------------------------------------------------------------------------------
 
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
         """Run to the end and return the summary. SIGTERM ends it as Ctrl-C does.
 
-        Call it in the main thread: nowhere else can a participant of this process be interrupted that hangs or waits for a dead one.
+        Call it in the main thread: nowhere else can a participant of this process be interrupted that hangs
+        or waits for a dead one.
 
-        Raises ParticipantError or SessionError when the session fails (the recording is then closed and readable),
-        ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
+        Raises ParticipantError or SessionError when the session fails (the recording is then closed and
+        readable), ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
         """
         recorder = Recorder(self._record, attachments=self._attachments) if self._record is not None else None
         try:
             with self._interrupt, open_session("router", listen=[self.endpoint]) as session:
-                self._observers = Observers(self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder)
-                self._account = Account(self.scenario, self.plan, self._run_id, self._clock, self._drops, self._observers, self._intake)
+                self._observers = Observers(
+                    self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder
+                )
+                self._account = Account(
+                    self.scenario,
+                    self.plan,
+                    self._run_id,
+                    self._clock,
+                    self._drops,
+                    self._observers,
+                    self._intake,
+                )
                 self._open(session)
                 try:
                     if self._gate is not None:
@@ -121,7 +135,8 @@ class Session:
                     self._account.phase = "done"
                 except SessionError as error:
                     self._account.detail = str(error)
-                    log.error("ending the session: %s", error)  # at once: it may take a while until all have closed
+                    # at once: it may take a while until all have closed
+                    log.error("ending the session: %s", error)
                     raise
                 finally:
                     self._close()
@@ -130,7 +145,9 @@ class Session:
         return self._account.summary(recorded)
 
     def _start_and_step(self, progress: Callable[[Progress], None] | None) -> None:
-        """Run, and let nothing interrupt what comes after: one failure brings others, which may be told at any moment."""
+        """Run, and let nothing interrupt what comes after: one failure brings others, which may be told at
+        any moment.
+        """
         try:
             try:
                 self._start()
@@ -148,30 +165,56 @@ class Session:
         keys = self._keys
         self._acks = Acks(session, keys, self.plan, self._run_id, self._drops)
         self._failures = Failures(wake=self._wake)
-        self._membership = Membership(self.scenario, self.plan, self._directory, self._run_id, list(self._observers.away.values()), self._fail)
-        block, real_time, cdr = zenoh.CongestionControl.BLOCK, zenoh.Priority.REAL_TIME, zenoh.Encoding.APPLICATION_CDR
-        self._grant_publisher = session.declare_publisher(keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True)
+        self._membership = Membership(
+            self.scenario,
+            self.plan,
+            self._directory,
+            self._run_id,
+            list(self._observers.away.values()),
+            self._fail,
+        )
+        block, real_time, cdr = (
+            zenoh.CongestionControl.BLOCK,
+            zenoh.Priority.REAL_TIME,
+            zenoh.Encoding.APPLICATION_CDR,
+        )
+        self._grant_publisher = session.declare_publisher(
+            keys.grant, encoding=cdr, congestion_control=block, priority=real_time, express=True
+        )
         self._status_publisher = session.declare_publisher(keys.status, encoding=cdr)
-        self._energy_publishers = {b.bond.name: session.declare_publisher(keys.energy(b.bond.name), encoding=cdr) for b in self.plan.bonds}
+        self._energy_publishers = {
+            b.bond.name: session.declare_publisher(keys.energy(b.bond.name), encoding=cdr)
+            for b in self.plan.bonds
+        }
         self._lay_local(session)
         watch = Callback(self._observers.sample, indirect=False)
         self._entities: list[zenoh.Subscriber[None] | zenoh.Queryable[None] | ControlServer] = [
             session.declare_queryable(keys.status, Callback(self._answer_status)),
             session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._came_or_went)),
-            ControlServer(session, keys, self.state, self._inlets, self._intake.relink, self._membership, self._drops),
+            ControlServer(
+                session, keys, self.state, self._inlets, self._intake.relink, self._membership, self._drops
+            ),
             session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
             *(session.declare_subscriber(key, watch) for key in self._observers.away),
         ]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         self._fleet = Fleet()
-        self._watchdog = Watchdog(self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail)
+        self._watchdog = Watchdog(
+            self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail
+        )
 
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
         tap = self._observers.value if self._observers.watches_values else None
-        wire = Wire(session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts())))
+        wire = Wire(
+            session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts()))
+        )
         self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
-        devices = {n: p for n, p in self._participants.items() if isinstance(p, Device)} if self._grants is None else {}
+        devices = (
+            {n: p for n, p in self._participants.items() if isinstance(p, Device)}
+            if self._grants is None
+            else {}
+        )
         for device in devices.values():
             device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
         self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
@@ -205,7 +248,9 @@ class Session:
                 log.info("waiting for %s to join at %s", ", ".join(missing), doors)
             told = missing
             if monotonic() > deadline:
-                raise SessionError(f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {doors}")
+                raise SessionError(
+                    f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {doors}"
+                )
 
     def _await_links(self) -> None:
         waiting = [name for name in self.plan.order if name in self._away]
@@ -249,7 +294,8 @@ class Session:
 
     def _wait_while_paused(self) -> None:
         self._settle()
-        self._account.phase = "paused"  # after the reports are booked: a status that says so tells the steps taken
+        # after the reports are booked: a status that says so tells the steps taken
+        self._account.phase = "paused"
         self._tell_status()
         while not self.state.wait(0.2):
             self._check()
@@ -257,12 +303,21 @@ class Session:
         self._clock.start()
 
     def _next_grant(self, budget: int | None) -> Permission | None:
-        """Return the next grant, of at most `budget` steps, with all that enters the simulation at this communication point."""
+        """Return the next grant, of at most `budget` steps, with all that enters the simulation at this
+        communication point.
+        """
         if self._grants is not None:
             recorded = next(self._grants, None)
             if recorded is None:
                 return None
-            return Permission(self._run_id, recorded.epoch, recorded.step, recorded.start_ns, recorded.horizon_ns, recorded.inlets)
+            return Permission(
+                self._run_id,
+                recorded.epoch,
+                recorded.step,
+                recorded.start_ns,
+                recorded.horizon_ns,
+                recorded.inlets,
+            )
         step, time_ns = self._clock.step, self._clock.time_ns
         horizon_ns = time_ns + self._clock.horizon(budget) * self.plan.step_ns
         return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._intake.enter(time_ns, step))
@@ -299,7 +354,9 @@ class Session:
         self.state.spend(count)
 
     def _schedule(self, grant: Permission) -> tuple[list[str], dict[str, int]]:
-        """Return who steps in a grant, in step order, and how often; grants come in few patterns, so each is worked out once."""
+        """Return who steps in a grant, in step order, and how often; grants come in few patterns, so each is
+        worked out once.
+        """
         begin, end = grant.step, grant.horizon_ns // self.plan.step_ns
         key = begin % self._common_period, end - begin
         if key not in self._schedules:
@@ -338,20 +395,27 @@ class Session:
         for entity in self._entities:
             entity.undeclare()
 
-    # --- what others report and ask --------------------------------------------------------------------------------
+    # --- what others report and ask
+    # --------------------------------------------------------------------------------
 
     def _fail(self, participant: str, cause: str) -> None:
         """End the run because of `participant`; may be called from any thread."""
         here = self.plan.members[participant].host == "hub"  # of another host only the grant is known
-        self._failures.report(participant, max(self._clock.step, self._host.step) if here else self._clock.step, cause)
+        self._failures.report(
+            participant, max(self._clock.step, self._host.step) if here else self._clock.step, cause
+        )
 
     def _wake(self) -> None:
-        """Make the step loop look at the failures: it may wait for acks, or be inside a participant of this process."""
+        """Make the step loop look at the failures: it may wait for acks, or be inside a participant of this
+        process.
+        """
         self._acks.wake()
         self._interrupt()
 
     def _check(self) -> None:
-        """Raise the first failure, if there is one: in the words of a participant, if they are here already; else an interrupt that got lost."""
+        """Raise the first failure, if there is one: in the words of a participant, if they are here already;
+        else an interrupt that got lost.
+        """
         if self._failures.first is None:
             self._interrupt.check()
             return
@@ -359,7 +423,10 @@ class Session:
         self._failures.check()
 
     def _came_or_went(self, sample: zenoh.Sample) -> None:
-        """Take note that a liveliness token came or went. A lost engine ends the run; a lost device makes its arm hold."""
+        """Take note that a liveliness token came or went.
+
+        A lost engine ends the run; a lost device makes its arm hold.
+        """
         name = str(sample.key_expr).rsplit("/", 1)[1]
         member = self.plan.members.get(name)
         if member is None or not member.host.startswith("remote/"):
@@ -375,7 +442,10 @@ class Session:
             return
         if member.role == "device":
             log.warning(
-                "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the network; a host that still runs joins again", name, name
+                "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the"
+                " network; a host that still runs joins again",
+                name,
+                name,
             )
         else:
             self._fail(name, "its host is gone")
@@ -390,7 +460,11 @@ class Session:
 
     def _answer_status(self, query: zenoh.Query) -> None:
         with query:
-            query.reply(self._keys.status, encode(self._account.status(self._membership.pid)), encoding=zenoh.Encoding.APPLICATION_CDR)
+            query.reply(
+                self._keys.status,
+                encode(self._account.status(self._membership.pid)),
+                encoding=zenoh.Encoding.APPLICATION_CDR,
+            )
 
     def _tell_status(self) -> None:
         status = self._account.status(self._membership.pid)

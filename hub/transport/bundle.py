@@ -1,6 +1,7 @@
 """What the signals of one participant are for one device of the wall clock, all of a step in one message.
 
-A gateway to ROS is told a hundred of them at a time. As a message each they took the hub 1.9 ms of a step (docs/decisions/0034).
+A gateway to ROS is told a hundred of them at a time. As a message each they took the hub 1.9 ms of a step
+(docs/decisions/0034).
 """
 
 from __future__ import annotations
@@ -21,9 +22,13 @@ _HEAD = struct.Struct("<II")
 
 
 def bundled(plan: Plan, source: str, device: str) -> list[Outlet]:
-    """Return the connections whose values go together, in the order in which both ends count them: those of signals."""
+    """Return the connections whose values go together, in the order in which both ends count them: those of
+    signals.
+    """
     between = (outlet for outlet in plan.outlets if (outlet.source, outlet.device) == (source, device))
-    return [outlet for outlet in between if plan.members[source].port(outlet.source_port).variability == "signal"]
+    return [
+        outlet for outlet in between if plan.members[source].port(outlet.source_port).variability == "signal"
+    ]
 
 
 class Bundle:

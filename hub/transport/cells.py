@@ -1,7 +1,8 @@
-"""Where the values of one output port wait for whoever needs them: the same rules inside a process and between processes.
+"""Where the values of one output port wait for whoever needs them: the same rules inside a process and
+between processes.
 
-A value carries the step in which its source computed it (the *tag*; -1 for the value at time 0). Readers ask for a
-tag, never for "the newest", so that the result does not depend on timing or on who runs where.
+A value carries the step in which its source computed it (the *tag*; -1 for the value at time 0). Readers ask
+for a tag, never for "the newest", so that the result does not depend on timing or on who runs where.
 """
 
 from __future__ import annotations
@@ -34,14 +35,18 @@ class Cell:
     """The last values of one output port of a participant in this process."""
 
     def __init__(self, period: int, stride: int, depth: int) -> None:
-        """Take the source's period and the distance of two values, both in steps, and how many values readers may look back."""
+        """Take the source's period and the distance of two values, both in steps, and how many values readers
+        may look back.
+        """
         self._period = period
         self.stride = stride
         self._depth = depth
         self._values: dict[int, Any] = {}
 
     def put(self, tag: int, value: Any) -> None:
-        """Store the value computed in step `tag`; an array is copied if readers look back, as its owner may reuse it."""
+        """Store the value computed in step `tag`; an array is copied if readers look back, as its owner may
+        reuse it.
+        """
         if self._depth == 1:
             self._values = {tag: value}
             return
@@ -54,7 +59,9 @@ class Cell:
         return self._values[tag]
 
     def tag(self, step: int, *, fresh: bool) -> int:
-        """Return the tag that a reader in `step` sees: of the newest step begun (fresh), or of the newest completed by then."""
+        """Return the tag that a reader in `step` sees: of the newest step begun (fresh), or of the newest
+        completed by then.
+        """
         count = (step + self._period if fresh else step) // self.stride
         return count * self.stride - self._period if count else INITIAL
 
@@ -74,7 +81,14 @@ class Cell:
 class RemoteCell(Cell):
     """The values of an output port of a participant in another process; `get` waits for them to arrive."""
 
-    def __init__(self, period: int, stride: int, depth: int, receiver: Receiver, heard: Callable[[int, Any], None] | None = None) -> None:
+    def __init__(
+        self,
+        period: int,
+        stride: int,
+        depth: int,
+        receiver: Receiver,
+        heard: Callable[[int, Any], None] | None = None,
+    ) -> None:
         """Take where the values come from; `heard` is shown each of them with its tag, once, in order."""
         super().__init__(period, stride, depth)
         self._receiver = receiver
@@ -90,14 +104,17 @@ class RemoteCell(Cell):
         return INITIAL in self._values
 
     def _keep(self, tag: int, value: Any) -> None:
-        if tag > self._newest:  # the value at time 0 is sent until every host has it; whatever else is old is a repetition
+        # the value at time 0 is sent until every host has it; whatever else is old is a repetition
+        if tag > self._newest:
             self._newest = tag
             self.put(tag, value)
             if self._heard is not None:
                 self._heard(tag, value)
 
     def take_until(self, tag: int) -> None:
-        """Take what has arrived up to the value of step `tag`, the next one that is asked for: whoever sends waits where too much is not taken."""
+        """Take what has arrived up to the value of step `tag`, the next one that is asked for: whoever sends
+        waits where too much is not taken.
+        """
         while self._newest < tag and (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)
 
@@ -110,7 +127,9 @@ class RemoteCell(Cell):
         """Return the value computed in step `tag`, as soon as it is here."""
         while tag not in self._values:
             if self._newest > tag:
-                raise SessionError(f"the value of step {tag} was lost on its way: step {self._newest} arrived instead")
+                raise SessionError(
+                    f"the value of step {tag} was lost on its way: step {self._newest} arrived instead"
+                )
             self.waiting = True
             self._keep(*self._receiver.receive())
             self.waiting = False

@@ -22,12 +22,16 @@ _PATIENCE_S = 5.0
 R = TypeVar("R", bound=BaseModel)
 
 
-def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R], *, timeout_s: float = 5.0) -> R:
+def ask(
+    session: zenoh.Session, key: str, request: BaseModel, reply_model: type[R], *, timeout_s: float = 5.0
+) -> R:
     """Send a control request and return the reply.
 
     Raises ConnectError if nobody answers in time, MessageError if the request is refused.
     """
-    replies = session.get(key, payload=encode(StringMessage(data=request.model_dump_json())), timeout=timeout_s)
+    replies = session.get(
+        key, payload=encode(StringMessage(data=request.model_dump_json())), timeout=timeout_s
+    )
     for reply in replies:
         if reply.ok is None:
             continue
@@ -39,11 +43,15 @@ def ask(session: zenoh.Session, key: str, request: BaseModel, reply_model: type[
                 raise MessageError(Refusal.model_validate_json(text).refused) from None
             except ValidationError as error:
                 raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
-    raise ConnectError(f"nobody answers on {key}: is the hub running, and does its session have what this names?")
+    raise ConnectError(
+        f"nobody answers on {key}: is the hub running, and does its session have what this names?"
+    )
 
 
 def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
-    """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask` raises."""
+    """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask`
+    raises.
+    """
     deadline = monotonic() + _PATIENCE_S
     while True:
         try:
@@ -52,4 +60,3 @@ def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinRep
             if monotonic() > deadline:
                 raise
             sleep(0.1)
-

@@ -11,6 +11,7 @@ from schemas.ports import BondSide
 
 __all__ = ["ClockReply", "Empty", "JoinReply", "JoinRequest", "Refusal", "SetRequest", "StepRequest"]
 
+
 class _Json(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -63,11 +64,12 @@ class JoinReply(_Json):
     session: str
     run: int
     admission: int
-    """Counts the hosts that were let in: a device's samples carry it, so that those of a host before it are known."""
+    """Counts the hosts that were let in: a device's samples carry it, so that those of a host before it are
+    known.
+    """
     plan: Plan
     """For another machine, the part of it that concerns the host."""
     params: dict[str, dict[str, Any]]
     directory: str
     watched: list[tuple[str, str]]
     """Outputs, as participant and port, whose every value the hub wants: for a recording or a measure."""
-

@@ -1,4 +1,6 @@
-"""Where a hub listens, and where to look for hubs: on loopback without more ado, elsewhere through a gate that speaks TLS."""
+"""Where a hub listens, and where to look for hubs: on loopback without more ado, elsewhere through a gate
+that speaks TLS.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,24 @@ from ipaddress import ip_address
 
 from schemas.errors import ConnectError, ScenarioError
 
-__all__ = ["PORTS", "address", "free_endpoint", "is_loopback", "listening_endpoints", "parted", "require_loopback"]
+__all__ = [
+    "PORTS",
+    "address",
+    "free_endpoint",
+    "is_loopback",
+    "listening_endpoints",
+    "parted",
+    "require_loopback",
+]
 
 PORTS = range(7447, 7467)
 """Zenoh's own port, and the next ones for further hubs on the same machine."""
 
 
 def free_endpoint(ports: Iterable[int] = PORTS) -> str:
-    """Return the endpoint of the first loopback port that is free. Port 0 is any free one. Raises ConnectError if none is."""
+    """Return the endpoint of the first loopback port that is free. Port 0 is any free one. Raises
+    ConnectError if none is.
+    """
     for port in ports:
         try:
             with socket.create_server(("127.0.0.1", port)) as probe:
@@ -24,13 +36,18 @@ def free_endpoint(ports: Iterable[int] = PORTS) -> str:
         except OSError:
             continue
     raise ConnectError(
-        f"no free port among {PORTS.start} to {PORTS.stop - 1} on 127.0.0.1: end a session that is not needed, or give --listen tcp/127.0.0.1:PORT"
+        f"no free port among {PORTS.start} to {PORTS.stop - 1} on 127.0.0.1: end a session that is not"
+        " needed, or give --listen tcp/127.0.0.1:PORT"
     )
 
 
 def listening_endpoints() -> list[str]:
-    """Return the endpoints of the ports where somebody listens on loopback alone: who listens on all addresses is the gate of a hub."""
-    return [_endpoint(port) for port in PORTS if _answers("127.0.0.1", port) and not _answers("127.0.0.2", port)]
+    """Return the endpoints of the ports where somebody listens on loopback alone: who listens on all
+    addresses is the gate of a hub.
+    """
+    return [
+        _endpoint(port) for port in PORTS if _answers("127.0.0.1", port) and not _answers("127.0.0.2", port)
+    ]
 
 
 def _answers(address: str, port: int) -> bool:
@@ -40,7 +57,8 @@ def _answers(address: str, port: int) -> bool:
 
 
 def parted(endpoints: Iterable[str]) -> tuple[str, list[str]]:
-    """Return the loopback endpoint of a hub, a free one if `endpoints` has none, and those at which its gate listens to other machines.
+    """Return the loopback endpoint of a hub, a free one if `endpoints` has none, and those at which its gate
+    listens to other machines.
 
     Raises ScenarioError if one of them is neither TCP on loopback nor TLS.
     """
@@ -58,7 +76,8 @@ def require_loopback(endpoint: str) -> str:
     if is_loopback(endpoint):
         return endpoint
     raise ScenarioError(
-        f"'{endpoint}' cannot be listened on: a hub listens on loopback, such as tcp/127.0.0.1:7447, and to other machines by TLS, such as tls/0.0.0.0:7447"
+        f"'{endpoint}' cannot be listened on: a hub listens on loopback, such as tcp/127.0.0.1:7447, and to"
+        " other machines by TLS, such as tls/0.0.0.0:7447"
     )
 
 
@@ -77,7 +96,10 @@ def address(endpoint: str) -> tuple[str, int]:
     _, slash, rest = endpoint.partition("/")
     host, colon, port = rest.rpartition(":")
     if not (slash and colon and host and port.isdecimal()):
-        raise ScenarioError(f"'{endpoint}' is no endpoint: write tls/HOST:PORT, or tcp/127.0.0.1:PORT on the hub's own machine")
+        raise ScenarioError(
+            f"'{endpoint}' is no endpoint: write tls/HOST:PORT, or tcp/127.0.0.1:PORT on the hub's own"
+            " machine"
+        )
     return host.strip("[]"), int(port)
 
 

@@ -21,14 +21,24 @@ _STAMP = struct.Struct("<QQq")
 class Tag:
     """The attachment of every value.
 
-    Run, epoch, step in which it was computed, time it is valid at, index and count of an event batch, and when it was published (by the
-    monotonic clock of its host).
+    Run, epoch, step in which it was computed, time it is valid at, index and count of an event batch, and
+    when it was published (by the monotonic clock of its host).
     """
 
     __slots__ = ("count", "epoch", "index", "run", "sent_ns", "step", "time_ns")
 
-    def __init__(self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int, sent_ns: int) -> None:
-        self.run, self.epoch, self.step, self.time_ns, self.index, self.count, self.sent_ns = run, epoch, step, time_ns, index, count, sent_ns
+    def __init__(
+        self, run: int, epoch: int, step: int, time_ns: int, index: int, count: int, sent_ns: int
+    ) -> None:
+        self.run, self.epoch, self.step, self.time_ns, self.index, self.count, self.sent_ns = (
+            run,
+            epoch,
+            step,
+            time_ns,
+            index,
+            count,
+            sent_ns,
+        )
 
     @staticmethod
     def pack(run: int, epoch: int, step: int, time_ns: int, index: int = 0, count: int = 1) -> bytes:
@@ -48,11 +58,13 @@ class Stamp(NamedTuple):
     """The attachment of every sample of a device."""
 
     admission: int
-    """The hub counts the hosts that it lets join; a device that joined anew begins to count its samples anew."""
+    """The hub counts the hosts that it lets join; a device that joined anew begins to count its samples anew.
+    """
     sequence: int
     """Counts the samples of one port."""
     sent_ns: int
-    """When the device had it, by the clock of the device: the monotonic clock of its host, or simulated time."""
+    """When the device had it, by the clock of the device: the monotonic clock of its host, or simulated time.
+    """
 
     def pack(self) -> bytes:
         """Return the bytes of a stamp."""
@@ -65,4 +77,3 @@ class Stamp(NamedTuple):
         if len(raw) != _STAMP.size:
             raise MessageError(f"attachment of {len(raw)} bytes, a device's sample has {_STAMP.size}")
         return cls(*_STAMP.unpack(raw))
-

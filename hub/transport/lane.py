@@ -1,8 +1,8 @@
 """The fast lane: vectors from one host to another on the same machine, past Zenoh.
 
-A Zenoh hop wakes three threads, a socket one; between processes that wait for each other at every millisecond this is
-half of the step (docs/decisions/0006-fast-lane.md). The values are the same, under the same tags; what anybody else
-subscribes to is still published on Zenoh. Linux only, between processes of one user.
+A Zenoh hop wakes three threads, a socket one; between processes that wait for each other at every millisecond
+this is half of the step (docs/decisions/0006-fast-lane.md). The values are the same, under the same tags;
+what anybody else subscribes to is still published on Zenoh. Linux only, between processes of one user.
 """
 
 from __future__ import annotations
@@ -34,31 +34,48 @@ _SPIN_NS = 2_000_000
 
 
 def may_spin(hosts: int) -> bool:
-    """Say whether a host may keep its core busy while it waits: only if each of `hosts` processes has a core of its own."""
+    """Say whether a host may keep its core busy while it waits: only if each of `hosts` processes has a core
+    of its own.
+    """
     return hasattr(os, "sched_getaffinity") and hosts <= len(os.sched_getaffinity(0))
 
 
 def has_lane(port: Port, one_host: str, other_host: str) -> bool:
     """Say whether the values of `port` can go past Zenoh from one host to the other."""
-    if not hasattr(socket, "SO_PEERCRED") or one_host.startswith("remote/") or other_host.startswith("remote/"):
+    if (
+        not hasattr(socket, "SO_PEERCRED")
+        or one_host.startswith("remote/")
+        or other_host.startswith("remote/")
+    ):
         return False
-    return has_vector(port.type) and port.variability == "signal" and 8 * VectorCodec(port).size <= _MOST_BYTES
+    return (
+        has_vector(port.type) and port.variability == "signal" and 8 * VectorCodec(port).size <= _MOST_BYTES
+    )
 
 
 def lane_address(run: int, participant: str, port: str, reader_host: str) -> str:
-    """Return the address of a lane, in Linux' abstract namespace: no file is left behind, however a process ends."""
+    """Return the address of a lane, in Linux' abstract namespace: no file is left behind, however a process
+    ends.
+    """
     name = f"{run:x} {participant} {port} {reader_host}"
     return f"\0trocar-{hashlib.blake2b(name.encode(), digest_size=16).hexdigest()}"
 
 
 def _is_ours(connection: socket.socket) -> bool:
-    """Say whether the process at the other end belongs to the same user: names in the abstract namespace are open to all."""
-    _, user, _ = _CREDENTIALS.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
+    """Say whether the process at the other end belongs to the same user: names in the abstract namespace are
+    open to all.
+    """
+    _, user, _ = _CREDENTIALS.unpack(
+        connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    )
     return user == os.getuid()
 
 
 class LaneSender:
-    """The writing end. It connects while values at time 0 are repeated; until then there is nobody to write to."""
+    """The writing end.
+
+    It connects while values at time 0 are repeated; until then there is nobody to write to.
+    """
 
     def __init__(self, address: str) -> None:
         self._address = address
@@ -68,7 +85,8 @@ class LaneSender:
         """Send the value computed in `step`."""
         if self._socket is None and not (step == INITIAL and self._connect()):
             return
-        with suppress(BrokenPipeError, ConnectionResetError):  # the reader is gone; the hub, which looks after processes, knows why
+        # the reader is gone; the hub, which looks after processes, knows why
+        with suppress(BrokenPipeError, ConnectionResetError):
             self._socket.send(_HEAD.pack(step) + value.tobytes())  # pyright: ignore[reportOptionalMemberAccess]
 
     def _connect(self) -> bool:
@@ -139,8 +157,12 @@ class LaneReceiver:
         while not packet:
             sleep(1.0)  # the writer is gone: the hub reports it and interrupts whoever waits here
         if len(packet) != self._length:
-            raise MessageError(f"port '{self._codec.port.name}': a packet of {len(packet)} bytes, expected {self._length}")
-        return _HEAD.unpack_from(packet)[0], self._codec.checked(np.frombuffer(packet, np.float64, offset=_HEAD.size))
+            raise MessageError(
+                f"port '{self._codec.port.name}': a packet of {len(packet)} bytes, expected {self._length}"
+            )
+        return _HEAD.unpack_from(packet)[0], self._codec.checked(
+            np.frombuffer(packet, np.float64, offset=_HEAD.size)
+        )
 
     def close(self) -> None:
         """Close both sockets."""

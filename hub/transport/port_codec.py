@@ -12,6 +12,7 @@ from schemas.vectors import VectorCodec, has_vector
 
 __all__ = ["PortCodec"]
 
+
 class PortCodec:
     """Values of one port to CDR and back, whatever its type."""
 
@@ -26,11 +27,15 @@ class PortCodec:
         return self.vector.encode(value, time_ns) if self.vector is not None else encode(value)
 
     def decode(self, payload: bytes) -> Any:
-        """Return the vector or message in `payload` written by a `PortCodec` of the same port; raises MessageError."""
+        """Return the vector or message in `payload` written by a `PortCodec` of the same port; raises
+        MessageError.
+        """
         return self.vector.decode(payload) if self.vector is not None else decode(self._model, payload)
 
     def accept(self, payload: bytes) -> Any:
-        """Return the vector or message in `payload` written by anybody (joints in any order, frame left out); raises MessageError."""
+        """Return the vector or message in `payload` written by anybody (joints in any order, frame left out);
+        raises MessageError.
+        """
         if self.vector is not None and self.vector.fits(payload):
             return self.vector.decode(payload)
         message = decode(self._model, payload)
@@ -39,4 +44,3 @@ class PortCodec:
     def batch(self, value: Value) -> tuple[Message, ...]:
         """Return the messages of an event port's value."""
         return value if isinstance(value, tuple) else ()
-

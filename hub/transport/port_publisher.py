@@ -19,11 +19,12 @@ from schemas.ports import Port
 
 __all__ = ["PortPublisher"]
 
+
 class PortPublisher:
     """Publishes the values of one output port; without a reader it costs a flag test.
 
-    Devices of the wall clock hear events under a key of their own, and signals in bundles. A step without events is told only to those who need every
-    value (`always`): dozens of quiet ports cost nothing.
+    Devices of the wall clock hear events under a key of their own, and signals in bundles. A step without
+    events is told only to those who need every value (`always`): dozens of quiet ports cost nothing.
     """
 
     def __init__(
@@ -39,7 +40,9 @@ class PortPublisher:
         bundles: Sequence[tuple[Bundle, int]] = (),
         lanes: Sequence[LaneSender] = (),
     ) -> None:
-        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock takes its events; `bundles`: for its signals."""
+        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock takes
+        its events; `bundles`: for its signals.
+        """
         self.codec = PortCodec(port)
         self._lanes = lanes
         self._run = run
@@ -47,9 +50,19 @@ class PortPublisher:
         self._bundles = bundles
         block = zenoh.CongestionControl.BLOCK
         self._ways: list[Outgoing] = []
-        self._ways.append(Outgoing(session, keys.output(member.key_role, member.name, port.name), block, self._look, always=always))
+        self._ways.append(
+            Outgoing(
+                session,
+                keys.output(member.key_role, member.name, port.name),
+                block,
+                self._look,
+                always=always,
+            )
+        )
         if feeds:
-            self._ways.append(Outgoing(session, keys.feed(member.name, port.name), block, self._look, always=False))
+            self._ways.append(
+                Outgoing(session, keys.feed(member.name, port.name), block, self._look, always=False)
+            )
         self._look()
 
     def _look(self) -> None:
@@ -84,4 +97,3 @@ class PortPublisher:
             lane.close()
         for way in self._ways:
             way.close()
-

@@ -17,8 +17,11 @@ from schemas.ports import Port
 
 __all__ = ["PortReceiver"]
 
+
 class PortReceiver:
-    """Receives the values of one output port of another process, in order; invalid and foreign messages are dropped and counted."""
+    """Receives the values of one output port of another process, in order; invalid and foreign messages are
+    dropped and counted.
+    """
 
     def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, drops: Drops) -> None:
         self._codec = PortCodec(port)
@@ -74,4 +77,3 @@ class PortReceiver:
     def close(self) -> None:
         """Stop receiving."""
         self._subscriber.undeclare()
-

@@ -12,12 +12,28 @@ __all__ = ["Outgoing"]
 
 
 class Outgoing:
-    """Publishes under one key, at once and before all else; tells when the first listener comes and the last one goes."""
+    """Publishes under one key, at once and before all else; tells when the first listener comes and the last
+    one goes.
+    """
 
-    def __init__(self, session: zenoh.Session, key: str, choked: zenoh.CongestionControl, changed: Callable[[], None], *, always: bool) -> None:
-        """`choked`: what becomes of a message that cannot go now; `changed` is called whenever `wanted` may be another; `always`: it is wanted anyhow."""
+    def __init__(
+        self,
+        session: zenoh.Session,
+        key: str,
+        choked: zenoh.CongestionControl,
+        changed: Callable[[], None],
+        *,
+        always: bool,
+    ) -> None:
+        """`choked`: what becomes of a message that cannot go now; `changed` is called whenever `wanted` may
+        be another; `always`: it is wanted anyhow.
+        """
         self._publisher = session.declare_publisher(
-            key, encoding=zenoh.Encoding.APPLICATION_CDR, congestion_control=choked, priority=zenoh.Priority.REAL_TIME, express=True
+            key,
+            encoding=zenoh.Encoding.APPLICATION_CDR,
+            congestion_control=choked,
+            priority=zenoh.Priority.REAL_TIME,
+            express=True,
         )
         self.wanted = always
         """Whether somebody listens."""

@@ -1,4 +1,6 @@
-"""How an input is read from the cell of its source, and what a device that follows the clock is fed from such readings."""
+"""How an input is read from the cell of its source, and what a device that follows the clock is fed from such
+readings.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ class Reader:
     seen: int = INITIAL
 
     def events(self, step: int, step_ns: int) -> list[tuple[int, Message]]:
-        """Return what is new to an event port in `step`, oldest first, each with the time (ns) at which it is valid."""
+        """Return what is new to an event port in `step`, oldest first, each with the time (ns) at which it is
+        valid.
+        """
         if self.messages is None:
             raise ValueError(f"'{self.port}' is a signal")
         cell, tag = self.cell, self.cell.tag(step, fresh=self.fresh)
@@ -45,7 +49,9 @@ class Reader:
 
 
 class Feed:
-    """What one device that follows the clock is written: at a communication point, what all participants had computed by then."""
+    """What one device that follows the clock is written: at a communication point, what all participants had
+    computed by then.
+    """
 
     def __init__(self, readers: Sequence[Reader], step_ns: int) -> None:
         """Take the readers of the device's connected inputs."""
@@ -55,7 +61,9 @@ class Feed:
         self._step_ns = step_ns
 
     def due(self, step: int) -> Iterator[tuple[str, int, Value]]:
-        """Yield port, time (ns) at which it is valid and value: every event, and the newest value of each signal that has a new one."""
+        """Yield port, time (ns) at which it is valid and value: every event, and the newest value of each
+        signal that has a new one.
+        """
         for reader in self._signals:
             tag = reader.cell.tag(step, fresh=False)
             if tag > self._newest[reader.port]:
@@ -67,7 +75,9 @@ class Feed:
 
 
 def as_messages(source: Port, target: Port) -> Messages | None:
-    """Return what makes the messages of an event port `target` of a value of `source`; None if the target is a signal."""
+    """Return what makes the messages of an event port `target` of a value of `source`; None if the target is
+    a signal.
+    """
     if target.variability == "signal":
         return None
     if source.variability == "event":

@@ -14,7 +14,9 @@ log = logging.getLogger(__name__)
 
 
 class Drops:
-    """Counts what was refused, per key, and logs each key's first refusals with their source. For use from any thread."""
+    """Counts what was refused, per key, and logs each key's first refusals with their source. For use from
+    any thread.
+    """
 
     _LOGGED_PER_KEY = 3
 
@@ -47,5 +49,6 @@ class Drops:
     def count(self, sample: zenoh.Sample, reason: object) -> None:
         """Refuse a sample."""
         source = sample.source_info
-        self.refuse(str(sample.key_expr), reason, f" from {source.source_id.zid}" if source is not None else "")
-
+        self.refuse(
+            str(sample.key_expr), reason, f" from {source.source_id.zid}" if source is not None else ""
+        )

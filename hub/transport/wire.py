@@ -19,13 +19,25 @@ from schemas.ports import Port
 
 __all__ = ["Wire"]
 
+
 class Wire:
     """A host's publishers and receivers on one Zenoh session, with the fast lanes beside it."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, run: int, drops: Drops, host: str, *, spin: bool, watched: Sequence[tuple[str, str]] = ()) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        run: int,
+        drops: Drops,
+        host: str,
+        *,
+        spin: bool,
+        watched: Sequence[tuple[str, str]] = (),
+    ) -> None:
         """Take the session and the name of the host whose values go over it.
 
-        `spin`: its lanes may keep a core busy while they wait; `watched`: the outputs that the hub wants in full.
+        `spin`: its lanes may keep a core busy while they wait; `watched`: the outputs that the hub wants in
+        full.
         """
         self._spin = spin
         self.host = host
@@ -45,24 +57,60 @@ class Wire:
         self._bundles.append(bundle)
         return bundle
 
-    def publisher(self, member: Member, port: Port, readers: Sequence[str], *, feeds: bool, bundles: Sequence[tuple[Bundle, int]]) -> PortPublisher:
+    def publisher(
+        self,
+        member: Member,
+        port: Port,
+        readers: Sequence[str],
+        *,
+        feeds: bool,
+        bundles: Sequence[tuple[Bundle, int]],
+    ) -> PortPublisher:
         """Return a publisher of an output of a participant here; the hosts `readers` need every value.
 
-        Devices of the wall clock get events if it `feeds` them, and signals in `bundles`, each with the number that it has there.
+        Devices of the wall clock get events if it `feeds` them, and signals in `bundles`, each with the
+        number that it has there.
         """
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
         always = len(fast) < len(readers) or (member.name, port.name) in self._watched
-        publisher = PortPublisher(self.session, self.keys, member, port, self.run, always=always, feeds=feeds, bundles=bundles, lanes=lanes)
+        publisher = PortPublisher(
+            self.session,
+            self.keys,
+            member,
+            port,
+            self.run,
+            always=always,
+            feeds=feeds,
+            bundles=bundles,
+            lanes=lanes,
+        )
         self._publishers.append(publisher)
         return publisher
 
-    def cell(self, member: Member, port: Port, stride: int, depth: int, heard: Callable[[int, Any], None] | None = None) -> RemoteCell:
-        """Return the cell of an output of a participant elsewhere; `heard` is shown each value that comes by a lane."""
+    def cell(
+        self,
+        member: Member,
+        port: Port,
+        stride: int,
+        depth: int,
+        heard: Callable[[int, Any], None] | None = None,
+    ) -> RemoteCell:
+        """Return the cell of an output of a participant elsewhere; `heard` is shown each value that comes by
+        a lane.
+        """
         if has_lane(port, member.host, self.host):
-            receiver = LaneReceiver(lane_address(self.run, member.name, port.name, self.host), port, spin=self._spin)
+            receiver = LaneReceiver(
+                lane_address(self.run, member.name, port.name, self.host), port, spin=self._spin
+            )
         else:
-            receiver = PortReceiver(self.session, self.keys.output(member.key_role, member.name, port.name), port, self.run, self.drops)
+            receiver = PortReceiver(
+                self.session,
+                self.keys.output(member.key_role, member.name, port.name),
+                port,
+                self.run,
+                self.drops,
+            )
             heard = None  # whoever watches it subscribes to it
         self._receivers.append(receiver)
         cell = RemoteCell(member.period, stride, depth, receiver, heard)
@@ -83,4 +131,3 @@ class Wire:
         for entity in (*self._publishers, *self._bundles, *self._receivers):
             entity.close()
         self._publishers, self._bundles, self._receivers = [], [], []
-

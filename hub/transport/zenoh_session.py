@@ -13,18 +13,30 @@ from schemas.errors import ConnectError
 __all__ = ["LEASE_MS", "open_session"]
 
 LEASE_MS = 10_000
-"""A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a busy machine may stand for seconds."""
+"""A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a
+busy machine may stand for seconds.
+"""
 
 
 _EVENT_BATCHES = 16
-"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures. With its default, two, the second picture of a stereo pair was dropped now and
-then while the first one was on its way."""
+"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures.
+
+With its default, two, the second picture of a stereo pair was dropped now and then while the first one was on
+its way.
+"""
 
 
-def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str] = (), security: Mapping[str, Any] | None = None) -> zenoh.Session:
+def open_session(
+    mode: str,
+    *,
+    listen: Sequence[str] = (),
+    connect: Sequence[str] = (),
+    security: Mapping[str, Any] | None = None,
+) -> zenoh.Session:
     """Open a Zenoh session that scouts for nobody: it listens and connects where it is told to.
 
-    `security`: Zenoh's settings of TLS and of access, as `hub.security.credentials` and `hub.security.access` make them.
+    `security`: Zenoh's settings of TLS and of access, as `hub.security.credentials` and `hub.security.access`
+    make them.
 
     Raises ConnectError if an endpoint cannot be opened or reached.
     """
@@ -48,4 +60,3 @@ def open_session(mode: str, *, listen: Sequence[str] = (), connect: Sequence[str
     except zenoh.ZError as error:
         where = f"listen on {', '.join(listen)}" if listen else f"reach {', '.join(connect)}"
         raise ConnectError(f"cannot {where}: {error}") from error
-

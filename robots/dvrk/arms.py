@@ -23,7 +23,8 @@ def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
 
     Args:
         arm: one of `ARMS`.
-        tool: name or number of the instrument of a PSM (a large needle driver 400006 unless given), endoscope of the ECM
+        tool: name or number of the instrument of a PSM (a large needle driver 400006 unless given), endoscope
+        of the ECM
             (straight unless given); nothing for the others.
 
     Raises:

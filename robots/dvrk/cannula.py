@@ -1,9 +1,11 @@
-"""How far an instrument or endoscope must be in before its tip may be commanded: past its cannula, and away from the remote centre (RCM).
+"""How far an instrument or endoscope must be in before its tip may be commanded: past its cannula, and away
+from the remote centre (RCM).
 
-Near the RCM a small motion of the tip asks for a large one of the joints, and in the cannula there is no room for it. Source: SAW =
-jhu-dvrk/sawIntuitiveResearchKit. For a PSM it is about the distance of the end of its shaft from the RCM, where roll and wrist meet
-(mtsIntuitiveResearchKitPSM.cpp, is_safe_for_cartesian_control and InverseKinematics; numbers in mtsIntuitiveResearchKit.h), for the ECM
-about its insertion (mtsIntuitiveResearchKitECM.h and .cpp). SI units.
+Near the RCM a small motion of the tip asks for a large one of the joints, and in the cannula there is no room
+for it. Source: SAW = jhu-dvrk/sawIntuitiveResearchKit. For a PSM it is about the distance of the end of its
+shaft from the RCM, where roll and wrist meet (mtsIntuitiveResearchKitPSM.cpp, is_safe_for_cartesian_control
+and InverseKinematics; numbers in mtsIntuitiveResearchKit.h), for the ECM about its insertion
+(mtsIntuitiveResearchKitECM.h and .cpp). SI units.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ from schemas.vectors import Vector
 __all__ = ["Cannula"]
 
 _PSM_SAFE, _PSM_BUFFER = 0.045, 0.002
-"""m: nearest goal, and by how much nearer Cartesian control may begin (SafeDistanceFromRCM, SafeDistanceFromRCMBuffer)."""
+"""m: nearest goal, and by how much nearer Cartesian control may begin (SafeDistanceFromRCM,
+SafeDistanceFromRCMBuffer).
+"""
 _ECM_SAFE, _ECM_START = 0.040, 0.050
 """m: nearest goal, and insertion beyond which Cartesian control may begin."""
 _ROUNDING = 1e-6
@@ -45,7 +49,9 @@ class Cannula:
         insertion, roll = chain.joints[_INSERTION : _INSERTION + 2]
         if chain.joints == ecm.JOINTS:
             return cls("the endoscope's insertion", 0.0, _ECM_START, _ECM_SAFE)
-        return cls("the end of the instrument's shaft", insertion.d + roll.d, _PSM_SAFE - _PSM_BUFFER, _PSM_SAFE)
+        return cls(
+            "the end of the instrument's shaft", insertion.d + roll.d, _PSM_SAFE - _PSM_BUFFER, _PSM_SAFE
+        )
 
     def depth(self, q: Vector) -> float:
         """Return the depth at joint positions `q`, shape (n,)."""
@@ -55,10 +61,17 @@ class Cannula:
         """Return why Cartesian control cannot begin at `q`, shape (n,); empty if it can."""
         if (depth := self.depth(q)) >= self.start:
             return ""
-        return f"{self.what} is {depth:.4g} m past the remote centre, allowed from {self.start:g} on; insert it in joint space first"
+        return (
+            f"{self.what} is {depth:.4g} m past the remote centre, allowed from {self.start:g} on; insert it"
+            " in joint space first"
+        )
 
     def check(self, goal: Vector, q: Vector) -> None:
-        """Raise MotionError if `goal`, shape (n,), is nearer to the remote centre than is safe and than `q`, where the arm is."""
+        """Raise MotionError if `goal`, shape (n,), is nearer to the remote centre than is safe and than `q`,
+        where the arm is.
+        """
         depth = self.depth(goal)
         if depth < self.safe and depth < self.depth(q) - _ROUNDING:
-            raise MotionError(f"{self.what} would be {depth:.4g} m past the remote centre, allowed from {self.safe:g} on")
+            raise MotionError(
+                f"{self.what} would be {depth:.4g} m past the remote centre, allowed from {self.safe:g} on"
+            )

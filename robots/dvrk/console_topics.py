@@ -1,7 +1,8 @@
-"""What the dVRK's console, its system and its teleoperation components say and hear: names of topics without those of their parts, and ROS 2 types.
+"""What the dVRK's console, its system and its teleoperation components say and hear: names of topics without
+those of their parts, and ROS 2 types.
 
-Source: jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp); pedals as jhu-dvrk/dvrk-readthedocs (53699e4d) names them,
-and the head sensor.
+Source: jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp); pedals as
+jhu-dvrk/dvrk-readthedocs (53699e4d) names them, and the head sensor.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ class Topics:
     heard: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
-PEDALS = Topics(dict.fromkeys(("clutch", "camera", "cam_minus", "cam_plus", "bicoag", "coag", "operatorpresent"), BUTTON))
+PEDALS = Topics(
+    dict.fromkeys(("clutch", "camera", "cam_minus", "cam_plus", "bicoag", "coag", "operatorpresent"), BUTTON)
+)
 
 SYSTEM = Topics(
     told={"volume": _FLOAT},

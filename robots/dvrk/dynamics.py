@@ -1,9 +1,11 @@
-"""Joint-space dynamics of an arm: inertia matrix and gravity, from its kinematics, its linkage and the masses of its bodies.
+"""Joint-space dynamics of an arm: inertia matrix and gravity, from its kinematics, its linkage and the masses
+of its bodies.
 
-Every body moves as a rigid displacement D(q) from where it is with every joint at 0. With the pseudo-inertia J of the body
-(integral of r r^T over its mass, r homogeneous, in the base frame there) the inertia matrix is M_ij = sum trace(D_i J D_j^T) and the
-effort of gravity G_i = -sum g^T D_i J e4, D_i being the derivative by q_i (Uicker's form of Lagrange's equations; Siciliano et
-al., Robotics, section 7.1). The linkage's bodies follow the joints, so that all is a function of the independent joints.
+Every body moves as a rigid displacement D(q) from where it is with every joint at 0. With the pseudo-inertia
+J of the body (integral of r r^T over its mass, r homogeneous, in the base frame there) the inertia matrix is
+M_ij = sum trace(D_i J D_j^T) and the effort of gravity G_i = -sum g^T D_i J e4, D_i being the derivative by
+q_i (Uicker's form of Lagrange's equations; Siciliano et al., Robotics, section 7.1). The linkage's bodies
+follow the joints, so that all is a function of the independent joints.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ STANDARD_GRAVITY = 9.81
 
 
 class _Motion(NamedTuple):
-    """How a body moves against its parent: `ratio` times joint `joint` along `twist`, shape (4, 4), in the base frame at q = 0."""
+    """How a body moves against its parent: `ratio` times joint `joint` along `twist`, shape (4, 4), in the
+    base frame at q = 0.
+    """
 
     parent: int
     joint: int
@@ -39,7 +43,9 @@ class _Motion(NamedTuple):
 class Dynamics:
     """The dynamics of one arm over its n independent joints."""
 
-    def __init__(self, chain: SerialChain, bars: Linkage, bodies: Mapping[str, Inertia], rotors: Vector) -> None:
+    def __init__(
+        self, chain: SerialChain, bars: Linkage, bodies: Mapping[str, Inertia], rotors: Vector
+    ) -> None:
         """Take kinematics, linkage, bodies by link, and the inertia of the drives at the joints, shape (n,).
 
         A body that is neither a joint's nor the linkage's (a finger of the jaw) moves with the last link.
@@ -59,7 +65,8 @@ class Dynamics:
         self._pseudo = np.array([body.pseudo_inertia for body in bodies.values()])  # (bodies, 4, 4)
 
     def displacements(self, q: Vector) -> Vector:
-        """Return the derivatives by the joints of the bodies' displacements, shape (bodies, n, 4, 4), bodies in the order they were given.
+        """Return the derivatives by the joints of the bodies' displacements, shape (bodies, n, 4, 4), bodies
+        in the order they were given.
 
         Raises MotionError if `q` is not n finite numbers.
         """
@@ -85,7 +92,8 @@ class Dynamics:
 
         Args:
             q: joint positions, shape (n,).
-            acceleration: of gravity in the base frame, m/s^2, shape (3,); along -z, for an upright base, unless given. On a base
+            acceleration: of gravity in the base frame, m/s^2, shape (3,); along -z, for an upright base,
+            unless given. On a base
                 turned by R against the world it is R^T (0, 0, -9.81).
         """
         pull = np.array([0.0, 0.0, -STANDARD_GRAVITY]) if acceleration is None else acceleration
@@ -124,7 +132,9 @@ def _twist(axis: Vector, point: Vector, is_revolute: bool) -> Vector:
 
 
 def _exponential(twist: Vector, q: float, is_revolute: bool) -> Vector:
-    """Return exp(q twist): for a rotation 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q T."""
+    """Return exp(q twist): for a rotation 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q
+    T.
+    """
     if not is_revolute:
         return np.eye(4) + q * twist
     return np.eye(4) + np.sin(q) * twist + (1.0 - np.cos(q)) * twist @ twist

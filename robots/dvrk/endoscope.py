@@ -1,8 +1,9 @@
-"""The stereo endoscope: the numbers of its cameras, and where they look from the end of the endoscope camera manipulator.
+"""The stereo endoscope: the numbers of its cameras, and where they look from the end of the endoscope camera
+manipulator.
 
-Pictures are described in the optical frame of REP 103: z ahead, x to the right, y down; pixel (0, 0) is the middle of the upper
-left pixel, so the middle of the picture is at ((width - 1) / 2, (height - 1) / 2). Sources that differ, and why these were chosen:
-docs/decisions/0013. SI units, radians.
+Pictures are described in the optical frame of REP 103: z ahead, x to the right, y down; pixel (0, 0) is the
+middle of the upper left pixel, so the middle of the picture is at ((width - 1) / 2, (height - 1) / 2).
+Sources that differ, and why these were chosen: docs/decisions/0013. SI units, radians.
 """
 
 from __future__ import annotations
@@ -16,7 +17,18 @@ import numpy as np
 from robots.dvrk.ecm import Endoscope, tip
 from schemas.vectors import Vector
 
-__all__ = ["BASELINE", "EYES", "FAR", "FIELD_OF_VIEW", "HEIGHT", "NEAR", "WIDTH", "Eye", "StereoCamera", "optical_in_roll"]
+__all__ = [
+    "BASELINE",
+    "EYES",
+    "FAR",
+    "FIELD_OF_VIEW",
+    "HEIGHT",
+    "NEAR",
+    "WIDTH",
+    "Eye",
+    "StereoCamera",
+    "optical_in_roll",
+]
 
 Eye = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
@@ -26,7 +38,8 @@ WIDTH, HEIGHT = 320, 288
 FIELD_OF_VIEW = radians(60.0)
 """Horizontal (unina-icaros/dvrk-vrep, vision sensors of the ECM)."""
 BASELINE = 5.06e-3
-"""Distance of the two cameras, m (same source: 5.00 mm sideways, 0.24 mm and 0.73 mm along the other axes)."""
+"""Distance of the two cameras, m (same source: 5.00 mm sideways, 0.24 mm and 0.73 mm along the other axes).
+"""
 NEAR, FAR = 0.01, 2.0
 """Distances between which the cameras see, m (same source)."""
 
@@ -53,13 +66,16 @@ class StereoCamera:
         return np.array([[f, 0.0, (self.width - 1) / 2], [0.0, f, (self.height - 1) / 2], [0.0, 0.0, 1.0]])
 
     def projection(self, eye: Eye) -> Vector:
-        """Return the matrix P that takes points in the left camera's optical frame to pixels of `eye`, shape (3, 4)."""
+        """Return the matrix P that takes points in the left camera's optical frame to pixels of `eye`, shape
+        (3, 4).
+        """
         shift = -self.focal_length * self.baseline if eye == "right" else 0.0
         return np.column_stack([self.intrinsics(), [shift, 0.0, 0.0]])
 
 
 def optical_in_roll(endoscope: Endoscope) -> Vector:
-    """Return the optical frame midway between the two cameras, in the frame of the ECM's roll link, shape (4, 4).
+    """Return the optical frame midway between the two cameras, in the frame of the ECM's roll link, shape (4,
+    4).
 
     The left camera's frame is half the baseline along -x of it, the right one's half along x.
     """

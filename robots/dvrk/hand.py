@@ -1,15 +1,18 @@
 """A hand of under-actuated fingers at the end of a shaft: geometry, tendons and kinematics.
 
-Two motors drive the three joints of a finger. One sets the *spread* s (rad), where the spring in the first joint is at rest. The other winds a tendon up that
-runs over a pulley in every joint and closes the phalanges against springs: how far each goes is decided by springs and by what it meets, and a
-phalanx that is blocked lets the others go on. At the tension T of the tendon, joint i with pulley r_i and spring k_i (at rest at
+Two motors drive the three joints of a finger. One sets the *spread* s (rad), where the spring in the first
+joint is at rest. The other winds a tendon up that runs over a pulley in every joint and closes the phalanges
+against springs: how far each goes is decided by springs and by what it meets, and a phalanx that is blocked
+lets the others go on. At the tension T of the tendon, joint i with pulley r_i and spring k_i (at rest at
 q_i0, s for the first one) stands, unloaded, at q_i = q_i0 + r_i T / k_i, inside its stops.
 
-The *closing* u (rad) of a finger is the length of tendon wound up, over the radius of the first pulley: u = sum r_i q_i / r_1; the
-tendon slackens where less is wound up than the springs leave over. At spread 0 and closing 0 the fingers are straight along the shaft.
-A *command* of the hand has the closings of all fingers, then their spreads.
+The *closing* u (rad) of a finger is the length of tendon wound up, over the radius of the first pulley: u =
+sum r_i q_i / r_1; the tendon slackens where less is wound up than the springs leave over. At spread 0 and
+closing 0 the fingers are straight along the shaft. A *command* of the hand has the closings of all fingers,
+then their spreads.
 
-The hand's frame is that of the link that rolls: z along the shaft to the fingertips, origin where the shaft ends. SI units, radians.
+The hand's frame is that of the link that rolls: z along the shaft to the fingertips, origin where the shaft
+ends. SI units, radians.
 """
 
 from __future__ import annotations
@@ -46,14 +49,19 @@ class Phalanx:
     stiffness: float
     """Of the spring, N m/rad."""
     rest: float
-    """Where the spring would be at rest, rad; below `lower` it presses the joint to its stop. Of the first phalanx: with the spread at 0."""
+    """Where the spring would be at rest, rad; below `lower` it presses the joint to its stop.
+
+    Of the first phalanx: with the spread at 0.
+    """
     contact: float
     """Of the contact sphere's centre along the phalanx, share of its length."""
 
 
 @dataclass(frozen=True)
 class HandLink:
-    """A phalanx of one finger, as a body: its frame has z along the joint's axis, x along the phalanx, y to the side that closes."""
+    """A phalanx of one finger, as a body: its frame has z along the joint's axis, x along the phalanx, y to
+    the side that closes.
+    """
 
     name: str
     parent: str
@@ -64,7 +72,9 @@ class HandLink:
 
 @dataclass(frozen=True)
 class Mode:
-    """An actuation pattern: the commands (rad) of the hand, between which one number from 0 (open) to 1 (closed) goes straight."""
+    """An actuation pattern: the commands (rad) of the hand, between which one number from 0 (open) to 1
+    (closed) goes straight.
+    """
 
     open: tuple[float, ...]
     closed: tuple[float, ...]
@@ -87,7 +97,8 @@ class Hand:
     density: float
     """Of the phalanges, round bars, kg/m^3."""
     effort: float
-    """Largest torque of a motor, of a tendon's at the first pulley, N m: that one pulls, and pushes nothing."""
+    """Largest torque of a motor, of a tendon's at the first pulley, N m: that one pulls, and pushes nothing.
+    """
     velocity: float
     """Largest velocity of a closing or spread, rad/s."""
     acceleration: float
@@ -125,13 +136,23 @@ class Hand:
         first, ratios = self.phalanges[0], self._pulleys / self._pulleys[0]
         limits = (self.velocity, self.effort, self.acceleration, self.jerk)
         most = float(ratios @ [phalanx.upper for phalanx in self.phalanges])
-        ranges = [(name, first.lower, most) for name in self.fingers] + [(name, first.lower, first.upper) for name in self.spreads]
-        return tuple(Joint(name, "revolute", 0.0, 0.0, 0.0, 0.0, lower, upper, *limits) for name, lower, upper in ranges)
+        ranges = [(name, first.lower, most) for name in self.fingers] + [
+            (name, first.lower, first.upper) for name in self.spreads
+        ]
+        return tuple(
+            Joint(name, "revolute", 0.0, 0.0, 0.0, 0.0, lower, upper, *limits)
+            for name, lower, upper in ranges
+        )
 
     @cached_property
     def spheres(self) -> tuple[ContactSphere, ...]:
         """One contact sphere on each phalanx, in the order of `links`."""
-        return tuple(ContactSphere(link.name, link.name, (link.phalanx.contact * link.phalanx.length, 0.0, 0.0), self.radius) for link in self.links)
+        return tuple(
+            ContactSphere(
+                link.name, link.name, (link.phalanx.contact * link.phalanx.length, 0.0, 0.0), self.radius
+            )
+            for link in self.links
+        )
 
     @property
     def reach(self) -> float:
@@ -141,22 +162,30 @@ class Hand:
     @cached_property
     def masses(self) -> Vector:
         """Masses of the phalanges of a finger, kg, shape (phalanges,)."""
-        return np.array([self.density * np.pi * self.radius**2 * phalanx.length for phalanx in self.phalanges])
+        return np.array(
+            [self.density * np.pi * self.radius**2 * phalanx.length for phalanx in self.phalanges]
+        )
 
     @cached_property
     def damping(self) -> Vector:
         """Viscous friction of the joints of a finger, N m s/rad, shape (phalanges,).
 
-        That which damps a spring critically with all that is beyond its joint, straight: 2 sqrt(k I), I = sum m (l^2 / 12 + d^2).
+        That which damps a spring critically with all that is beyond its joint, straight: 2 sqrt(k I), I = sum
+        m (l^2 / 12 + d^2).
         """
         lengths = np.array([phalanx.length for phalanx in self.phalanges])
         starts = np.cumsum(lengths) - lengths
         away = np.maximum((starts + lengths / 2.0) - starts[:, None], 0.0)  # (joint, phalanx)
-        inertia = (np.triu(np.ones((len(lengths), len(lengths)))) * self.masses * (lengths**2 / 12.0 + away**2)).sum(axis=1)
+        inertia = (
+            np.triu(np.ones((len(lengths), len(lengths)))) * self.masses * (lengths**2 / 12.0 + away**2)
+        ).sum(axis=1)
         return 2.0 * np.sqrt(np.array([phalanx.stiffness for phalanx in self.phalanges]) * inertia)
 
     def command(self, mode: str, closing: float) -> Vector:
-        """Return the command (rad), shape (2 fingers,), of a mode closed by `closing`, 0 to 1. Raises MotionError."""
+        """Return the command (rad), shape (2 fingers,), of a mode closed by `closing`, 0 to 1.
+
+        Raises MotionError.
+        """
         pattern = self.modes.get(mode)
         if pattern is None:
             raise MotionError(f"no mode '{mode}'.{did_you_mean(mode, self.modes)}")
@@ -166,15 +195,27 @@ class Hand:
         return start + closing * (end - start)
 
     def unloaded(self, command: Vector) -> Vector:
-        """Return the joint positions (rad), shape (fingers, phalanges), of fingers that touch nothing, at a command, shape (2 fingers,)."""
+        """Return the joint positions (rad), shape (fingers, phalanges), of fingers that touch nothing, at a
+        command, shape (2 fingers,).
+        """
         closings, spreads = command.reshape(2, -1).tolist()
-        return np.array([self._positions(self.tension(u, s), s) for u, s in zip(closings, spreads, strict=True)])
+        return np.array(
+            [self._positions(self.tension(u, s), s) for u, s in zip(closings, spreads, strict=True)]
+        )
 
     def tension(self, closing: float, spread: float) -> float:
         """Return the tension (N) of the tendon of a finger that touches nothing; 0 where it is slack."""
-        stops = [p.stiffness * (stop - rest) / p.pulley for p, rest in zip(self.phalanges, self._rest(spread), strict=True) for stop in (p.lower, p.upper)]
-        tensions = sorted({0.0, *(stop for stop in stops if stop > 0.0)})  # between these all moves in proportion
-        closings = [float(self._positions(tension, spread) @ self._pulleys) / float(self._pulleys[0]) for tension in tensions]
+        stops = [
+            p.stiffness * (stop - rest) / p.pulley
+            for p, rest in zip(self.phalanges, self._rest(spread), strict=True)
+            for stop in (p.lower, p.upper)
+        ]
+        # between these all moves in proportion
+        tensions = sorted({0.0, *(stop for stop in stops if stop > 0.0)})
+        closings = [
+            float(self._positions(tension, spread) @ self._pulleys) / float(self._pulleys[0])
+            for tension in tensions
+        ]
         return float(np.interp(closing, closings, tensions))
 
     def closing_for(self, positions: Vector) -> float:
@@ -182,7 +223,8 @@ class Hand:
         return float(positions @ self._pulleys / self._pulleys[0])
 
     def contacts(self, positions: Vector) -> Vector:
-        """Return the centres of the contact spheres in the hand's frame (m), shape (..., fingers, phalanges, 3).
+        """Return the centres of the contact spheres in the hand's frame (m), shape (..., fingers, phalanges,
+        3).
 
         Args:
             positions: of the joints, rad, shape (..., fingers, phalanges).
@@ -190,7 +232,8 @@ class Hand:
         angles = np.cumsum(positions, axis=-1)
         lengths = np.array([phalanx.length for phalanx in self.phalanges])
         shares = np.array([phalanx.contact for phalanx in self.phalanges])
-        ways = np.stack([np.cos(angles), np.sin(angles)], axis=-1) * lengths[:, None]  # along the shaft and towards its axis, (..., 2)
+        # along the shaft and towards its axis, (..., 2)
+        ways = np.stack([np.cos(angles), np.sin(angles)], axis=-1) * lengths[:, None]
         along, inwards = np.moveaxis(np.cumsum(ways, axis=-2) - (1.0 - shares)[:, None] * ways, -1, 0)
         radial = self.offset - inwards
         azimuths = np.array(self.azimuths)[:, None]
@@ -205,6 +248,8 @@ class Hand:
         return [first.rest + spread, *(phalanx.rest for phalanx in others)]
 
     def _positions(self, tension: float, spread: float) -> Vector:
-        """Return the unloaded joint positions of a finger, shape (phalanges,), at a tension (N) and a spread (rad)."""
+        """Return the unloaded joint positions of a finger, shape (phalanges,), at a tension (N) and a spread
+        (rad).
+        """
         slope, lower, upper = np.array([(p.pulley / p.stiffness, p.lower, p.upper) for p in self.phalanges]).T
         return np.clip(self._rest(spread) + slope * tension, lower, upper)

@@ -1,13 +1,16 @@
-"""Kinematics of a curved needle between the pads of a rolling needle driver: the arm's six joints and the roll of the needle.
+"""Kinematics of a curved needle between the pads of a rolling needle driver: the arm's six joints and the
+roll of the needle.
 
-The needle is held with its tangent along the wrist yaw axis, its tip to the side of the tip frame's +x. With the roller at 0 its arc goes out ahead of the
-jaw; at -90 degrees its plane is across the jaw, so that a turn to the right (clockwise, seen along the shaft) drives it on: forehand; at +90
-degrees it is across the other way: backhand. Its own frame has the origin in the arc's centre, x to the middle of the wire and z normal to its
-plane, so that a turn about z drives it on.
+The needle is held with its tangent along the wrist yaw axis, its tip to the side of the tip frame's +x. With
+the roller at 0 its arc goes out ahead of the jaw; at -90 degrees its plane is across the jaw, so that a turn
+to the right (clockwise, seen along the shaft) drives it on: forehand; at +90 degrees it is across the other
+way: backhand. Its own frame has the origin in the arc's centre, x to the middle of the wire and z normal to
+its plane, so that a turn about z drives it on.
 
-Seven joints for six coordinates: of the rolls on a lattice over the range, that is taken from which the joints are farthest from their limits,
-as the sum of ((q - middle) / half range)^2 counts it (Liegeois, "Automatic supervisory control of the configuration and behavior of
-multibody mechanisms", IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
+Seven joints for six coordinates: of the rolls on a lattice over the range, that is taken from which the
+joints are farthest from their limits, as the sum of ((q - middle) / half range)^2 counts it (Liegeois,
+"Automatic supervisory control of the configuration and behavior of multibody mechanisms", IEEE Transactions
+on Systems, Man, and Cybernetics 7(12), 1977).
 """
 
 from __future__ import annotations
@@ -42,7 +45,8 @@ class Needle:
 
 
 def chain(tool: Instrument, needle: Needle, held: float) -> SerialChain:
-    """Return the kinematics from `<arm>_base` to the frame of `needle`, held at the angle `held` (rad) behind its tip, along seven joints.
+    """Return the kinematics from `<arm>_base` to the frame of `needle`, held at the angle `held` (rad) behind
+    its tip, along seven joints.
 
     Raises MotionError if `tool` has no roller or the needle does not reach so far.
     """
@@ -54,9 +58,13 @@ def chain(tool: Instrument, needle: Needle, held: float) -> SerialChain:
     wrist = replace(arm[-1], theta=arm[-1].theta + pi / 2.0)  # x ahead, along the fingers
     roll = replace(tool.roller.joint, alpha=pi, a=tool.roller.distance)
     along = needle.arc / 2.0 - held
-    radial, tangent = np.array([np.cos(along), np.sin(along), 0.0]), np.array([-np.sin(along), np.cos(along), 0.0])
+    radial, tangent = (
+        np.array([np.cos(along), np.sin(along), 0.0]),
+        np.array([-np.sin(along), np.cos(along), 0.0]),
+    )
     tip = np.eye(4)
-    tip[:3, :3] = np.array([-radial, [0.0, 0.0, 1.0], tangent])  # the roll's x to the arc's centre, y normal to its plane, z along the wire
+    # the roll's x to the arc's centre, y normal to its plane, z along the wire
+    tip[:3, :3] = np.array([-radial, [0.0, 0.0, 1.0], tangent])
     tip[:3, 3] = tip[:3, :3] @ (-needle.radius * radial)
     return SerialChain([*arm[:-1], wrist, roll], tip)
 
@@ -69,7 +77,8 @@ def rolls(seven: SerialChain) -> Vector:
 
 
 def solutions(tool: Instrument, seven: SerialChain, pose: Vector, roll: Vector) -> Vector:
-    """Return the arm's joint positions, shape (4, ..., m, 6), at which the needle has `pose`, shape (..., 4, 4), with each `roll`, shape (m,).
+    """Return the arm's joint positions, shape (4, ..., m, 6), at which the needle has `pose`, shape (..., 4,
+    4), with each `roll`, shape (m,).
 
     In range or not, one set for each branch of `robots.dvrk.inverse.branches`.
     """
@@ -87,7 +96,8 @@ def solutions(tool: Instrument, seven: SerialChain, pose: Vector, roll: Vector) 
 
 
 def inverse(tool: Instrument, seven: SerialChain, pose: Vector) -> Vector:
-    """Return joint positions, shape (..., 7), in range, at which the needle has `pose`, shape (..., 4, 4), by the criterion of this module.
+    """Return joint positions, shape (..., 7), in range, at which the needle has `pose`, shape (..., 4, 4), by
+    the criterion of this module.
 
     Raises MotionError if a pose is not reachable with any roll.
     """
@@ -99,5 +109,8 @@ def inverse(tool: Instrument, seven: SerialChain, pose: Vector) -> Vector:
     away = (q - middle) / half
     cost = np.where((np.abs(away) <= 1.0).all(axis=-1), (away**2).sum(axis=-1), np.inf)  # (..., 4 m)
     if not np.isfinite(cost.min(axis=-1)).all():
-        raise MotionError(f"the needle cannot be brought there: with none of {len(lattice)} rolls all joints of the arm are in range")
+        raise MotionError(
+            f"the needle cannot be brought there: with none of {len(lattice)} rolls all joints of the arm are"
+            " in range"
+        )
     return np.take_along_axis(q, cost.argmin(axis=-1)[..., None, None], axis=-2)[..., 0, :]

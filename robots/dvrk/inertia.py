@@ -1,11 +1,12 @@
 """Masses, centres and inertia tensors of the bodies of PSM, ECM and instruments.
 
-PSM: the bodies of the arm are fitted so that the arm has the identified dynamics (`robots.dvrk.identified`) with an instrument
-mounted; `bench/identified_inertia.py` makes the numbers in `data/psm_inertia.json`. ECM: masses and centres from CAD, not
-identified; dvrk_env = WPI-AIM/dvrk_env (commit 675a3fa), dvrk_description/ecm/ecm.urdf.xacro. See docs/decisions/0010.
+PSM: the bodies of the arm are fitted so that the arm has the identified dynamics (`robots.dvrk.identified`)
+with an instrument mounted; `bench/identified_inertia.py` makes the numbers in `data/psm_inertia.json`. ECM:
+masses and centres from CAD, not identified; dvrk_env = WPI-AIM/dvrk_env (commit 675a3fa),
+dvrk_description/ecm/ecm.urdf.xacro. See docs/decisions/0010.
 
-SI units. All bodies of an arm stand in its base frame (origin in the remote centre of motion) with every joint at 0,
-insertion included.
+SI units. All bodies of an arm stand in its base frame (origin in the remote centre of motion) with every
+joint at 0, insertion included.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class Inertia:
 
     @classmethod
     def of_rod(cls, mass: float, start: Vector, end: Vector, radius: float) -> Inertia:
-        """Return that of a thin tube from `start` to `end` (m), shape (3,); of a ring without direction where these are one point."""
+        """Return that of a thin tube from `start` to `end` (m), shape (3,); of a ring without direction where
+        these are one point.
+        """
         along = np.outer(end - start, end - start)
         length_squared = np.trace(along)
         axis = along / (length_squared or 1.0)
@@ -55,9 +58,15 @@ class Inertia:
 
     @property
     def pseudo_inertia(self) -> Vector:
-        """Integral of r r^T over the mass, r = (x, y, z, 1), shape (4, 4): positive definite if and only if a body can have this inertia."""
+        """Integral of r r^T over the mass, r = (x, y, z, 1), shape (4, 4): positive definite if and only if a
+        body can have this inertia.
+        """
         result = np.empty((4, 4))
-        result[:3, :3] = np.trace(self.tensor) / 2.0 * np.eye(3) - self.tensor + self.mass * np.outer(self.centre, self.centre)
+        result[:3, :3] = (
+            np.trace(self.tensor) / 2.0 * np.eye(3)
+            - self.tensor
+            + self.mass * np.outer(self.centre, self.centre)
+        )
         result[:3, 3] = result[3, :3] = self.mass * self.centre
         result[3, 3] = self.mass
         return result
@@ -66,17 +75,23 @@ class Inertia:
 SHAFT_MASS = 0.0117201
 """kg of an instrument's shaft, as modelled in unina-icaros/dvrk-vrep (body L1_respondable_TOOL1)."""
 _YAW_LINK_MASS = 6.63661e-6
-"""kg of what turns with the wrist yaw beside the fingers (dvrk_env tool_lnd.urdf.xacro, CAD of the large needle driver, for all)."""
+"""kg of what turns with the wrist yaw beside the fingers (dvrk_env tool_lnd.urdf.xacro, CAD of the large
+needle driver, for all).
+"""
 _FINGER_MASS = 3.90696e-5
 """kg of one finger (same file)."""
 
 PROBE_RADIUS = 5e-3
 """m, of the sphere of a palpation probe unless a scene says otherwise."""
 
-ENDOSCOPE_MASS: Mapping[str, float] = MappingProxyType({"Classic_SD": 1.5, "Classic_HD": 2.5, "Si_HD": 1.8, "Custom": 0.8, "none": 0.1})
+ENDOSCOPE_MASS: Mapping[str, float] = MappingProxyType(
+    {"Classic_SD": 1.5, "Classic_HD": 2.5, "Si_HD": 1.8, "Custom": 0.8, "none": 0.1}
+)
 """kg, with its camera head (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitEndoscopeTypes.cdg)."""
 _ENDOSCOPE_CENTRE = -0.1
-"""Of an endoscope along the insertion axis in the frame of the insertion link, m (same project, share/kinematic/ECM.json, cz)."""
+"""Of an endoscope along the insertion axis in the frame of the insertion link, m (same project,
+share/kinematic/ECM.json, cz).
+"""
 _ENDOSCOPE_LENGTH, _ENDOSCOPE_RADIUS = 0.603, 0.035
 """m, with camera head: bounds of ECM_tool.stl (jhu-dvrk/dvrk_model)."""
 
@@ -89,18 +104,27 @@ def psm(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[str, In
 @cache
 def _arm_of_psm() -> Mapping[str, Inertia]:
     data = json.loads(files("robots.dvrk").joinpath("data/psm_inertia.json").read_text(encoding="utf-8"))
-    return {name: Inertia(row["mass"], np.array(row["centre"]), np.array(row["tensor"])) for name, row in data["bodies"].items()}
+    return {
+        name: Inertia(row["mass"], np.array(row["centre"]), np.array(row["tensor"]))
+        for name, row in data["bodies"].items()
+    }
 
 
 def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[str, Inertia]:
-    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe; or shaft and phalanges (straight)."""
+    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe; or
+    shaft and phalanges (straight).
+    """
     chain = psm_chain(tool)
     frames = chain.frames(np.zeros(len(chain.joints)))
     origins, ahead = frames[:-1, :3, 3], frames[-1, :3, 2]  # (n, 3), (3,)
     first = len(chain.joints) - len(tool.joints)
-    bodies = {"roll": Inertia.of_rod(tool.roll_mass + SHAFT_MASS, origins[first - 1], origins[first], SHAFT_RADIUS)}
+    bodies = {
+        "roll": Inertia.of_rod(tool.roll_mass + SHAFT_MASS, origins[first - 1], origins[first], SHAFT_RADIUS)
+    }
     for i in range(first + 1, len(chain.joints) - 1):
-        bodies[chain.joints[i].name] = Inertia.of_rod(tool.pitch_mass, origins[i], origins[i + 1], WRIST_RADIUS)
+        bodies[chain.joints[i].name] = Inertia.of_rod(
+            tool.pitch_mass, origins[i], origins[i + 1], WRIST_RADIUS
+        )
     if tool.hand is not None:
         return {**bodies, **_hand(tool.hand, frames[-2])}
     last, end = chain.joints[-1].name, origins[-1]
@@ -113,7 +137,9 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
 
 
 def _pads(tool: Instrument, end: Vector, ahead: Vector, axis: Vector) -> Mapping[str, Inertia]:
-    """Return the pads of a roller, of steel; the wrist yaw axis passes `end` along `axis`, which like `ahead` is one of the base frame's, shape (3,)."""
+    """Return the pads of a roller, of steel; the wrist yaw axis passes `end` along `axis`, which like `ahead`
+    is one of the base frame's, shape (3,).
+    """
     if tool.roller is None:
         return {}
     along, across, thickness = tool.roller.size
@@ -121,7 +147,9 @@ def _pads(tool: Instrument, end: Vector, ahead: Vector, axis: Vector) -> Mapping
     size = np.abs(along * ahead + across * axis + thickness * side)
     middle = end + tool.roller.distance * ahead
     return {
-        pad: Inertia.of_box(STEEL_DENSITY * along * across * thickness, middle + way * thickness / 2.0 * side, size)
+        pad: Inertia.of_box(
+            STEEL_DENSITY * along * across * thickness, middle + way * thickness / 2.0 * side, size
+        )
         for pad, way in zip(PADS, (1.0, -1.0), strict=True)
     }
 
@@ -131,7 +159,9 @@ def _hand(hand: Hand, shaft: Vector) -> Mapping[str, Inertia]:
     bodies: dict[str, Inertia] = {}
     for link, mass in zip(hand.links, np.tile(hand.masses, len(hand.fingers)).tolist(), strict=True):
         pose = shaft @ link.pose
-        bodies[link.name] = Inertia.of_rod(mass, pose[:3, 3], pose[:3, 3] + link.phalanx.length * pose[:3, 0], hand.radius)
+        bodies[link.name] = Inertia.of_rod(
+            mass, pose[:3, 3], pose[:3, 3] + link.phalanx.length * pose[:3, 0], hand.radius
+        )
     return bodies
 
 
@@ -144,13 +174,18 @@ _ECM_CAD = {
     "pitch_bottom": (0.35928, (0.0, -0.2975, 0.3135), (0.050, 0.408, 0.074)),
     "pitch_top": (0.43851, (0.0, -0.2787, 0.3242), (0.012, 0.358, 0.018)),
 }
-"""By link: mass, centre (dvrk_env, CAD, carried from the link's frame to the base frame), and the size of its mesh (jhu-dvrk/dvrk_model,
-bounds): the tensors that the CAD exports are zero or no body's, so a uniform box of that size stands in."""
+"""By link: mass, centre (dvrk_env, CAD, carried from the link's frame to the base frame), and the size of its
+mesh (jhu-dvrk/dvrk_model, bounds): the tensors that the CAD exports are zero or no body's, so a uniform box
+of that size stands in.
+"""
 
 
 def ecm(endoscope_mass: float = ENDOSCOPE_MASS["Classic_SD"]) -> Mapping[str, Inertia]:
     """Return the bodies of the ECM by link, with an endoscope of this mass (kg) on the roll."""
-    bodies = {name: Inertia.of_box(mass, np.array(centre), np.array(size)) for name, (mass, centre, size) in _ECM_CAD.items()}
+    bodies = {
+        name: Inertia.of_box(mass, np.array(centre), np.array(size))
+        for name, (mass, centre, size) in _ECM_CAD.items()
+    }
     carriage = ecm_chain().frames(np.zeros(4))[2]  # (4, 4)
     middle = carriage[:3, 3] + _ENDOSCOPE_CENTRE * carriage[:3, 2]
     half = _ENDOSCOPE_LENGTH / 2.0 * carriage[:3, 2]

@@ -1,20 +1,22 @@
 """Closed-form inverse kinematics of the arms whose shaft passes a remote centre of motion (RCM): PSM and ECM.
 
-The shaft turns about the RCM, the base frame's origin, by yaw and pitch, slides by insertion and rolls. With d its direction and
-r the signed way from the RCM to the point where the wrist begins, all in the base frame:
+The shaft turns about the RCM, the base frame's origin, by yaw and pitch, slides by insertion and rolls. With
+d its direction and r the signed way from the RCM to the point where the wrist begins, all in the base frame:
 
-PSM. The wrist yaw axis z6 passes o6, both known from the goal. The wrist pitch axis z5 is perpendicular to z6 and to the shaft, and
-x5 points from it to the wrist yaw axis, a away. As the RCM lies on the shaft, the plane normal to z5 through the shaft holds RCM, o6
-and z6: so x5 is, up to its sign, the part of o6 perpendicular to z6, and o5 = o6 - a x5 = r d. Two signs of x5 and two of r: four
-branches. Where the yaw axis passes the RCM any x5 will do: the wrist yaw of `near` stays. Where the pitch axis passes it (insertion
-15.6 mm with the instruments of the Classic) any d perpendicular to z5 will do: the shaft stays as near to that of `near` as the
-wrist pitch allows.
+PSM. The wrist yaw axis z6 passes o6, both known from the goal. The wrist pitch axis z5 is perpendicular to z6
+and to the shaft, and x5 points from it to the wrist yaw axis, a away. As the RCM lies on the shaft, the plane
+normal to z5 through the shaft holds RCM, o6 and z6: so x5 is, up to its sign, the part of o6 perpendicular to
+z6, and o5 = o6 - a x5 = r d. Two signs of x5 and two of r: four branches. Where the yaw axis passes the RCM
+any x5 will do: the wrist yaw of `near` stays. Where the pitch axis passes it (insertion 15.6 mm with the
+instruments of the Classic) any d perpendicular to z5 will do: the shaft stays as near to that of `near` as
+the wrist pitch allows.
 
-ECM, and a PSM with a hand in place of the wrist. Four joints cannot take any pose. As on the real ECM the position decides yaw, pitch and
-insertion, and the roll is what comes nearest to the orientation asked for; what remains is accepted up to `ORIENTATION_TOLERANCE` and
-refused beyond.
+ECM, and a PSM with a hand in place of the wrist. Four joints cannot take any pose. As on the real ECM the
+position decides yaw, pitch and insertion, and the roll is what comes nearest to the orientation asked for;
+what remains is accepted up to `ORIENTATION_TOLERANCE` and refused beyond.
 
-Of the branches inside all joint ranges the one nearest to `near` is taken, by the time that each joint would need at its velocity limit.
+Of the branches inside all joint ranges the one nearest to `near` is taken, by the time that each joint would
+need at its velocity limit.
 """
 
 from __future__ import annotations
@@ -33,9 +35,12 @@ from schemas.vectors import Vector
 __all__ = ["ORIENTATION_TOLERANCE", "branches", "inverse"]
 
 ORIENTATION_TOLERANCE = radians(20.0)
-"""Between the ECM's goal and the nearest orientation at its position, rad. The real controller (jhu-dvrk/sawIntuitiveResearchKit,
-robManipulatorECM.cpp) has no bound. Below the 30 degrees by which endoscopes differ, so that a goal meant for another one is
-refused; above the 11 degrees that 20 mm sideways at a depth of 100 mm need, a step for which nobody should have to work out the orientation."""
+"""Between the ECM's goal and the nearest orientation at its position, rad.
+
+The real controller (jhu-dvrk/sawIntuitiveResearchKit, robManipulatorECM.cpp) has no bound. Below the 30
+degrees by which endoscopes differ, so that a goal meant for another one is refused; above the 11 degrees that
+20 mm sideways at a depth of 100 mm need, a step for which nobody should have to work out the orientation.
+"""
 
 _SLACK = 1e-9
 """rad and m by which rounding may carry a joint past its limit."""
@@ -48,7 +53,10 @@ _POINT = 1e-9
 _RCM_ROWS = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in psm.ARM_JOINTS)
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 _TURN = 2.0 * pi
-_BRANCH_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])[:, None, None], np.array([1.0, 1.0, -1.0, -1.0])[:, None, None]
+_BRANCH_SIGNS = (
+    np.array([1.0, -1.0, 1.0, -1.0])[:, None, None],
+    np.array([1.0, 1.0, -1.0, -1.0])[:, None, None],
+)
 """Of x5 and of the shaft's direction, in the four branches of a PSM."""
 _WRIST_ALPHAS = (0.0, -pi / 2, -pi / 2)
 
@@ -62,7 +70,8 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
         near: joint positions that decide between solutions, shape (n,) or (..., n).
 
     Raises:
-        MotionError: wrong shape, not finite, no rigid transform, or not reachable; the message names the joints, what they would
+        MotionError: wrong shape, not finite, no rigid transform, or not reachable; the message names the
+        joints, what they would
             have to be and their ranges. Of many poses it speaks of the first that fails.
     """
     n = len(chain.joints)
@@ -76,7 +85,9 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
         branches = _psm_branches(chain, ends, start)
     branches = _unwind(chain, branches, start)
     excess = np.maximum(chain.lower - branches, branches - chain.upper)  # (branches, N, n)
-    cost = np.where((excess <= _SLACK).all(axis=-1), (((branches - start) / chain.velocity) ** 2).sum(axis=-1), np.inf)
+    cost = np.where(
+        (excess <= _SLACK).all(axis=-1), (((branches - start) / chain.velocity) ** 2).sum(axis=-1), np.inf
+    )
     best, each = cost.argmin(axis=0), np.arange(len(poses))
     reached = np.isfinite(cost[best, each])
     if not reached.all():
@@ -109,12 +120,16 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
     if wrong.any():
         i = int(wrong.argmax())
         where = f" {i}" if len(poses) > 1 else ""
-        raise MotionError(f"pose{where} is no rigid transform: {poses[i].tolist()}; allowed are a rotation matrix, a position and (0, 0, 0, 1) below")
+        raise MotionError(
+            f"pose{where} is no rigid transform: {poses[i].tolist()}; allowed are a rotation matrix, a"
+            " position and (0, 0, 0, 1) below"
+        )
     return poses, start
 
 
 def branches(chain: SerialChain, pose: Vector) -> Vector:
-    """Return the joint positions of all four branches, shape (4, ..., 6), in range or not, revolute ones within half a turn of 0.
+    """Return the joint positions of all four branches, shape (4, ..., 6), in range or not, revolute ones
+    within half a turn of 0.
 
     Where a singular pose leaves a joint free, it is at 0.
 
@@ -125,20 +140,31 @@ def branches(chain: SerialChain, pose: Vector) -> Vector:
     _require(chain, chain.joints[3:])
     ends = (pose @ inverse_pose(chain.tip)).reshape(-1, 4, 4)
     near = np.zeros((1, len(chain.joints)))
-    return _unwind(chain, _psm_branches(chain, ends, near), near).reshape(4, *pose.shape[:-2], len(chain.joints))
+    return _unwind(chain, _psm_branches(chain, ends, near), near).reshape(
+        4, *pose.shape[:-2], len(chain.joints)
+    )
 
 
 def _require(chain: SerialChain, wrist: tuple[Joint, ...]) -> None:
     """Refuse a chain that the closed form is not for."""
     rows = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in chain.joints[:3])
     alphas = tuple(joint.alpha for joint in wrist)
-    if rows != _RCM_ROWS or alphas != _WRIST_ALPHAS[: len(wrist)] or len(chain.joints) != 3 + len(wrist) or len(wrist) not in (1, 3):
+    if (
+        rows != _RCM_ROWS
+        or alphas != _WRIST_ALPHAS[: len(wrist)]
+        or len(chain.joints) != 3 + len(wrist)
+        or len(wrist) not in (1, 3)
+    ):
         names = ", ".join(joint.name for joint in chain.joints)
-        raise MotionError(f"no closed form for the joints {names}: it is for a PSM with roll, wrist pitch and wrist yaw or with roll alone, and for the ECM")
+        raise MotionError(
+            f"no closed form for the joints {names}: it is for a PSM with roll, wrist pitch and wrist yaw or"
+            " with roll alone, and for the ECM"
+        )
 
 
 def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vector) -> Vector:
-    """Return the joint positions, shape (2, N, 4), at which the tip, on the axis of the last link, is at `position`, shape (N, 3).
+    """Return the joint positions, shape (2, N, 4), at which the tip, on the axis of the last link, is at
+    `position`, shape (N, 3).
 
     `rotation`, shape (N, 3, 3), is the one asked for of the last link.
     """
@@ -147,7 +173,8 @@ def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vect
     shaft = outwards * _BRANCH_SIGNS[0][:2]  # (2, N, 3)
     q = np.empty((2, len(position), 4))
     x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, position) - chain.tip[2, 3], q)
-    # The turn about the shaft that brings x4, y4 nearest to the goal's x and y (least squares of the matrices' difference).
+    # The turn about the shaft that brings x4, y4 nearest to the goal's x and y (least squares of the
+    # matrices' difference).
     x, y = rotation[:, :, 0], rotation[:, :, 1]
     q[..., 3] = np.arctan2(_dot(x, y3) - _dot(y, x3), _dot(x, x3) + _dot(y, y3)) - chain.joints[3].theta
     return q
@@ -161,7 +188,8 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
     distance = np.linalg.norm(across, axis=-1, keepdims=True)
     angle = near[:, 5:] + yaw.theta
     kept = np.cos(angle) * x6 - np.sin(angle) * y6  # x5 at the wrist yaw of `near`
-    x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept) * _BRANCH_SIGNS[0]  # (4, N, 3)
+    # (4, N, 3)
+    x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept) * _BRANCH_SIGNS[0]
     z5 = _cross(x5, yaw_axis)
     wrist = centre - yaw.a * x5
     shaft = _shaft(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
@@ -174,7 +202,9 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
 
 
 def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vector) -> Vector:
-    """Return the direction of the shaft, shape (4, N, 3), perpendicular to the wrist pitch axis z5, that passes RCM and wrist."""
+    """Return the direction of the shaft, shape (4, N, 3), perpendicular to the wrist pitch axis z5, that
+    passes RCM and wrist.
+    """
     distance = np.linalg.norm(wrist, axis=-1, keepdims=True)
     yaw, pitch = near[:, 0], near[:, 1]
     old = np.stack([np.cos(pitch) * np.sin(yaw), -np.sin(pitch), -np.cos(pitch) * np.cos(yaw)], axis=-1)
@@ -187,7 +217,8 @@ def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vect
 
 
 def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -> tuple[Vector, Vector]:
-    """Write yaw, pitch and insertion into `q` and return the axes x3 and y3 of the insertion link, each shape (branches, N, 3).
+    """Write yaw, pitch and insertion into `q` and return the axes x3 and y3 of the insertion link, each shape
+    (branches, N, 3).
 
     The shaft's direction is (cos q2 sin q1, -sin q2, -cos q2 cos q1).
     """
@@ -206,23 +237,32 @@ def _dot(a: Vector, b: Vector) -> Vector:
 
 
 def _cross(a: Vector, b: Vector) -> Vector:
-    return a.take(_YZX, -1) * b.take(_ZXY, -1) - a.take(_ZXY, -1) * b.take(_YZX, -1)  # a quarter of the cost of np.cross
+    # a quarter of the cost of np.cross
+    return a.take(_YZX, -1) * b.take(_ZXY, -1) - a.take(_ZXY, -1) * b.take(_YZX, -1)
 
 
 def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
-    """Return revolute positions as many whole turns away as is nearest to `near`, or to the middle of the range if that is outside."""
+    """Return revolute positions as many whole turns away as is nearest to `near`, or to the middle of the
+    range if that is outside.
+    """
     revolute = [i for i, joint in enumerate(chain.joints) if joint.kind == "revolute"]
     q, lower, upper = branches[..., revolute], chain.lower[revolute], chain.upper[revolute]
     nearest = q + _TURN * np.round((near[:, revolute] - q) / _TURN)
     central = q + _TURN * np.round(((lower + upper) / 2 - q) / _TURN)
     unwound = branches.copy()
-    unwound[..., revolute] = np.where((nearest >= lower - _SLACK) & (nearest <= upper + _SLACK), nearest, central)
+    unwound[..., revolute] = np.where(
+        (nearest >= lower - _SLACK) & (nearest <= upper + _SLACK), nearest, central
+    )
     return unwound
 
 
 def _unreachable(chain: SerialChain, branches: Vector, index: np.intp, count: int) -> MotionError:
-    """Say of the branch that needs least beyond the joint ranges, shape (branches, n), which joints stand against it."""
-    beyond = np.maximum(np.maximum(chain.lower - branches, branches - chain.upper), 0.0) / (chain.upper - chain.lower)
+    """Say of the branch that needs least beyond the joint ranges, shape (branches, n), which joints stand
+    against it.
+    """
+    beyond = np.maximum(np.maximum(chain.lower - branches, branches - chain.upper), 0.0) / (
+        chain.upper - chain.lower
+    )
     q = branches[beyond.sum(axis=-1).argmin()]
     reasons = "; ".join(chain.out_of_range(q, slack=_SLACK))
     return MotionError(f"pose{f' {index}' if count > 1 else ''} cannot be reached: {reasons}")
@@ -236,6 +276,7 @@ def _check_orientation(reached: Vector, asked: Vector) -> None:
     if angles[worst] > ORIENTATION_TOLERANCE:
         where = f" {worst}" if len(asked) > 1 else ""
         raise MotionError(
-            f"pose{where} cannot be reached: four joints leave its orientation {degrees(angles[worst]):.1f} degrees away at this position, "
-            f"allowed are {degrees(ORIENTATION_TOLERANCE):g}; the shaft points away from the remote centre of motion"
+            f"pose{where} cannot be reached: four joints leave its orientation {degrees(angles[worst]):.1f}"
+            f" degrees away at this position, allowed are {degrees(ORIENTATION_TOLERANCE):g}; the shaft"
+            " points away from the remote centre of motion"
         )

@@ -1,9 +1,12 @@
-"""The kinematics of one arm as CRTK's services ask for them (crtk_msgs, QueryForwardKinematics and QueryInverseKinematics).
+"""The kinematics of one arm as CRTK's services ask for them (crtk_msgs, QueryForwardKinematics and
+QueryInverseKinematics).
 
-Rules and words are the real controller's (jhu-dvrk/sawIntuitiveResearchKit, core/components/code/mtsIntuitiveResearchKitArm.cpp;
-jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp): of fewer joints than the arm has, `forward` gives the link of the last one, the tip's
-own offset added as if the tip were there; of none, the base. `forward_kinematics` answers in the arm's reference, `local/forward_kinematics`
-in its base frame; `inverse_kinematics` is asked in the base frame, whatever the reference is.
+Rules and words are the real controller's (jhu-dvrk/sawIntuitiveResearchKit,
+core/components/code/mtsIntuitiveResearchKitArm.cpp; jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp): of
+fewer joints than the arm has, `forward` gives the link of the last one, the tip's own offset added as if the
+tip were there; of none, the base. `forward_kinematics` answers in the arm's reference,
+`local/forward_kinematics` in its base frame; `inverse_kinematics` is asked in the base frame, whatever the
+reference is.
 """
 
 from __future__ import annotations
@@ -47,7 +50,8 @@ class KinematicsQueries:
 
         Args:
             jp: of the first m joints.
-            base: pose of the arm's base frame in its reference, (x, y, z, qx, qy, qz, qw), as `SUJ/<arm>/measured_cp` tells it;
+            base: pose of the arm's base frame in its reference, (x, y, z, qx, qy, qz, qw), as
+            `SUJ/<arm>/measured_cp` tells it;
                 None for `local/forward_kinematics`.
         """
         nowhere, n = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), len(self._chain.joints)
@@ -57,13 +61,16 @@ class KinematicsQueries:
             return Answer(nowhere, False, f"not all joint positions are finite: {jp.tolist()}")
         frame = np.eye(4)
         if jp.size:
-            frame = self._chain.frames(np.concatenate([jp, np.zeros(n - jp.size)]))[jp.size - 1] @ self._chain.tip
+            frame = (
+                self._chain.frames(np.concatenate([jp, np.zeros(n - jp.size)]))[jp.size - 1] @ self._chain.tip
+            )
         if base is not None:
             frame = _frame(base) @ frame
         return Answer(np.concatenate([frame[:3, 3], rotation.from_matrix(frame)]), True, "")
 
     def inverse(self, cp: Vector, jp: Vector) -> Answer:
-        """Return the joint positions, shape (n,), inside the ranges, nearest to `jp`, shape (n,), with the tip at `cp`.
+        """Return the joint positions, shape (n,), inside the ranges, nearest to `jp`, shape (n,), with the
+        tip at `cp`.
 
         `cp` is (x, y, z, qx, qy, qz, qw) in the arm's base frame. Where there is no answer the value is `jp`.
         """
@@ -82,7 +89,9 @@ def _frame(pose: Vector) -> Vector:
     """Return the pose as (4, 4) matrix. Raises MotionError if its quaternion is none."""
     norm = hypot(*pose[3:].tolist())
     if not abs(norm - 1.0) <= _QUATERNION_TOLERANCE:
-        raise MotionError(f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}")
+        raise MotionError(
+            f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}"
+        )
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = rotation.matrix(pose[3:] / norm), pose[:3]
     return frame

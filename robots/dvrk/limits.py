@@ -5,8 +5,10 @@ from __future__ import annotations
 __all__ = ["jerk"]
 
 _RISE = 0.1
-"""Time (s) in which a trajectory's acceleration grows from 0 to its limit. The dVRK's own trajectories (Reflexxes, type II) do
-not limit jerk; for a choice see docs/decisions/0007."""
+"""Time (s) in which a trajectory's acceleration grows from 0 to its limit.
+
+The dVRK's own trajectories (Reflexxes, type II) do not limit jerk; for a choice see docs/decisions/0007.
+"""
 
 
 def jerk(acceleration: float) -> float:

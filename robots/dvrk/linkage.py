@@ -1,13 +1,14 @@
-"""The parallelogram linkages that carry the pitch from the yaw link to the instrument column, and the counterweight.
+"""The parallelogram linkages that carry the pitch from the yaw link to the instrument column, and the
+counterweight.
 
-The real arm has no joint in its remote centre of motion (RCM): a double parallelogram turns the column about that point. In
-the model the column (body `pitch`) has its joint in the RCM, so that the kinematics are exact, and the bars hang beside it,
-tied to the pitch one to one. All pivots lie in the plane x = 0 of the base frame `<arm>_base` with every joint at 0; their axes
-are parallel to the pitch axis, -x. A parallelogram closes in every position if its opposite sides are equal vectors, which is
-how the pivots are written here.
+The real arm has no joint in its remote centre of motion (RCM): a double parallelogram turns the column about
+that point. In the model the column (body `pitch`) has its joint in the RCM, so that the kinematics are exact,
+and the bars hang beside it, tied to the pitch one to one. All pivots lie in the plane x = 0 of the base frame
+`<arm>_base` with every joint at 0; their axes are parallel to the pitch axis, -x. A parallelogram closes in
+every position if its opposite sides are equal vectors, which is how the pivots are written here.
 
-Sources: dvrk_env = WPI-AIM/dvrk_env (commit 675a3fa), dvrk_description/psm/psm.urdf.xacro and ecm/ecm.urdf.xacro, lengths from
-CAD (see docs/decisions/0008). SI units.
+Sources: dvrk_env = WPI-AIM/dvrk_env (commit 675a3fa), dvrk_description/psm/psm.urdf.xacro and
+ecm/ecm.urdf.xacro, lengths from CAD (see docs/decisions/0008). SI units.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ class PassiveJoint:
     """Of the body and of its joint."""
     parent: str
     follows: Literal["pitch", "insertion"]
-    """The joint of the arm that decides the position of this one: a hinge follows the pitch, a slide the insertion."""
+    """The joint of the arm that decides the position of this one: a hinge follows the pitch, a slide the
+    insertion.
+    """
     ratio: float
     """Position of this joint over that of the joint it follows."""
     pivot: Point
@@ -63,13 +66,16 @@ def _at(*vectors: tuple[float, float]) -> Point:
     return (0.0, sum(v[0] for v in vectors), sum(v[1] for v in vectors))
 
 
-# PSM. Vectors (y, z) at pitch 0; back link of 0.150 m leaning by 0.29073 rad, bars of 0.516 m (dvrk_env psm.urdf.xacro).
+# PSM. Vectors (y, z) at pitch 0; back link of 0.150 m leaning by 0.29073 rad, bars of 0.516 m (dvrk_env
+# psm.urdf.xacro).
 _PSM_BACK = (-0.516, 0.0)
 """Back pivot on the yaw link, as far from the RCM as the bars are long."""
 _PSM_FRONT = (-0.420, 0.0)
 """Front pivot on the yaw link, 0.096 m before the back one."""
 _PSM_LOWER = (-0.04300, 0.14371)
-"""From the back pivot to the lower bar; also from the front pivot to it, and from the RCM to the lower bar's pivot on the column."""
+"""From the back pivot to the lower bar; also from the front pivot to it, and from the RCM to the lower bar's
+pivot on the column.
+"""
 _PSM_UPPER = (-0.03912, 0.18003)
 """From the back pivot to the upper bar; also from the RCM to the upper bar's pivot on the column."""
 
@@ -87,9 +93,10 @@ PSM = Linkage(
         Pin(("pitch_bottom", "pitch_front"), _at(_PSM_FRONT, _PSM_LOWER)),
     ),
 )
-"""The counterweight runs in the column (0.043 m beside the instrument's axis, dvrk_env) by the insertion's cable: as far up as the
-instrument goes down (the model of Fontanelli et al., IROS 2017, has it so); its height is an assumption without effect on the dynamics
-at pitch 0, see `robots.dvrk.inertia`."""
+"""The counterweight runs in the column (0.043 m beside the instrument's axis, dvrk_env) by the insertion's
+cable: as far up as the instrument goes down (the model of Fontanelli et al., IROS 2017, has it so); its
+height is an assumption without effect on the dynamics at pitch 0, see `robots.dvrk.inertia`.
+"""
 
 # ECM (dvrk_env ecm.urdf.xacro). There the front link drives, and the back one guides the lower bar.
 _ECM_FRONT = (-0.3404, 0.0)
@@ -97,7 +104,9 @@ _ECM_FRONT = (-0.3404, 0.0)
 _ECM_BACK = (-0.37697, -0.0098)
 """Back pivot on the yaw link."""
 _ECM_LOWER = (-0.10300, 0.28681)
-"""From the front pivot to the lower bar; also from the back pivot to it, and from the RCM to the lower bar's pivot on the column."""
+"""From the front pivot to the lower bar; also from the back pivot to it, and from the RCM to the lower bar's
+pivot on the column.
+"""
 _ECM_UPPER = (-0.10847, 0.32426)
 """From the front pivot to the upper bar; also from the RCM to the upper bar's pivot on the column."""
 

@@ -1,4 +1,6 @@
-"""The arms of a patient cart as a scenario states them to any participant: where each stands, what it holds, where it starts. SI units, radians."""
+"""The arms of a patient cart as a scenario states them to any participant: where each stands, what it holds,
+where it starts. SI units, radians.
+"""
 
 from __future__ import annotations
 
@@ -29,17 +31,30 @@ class MountedArm(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    position: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="of the remote centre of motion in the world")
-    orientation: UnitQuaternion = Field(default=(0.0, 0.0, 0.0, 1.0), description="of the arm's base frame in the world: quaternion x, y, z, w")
+    position: tuple[Length, Length, Length] = Field(
+        default=(0.0, 0.0, 0.0), description="of the remote centre of motion in the world"
+    )
+    orientation: UnitQuaternion = Field(
+        default=(0.0, 0.0, 0.0, 1.0),
+        description="of the arm's base frame in the world: quaternion x, y, z, w",
+    )
 
 
 class MountedPsm(MountedArm):
     """A patient-side manipulator: what it holds and where it starts."""
 
-    instrument: InstrumentName = Field(default="palpation-probe", description="name or number, such as 400006")
-    start: MountedPositions = Field(default_factory=home, description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are")
+    instrument: InstrumentName = Field(
+        default="palpation-probe", description="name or number, such as 400006"
+    )
+    start: MountedPositions = Field(
+        default_factory=home,
+        description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are",
+    )
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: HandPositions = Field(default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="closings, then spreads, of a hand's fingers at time 0; default: folded")
+    hand: HandPositions = Field(
+        default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        description="closings, then spreads, of a hand's fingers at time 0; default: folded",
+    )
 
     @cached_property
     def tool(self) -> Instrument:
@@ -60,11 +75,19 @@ class MountedPsm(MountedArm):
 class MountedEcm(MountedArm):
     """The endoscope camera manipulator: which endoscope it holds and where it starts."""
 
-    endoscope: ecm.Endoscope = Field(default="straight", description="where it looks: along its shaft, or 30 degrees up or down")
-    tip_frame: ecm.TipFrame = Field(
-        default="kinematic", description="how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to the left and y up"
+    endoscope: ecm.Endoscope = Field(
+        default="straight", description="where it looks: along its shaft, or 30 degrees up or down"
     )
-    start: EcmPositions = Field(default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}")
+    tip_frame: ecm.TipFrame = Field(
+        default="kinematic",
+        description=(
+            "how the tip's frame stands about the shaft: as the roll link, or as the surgeon sees it, x to"
+            " the left and y up"
+        ),
+    )
+    start: EcmPositions = Field(
+        default=ecm.HOME, description=f"joint positions at time 0: {', '.join(ecm.JOINT_NAMES)}"
+    )
 
     @cached_property
     def chain(self) -> SerialChain:

@@ -1,7 +1,8 @@
 """The master tool manipulators (MTML, MTMR) of the da Vinci Research Kit: numbers with their sources.
 
-Source: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/kinematic/MTML.json and MTMR.json (1.5708 of the tables
-taken as pi/2), velocities and accelerations from core/components/code/mtsIntuitiveResearchKitMTM.cpp. SI units, radians.
+Source: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/kinematic/MTML.json and MTMR.json
+(1.5708 of the tables taken as pi/2), velocities and accelerations from
+core/components/code/mtsIntuitiveResearchKitMTM.cpp. SI units, radians.
 """
 
 from __future__ import annotations
@@ -31,17 +32,28 @@ _RANGES = {
 """Of outer yaw, shoulder pitch and wrist platform, in which left and right differ."""
 
 ACTUATOR_TO_JOINT = np.eye(7)
-"""Joint positions of actuator positions, shape (7, 7): the elbow hangs on a parallelogram, the platform on both."""
+"""Joint positions of actuator positions, shape (7, 7): the elbow hangs on a parallelogram, the platform on
+both.
+"""
 ACTUATOR_TO_JOINT[2, 1], ACTUATOR_TO_JOINT[3, 1:3] = -1.0, (0.6697, -0.6697)
 
 
 def _base(side: float) -> Vector:
     tilt = radians(30.0)
-    return np.array([[-1.0, 0.0, 0.0, side], [0.0, cos(tilt), sin(tilt), 0.400], [0.0, sin(tilt), -cos(tilt), 0.475], [0.0, 0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [-1.0, 0.0, 0.0, side],
+            [0.0, cos(tilt), sin(tilt), 0.400],
+            [0.0, sin(tilt), -cos(tilt), 0.475],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 BASE = {"MTML": _base(0.180), "MTMR": _base(-0.180)}
-"""Pose of `<arm>_base` in the frame of the stereo viewer (HRSV), shape (4, 4) (SAW share/system/system-full-system-simulated.json)."""
+"""Pose of `<arm>_base` in the frame of the stereo viewer (HRSV), shape (4, 4) (SAW
+share/system/system-full-system-simulated.json).
+"""
 
 
 def _joints(arm: MtmName) -> tuple[Joint, ...]:
@@ -49,12 +61,55 @@ def _joints(arm: MtmName) -> tuple[Joint, ...]:
     yaw, shoulder, platform = _RANGES[arm]
     return (
         Joint("outer_yaw", "revolute", pi / 2, 0.0, 0.0, -pi / 2, *yaw, _TURN, 1.86082986, *_TURNING),
-        Joint("shoulder_pitch", "revolute", 0.0, 0.2794, 0.0, -pi / 2, *shoulder, _TURN, 3.21661506, *_TURNING),
-        Joint("elbow_pitch", "revolute", -pi / 2, 0.3645, 0.0, pi / 2, -0.872665, 0.610865, _TURN, 1.95978284, *_TURNING),
-        Joint("wrist_platform", "revolute", pi / 2, 0.0, 0.1506, 0.0, *platform, _TURN, 0.30901338, *_TURNING),
-        Joint("wrist_pitch", "revolute", -pi / 2, 0.0, 0.0, 0.0, -1.6580, 3.2288, _TURN, 0.09684378, *_TURNING),
-        Joint("wrist_yaw", "revolute", pi / 2, 0.0, 0.0, -pi / 2, -0.785398, 0.785398, _TURN, 0.09684378, *_TURNING),
-        Joint("wrist_roll", "revolute", 0.0, 0.0, 0.0, pi / 2, -8.37758, 7.85398, _ROLL, 0.02287592, _ROLL, jerk(_ROLL)),
+        Joint(
+            "shoulder_pitch", "revolute", 0.0, 0.2794, 0.0, -pi / 2, *shoulder, _TURN, 3.21661506, *_TURNING
+        ),
+        Joint(
+            "elbow_pitch",
+            "revolute",
+            -pi / 2,
+            0.3645,
+            0.0,
+            pi / 2,
+            -0.872665,
+            0.610865,
+            _TURN,
+            1.95978284,
+            *_TURNING,
+        ),
+        Joint(
+            "wrist_platform", "revolute", pi / 2, 0.0, 0.1506, 0.0, *platform, _TURN, 0.30901338, *_TURNING
+        ),
+        Joint(
+            "wrist_pitch", "revolute", -pi / 2, 0.0, 0.0, 0.0, -1.6580, 3.2288, _TURN, 0.09684378, *_TURNING
+        ),
+        Joint(
+            "wrist_yaw",
+            "revolute",
+            pi / 2,
+            0.0,
+            0.0,
+            -pi / 2,
+            -0.785398,
+            0.785398,
+            _TURN,
+            0.09684378,
+            *_TURNING,
+        ),
+        Joint(
+            "wrist_roll",
+            "revolute",
+            0.0,
+            0.0,
+            0.0,
+            pi / 2,
+            -8.37758,
+            7.85398,
+            _ROLL,
+            0.02287592,
+            _ROLL,
+            jerk(_ROLL),
+        ),
     )
 
 

@@ -1,9 +1,11 @@
-"""The MUSHA hand: three under-actuated fingers of three phalanges on the shaft of a PSM, in place of wrist and jaw.
+"""The MUSHA hand: three under-actuated fingers of three phalanges on the shaft of a PSM, in place of wrist
+and jaw.
 
-Published are three fingers of three phalanges, under-actuation, the modes retractor, grasp and caliper (palpation), and that the hand folds into a cylinder of
-12 mm (Liu et al., "The MUSHA Hand II", IEEE/ASME Transactions on Mechatronics; Selvaggio et al., International Journal of Medical
-Robotics 2019, DOI 10.1002/rcs.1981). Lengths, ranges, motors, pulleys and springs are not: those here are ours, see docs/decisions/0018.
-SI units, radians.
+Published are three fingers of three phalanges, under-actuation, the modes retractor, grasp and caliper
+(palpation), and that the hand folds into a cylinder of 12 mm (Liu et al., "The MUSHA Hand II", IEEE/ASME
+Transactions on Mechatronics; Selvaggio et al., International Journal of Medical Robotics 2019, DOI
+10.1002/rcs.1981). Lengths, ranges, motors, pulleys and springs are not: those here are ours, see
+docs/decisions/0018. SI units, radians.
 """
 
 from __future__ import annotations
@@ -20,24 +22,34 @@ TROCAR_RADIUS = 0.012 / 2
 """Of the cylinder into which the hand folds (Liu et al.)."""
 
 _RADIUS = 0.0024
-"""Of a phalanx: three of them, two opposed and one at right angles, fit into the trocar up to offset (1 + 1 / sqrt 2)."""
+"""Of a phalanx: three of them, two opposed and one at right angles, fit into the trocar up to offset (1 + 1 /
+sqrt 2).
+"""
 _OFFSET = 0.0035
-"""From the shaft's axis to a finger's: sqrt 2 times this keeps neighbours apart, this plus the radius is under that of the trocar."""
+"""From the shaft's axis to a finger's: sqrt 2 times this keeps neighbours apart, this plus the radius is
+under that of the trocar.
+"""
 
 _PHALANGES = (
     Phalanx("proximal", 0.022, radians(-90.0), radians(45.0), 0.0020, 50e-3, 0.0, contact=0.5),
     Phalanx("middle", 0.016, 0.0, radians(90.0), 0.0016, 5e-3, radians(-12.0), contact=0.5),
     Phalanx("distal", 0.014, 0.0, radians(90.0), 0.0012, 3.75e-3, radians(-12.0), contact=1.0),
 )
-"""Pulleys get smaller outwards. The springs of middle and distal joint are to each other as their pulleys, and so are their preloads: both bend alike.
-That of the first joint is ten times as stiff, so that what the tendon pulls bends the outer joints first."""
+"""Pulleys get smaller outwards.
+
+The springs of middle and distal joint are to each other as their pulleys, and so are their preloads: both
+bend alike. That of the first joint is ten times as stiff, so that what the tendon pulls bends the outer
+joints first.
+"""
 
 _OUT = radians(-85.0)
 """A finger at right angles to the shaft, all but 5 degrees."""
 
 
 def _bent(spread: float, bend: float) -> tuple[float, float]:
-    """Return closing and spread of a finger whose first joint is at `spread` and whose others are both at `bend` > 0 (rad)."""
+    """Return closing and spread of a finger whose first joint is at `spread` and whose others are both at
+    `bend` > 0 (rad).
+    """
     first, middle, distal = _PHALANGES
     tension = middle.stiffness * (bend - middle.rest) / middle.pulley
     closing = spread + bend * (middle.pulley + distal.pulley) / first.pulley
@@ -60,11 +72,15 @@ _MODES = {
     "grasp": _mode(*[_CURL] * 3),
     "caliper": _mode(_PARALLEL, _PARALLEL, (_FAN, _FAN)),
 }
-"""folded: through the trocar. retractor: straight fingers fan out, over half a turn. grasp: all curl about what lies between them. caliper: the
-distal phalanges of the two opposed fingers close on what is measured, parallel to each other all the way, the third finger is out of the way."""
+"""folded: through the trocar. retractor: straight fingers fan out, over half a turn. grasp: all curl about
+what lies between them. caliper: the distal phalanges of the two opposed fingers close on what is measured,
+parallel to each other all the way, the third finger is out of the way.
+"""
 
 _VELOCITY, _ACCELERATION = radians(180.0), radians(720.0)
-"""Of a motor: the range of a finger in a second; the acceleration is that of wrist and jaw (`robots.dvrk.instruments`)."""
+"""Of a motor: the range of a finger in a second; the acceleration is that of wrist and jaw
+(`robots.dvrk.instruments`).
+"""
 
 HAND = Hand(
     palm=0.006,
@@ -79,5 +95,7 @@ HAND = Hand(
     jerk=jerk(_ACCELERATION),
     modes=MappingProxyType(_MODES),
 )
-"""Two fingers stand opposed, as the caliper wants it, the third one at right angles. Effort: that of the jaw of a needle driver. Density: of steel
-1.4301, as of the palpation probe."""
+"""Two fingers stand opposed, as the caliper wants it, the third one at right angles.
+
+Effort: that of the jaw of a needle driver. Density: of steel 1.4301, as of the palpation probe.
+"""

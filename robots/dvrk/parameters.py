@@ -44,7 +44,10 @@ def _mountable(name: str) -> str:
     except MotionError as error:
         raise ValueError(str(error)) from error
     if found.has_snake_wrist:
-        raise ValueError(f"'{name}' has a snake wrist, which neither model nor motion controller can bend; take an 8 mm instrument such as 400006")
+        raise ValueError(
+            f"'{name}' has a snake wrist, which neither model nor motion controller can bend; take an 8 mm"
+            " instrument such as 400006"
+        )
     return found.name
 
 
@@ -56,7 +59,12 @@ InstrumentName = Annotated[
     str,
     BeforeValidator(_text),  # a number in YAML needs no quotes
     AfterValidator(_mountable),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer"}], "examples": ["LARGE_NEEDLE_DRIVER_400006", 400006]}),
+    WithJsonSchema(
+        {
+            "anyOf": [{"type": "string"}, {"type": "integer"}],
+            "examples": ["LARGE_NEEDLE_DRIVER_400006", 400006],
+        }
+    ),
 ]
 """Name or number of an instrument that can be mounted on a PSM; the name, once it is validated."""
 
@@ -80,15 +88,25 @@ HandPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 
 
 def home(arm: dict[str, Any]) -> MountedPositions:
-    """Return `psm.home` for the `instrument` of an arm whose fields are being validated; any where that is none."""
+    """Return `psm.home` for the `instrument` of an arm whose fields are being validated; any where that is
+    none.
+    """
     try:
         return cast("MountedPositions", psm.home(instrument(arm.get("instrument", ""))))
     except MotionError:
         return psm.HOME  # not looked at: the instrument has been refused
 
 
-def check_start(chain: SerialChain, start: Sequence[float], tool: Instrument | None = None, jaw: float = 0.0, hand: Sequence[float] = ()) -> None:
-    """Raise ValueError, as pydantic's validators do, if `start`, or how far `jaw` or `hand` (rad) of the tool are open, is not inside its range."""
+def check_start(
+    chain: SerialChain,
+    start: Sequence[float],
+    tool: Instrument | None = None,
+    jaw: float = 0.0,
+    hand: Sequence[float] = (),
+) -> None:
+    """Raise ValueError, as pydantic's validators do, if `start`, or how far `jaw` or `hand` (rad) of the tool
+    are open, is not inside its range.
+    """
     try:
         chain.check(np.array(start, np.float64))
     except MotionError as error:
@@ -103,7 +121,9 @@ def check_start(chain: SerialChain, start: Sequence[float], tool: Instrument | N
         raise ValueError("closings of a hand, but what the arm holds is none; leave them out")
     for joint, closing in zip(joints, hand, strict=bool(joints)):
         if not joint.lower <= closing <= joint.upper:
-            raise ValueError(f"{joint.name} at {closing:g} rad, allowed are {joint.lower:g} .. {joint.upper:g}")
+            raise ValueError(
+                f"{joint.name} at {closing:g} rad, allowed are {joint.lower:g} .. {joint.upper:g}"
+            )
 
 
 def settable(arm: setup_joints.CartArm) -> AfterValidator:

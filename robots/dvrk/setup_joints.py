@@ -1,9 +1,10 @@
 """The setup joints (SUJ) of the patient cart, Classic: braked links that carry PSM1 to PSM3 and the ECM.
 
-Each carries its arm's remote centre of motion (RCM): a lift, then revolute joints, of which all but `tilt` stand vertical. The
-cart's frame has z up and y from the column towards the patient. Sources: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68),
-share/arm/suj-simulated.json (right angles and 0.7853 taken as exact); dvrk_model = jhu-dvrk/dvrk_model (commit 70998aa),
-urdf/Classic/SUJ.urdf.xacro. SI units, radians.
+Each carries its arm's remote centre of motion (RCM): a lift, then revolute joints, of which all but `tilt`
+stand vertical. The cart's frame has z up and y from the column towards the patient. Sources: SAW =
+jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/arm/suj-simulated.json (right angles and 0.7853
+taken as exact); dvrk_model = jhu-dvrk/dvrk_model (commit 70998aa), urdf/Classic/SUJ.urdf.xacro. SI units,
+radians.
 """
 
 from __future__ import annotations
@@ -29,12 +30,16 @@ SIMULATED: Mapping[CartArm, tuple[float, ...]] = {
     "PSM3": (-0.0261, -1.5892, 1.3076, 0.6994, 0.1361, 0.3359),
     "ECM": (0.6647, 0.5782, -1.2662, 3.7818, 0.0, 0.0),
 }
-"""Positions that the dVRK's simulation gives them (SAW, simulated_position): three arms about the endoscope's view."""
+"""Positions that the dVRK's simulation gives them (SAW, simulated_position): three arms about the endoscope's
+view.
+"""
 
 _LIFT = (-0.3798, 0.8425)
 """Range (m) of the lift of PSM1, PSM2 and ECM (dvrk_model). The other joints turn without end there."""
 _LIFT_PSM3 = (-0.2858, 0.9365)
-"""PSM3's, as high above the floor: the range 0 .. 1.2223 of dvrk_model, counted from SAW's zero (see docs/decisions/0007)."""
+"""PSM3's, as high above the floor: the range 0 .. 1.2223 of dvrk_model, counted from SAW's zero (see
+docs/decisions/0007).
+"""
 
 _COLUMN: Mapping[CartArm, tuple[float, float, float, float]] = {
     "PSM1": (-0.1016, -0.1016, 0.4300, pi),
@@ -50,7 +55,9 @@ _LENGTHS: Mapping[CartArm, tuple[float, float, float]] = {
     "PSM3": (0.3404, 0.5842, 0.2571),
     "ECM": (0.4166, 0.4318, -0.3459),
 }
-"""What differs between the arms (m): height of the shoulder, length of the upper arm, height of the wrist over the elbow (SAW)."""
+"""What differs between the arms (m): height of the shoulder, length of the upper arm, height of the wrist
+over the elbow (SAW).
+"""
 
 
 def _joints(arm: CartArm) -> tuple[Joint, ...]:
@@ -76,15 +83,20 @@ def _joints(arm: CartArm) -> tuple[Joint, ...]:
 
 @cache
 def chain(arm: CartArm) -> SerialChain:
-    """Return the kinematics of the setup joint that carries `arm`, from the cart's frame to the arm's RCM frame `<arm>_base`."""
+    """Return the kinematics of the setup joint that carries `arm`, from the cart's frame to the arm's RCM
+    frame `<arm>_base`.
+    """
     x, y, z, turn = _COLUMN[arm]
     base = Joint("", "revolute", 0.0, 0.0, 0.0, turn, 0.0, 0.0).transform(0.0)
     base[:3, 3] = x, y, z
     tip = Joint("", "revolute", 0.0, 0.0, 0.0, -pi / 2, 0.0, 0.0).transform(0.0)
-    tip[:3, 3] = (0.6126, 0.0, 0.1016) if arm == "ECM" else (0.4864, 0.0, 0.1524)  # SAW, SUJ_tip_to_tool_origin
+    # SAW, SUJ_tip_to_tool_origin
+    tip[:3, 3] = (0.6126, 0.0, 0.1016) if arm == "ECM" else (0.4864, 0.0, 0.1524)
     return SerialChain(_joints(arm), tip, base)
 
 
 def base_pose(arm: CartArm, q: Vector) -> Vector:
-    """Return the pose of the RCM frame `<arm>_base` in the cart's frame, shape (..., 4, 4), at setup joint positions (..., 6)."""
+    """Return the pose of the RCM frame `<arm>_base` in the cart's frame, shape (..., 4, 4), at setup joint
+    positions (..., 6).
+    """
     return chain(arm).forward(q)

@@ -1,8 +1,9 @@
 """A stitch: how a curved needle goes through tissue, and the lattice of stitches that a study asks for.
 
-The needle turns about the centre of its arc, its plane upright on the tissue. It comes in and goes out at the same angle b to the
-surface, so the centre stands R cos b above it and the points are 2 R sin b apart. Its tip goes from the point of entry to the point of exit and
-on until enough of it is out to be taken there. SI units, radians.
+The needle turns about the centre of its arc, its plane upright on the tissue. It comes in and goes out at the
+same angle b to the surface, so the centre stands R cos b above it and the points are 2 R sin b apart. Its tip
+goes from the point of entry to the point of exit and on until enough of it is out to be taken there. SI
+units, radians.
 """
 
 from __future__ import annotations
@@ -24,16 +25,24 @@ _STEP = radians(7.5)
 """Largest turn of the needle between points of a path."""
 
 _DEPTH = 0.15
-"""From the remote centre to the middle of the tissue, straight down, m: reached half way along the insertion's range."""
+"""From the remote centre to the middle of the tissue, straight down, m: reached half way along the
+insertion's range.
+"""
 _TILTS = tuple(radians(angle) for angle in (0.0, 30.0, 60.0))
-"""Of the tissue against the plane across the shaft, about the base's y axis: instruments come in steeply at best, and often flat."""
+"""Of the tissue against the plane across the shaft, about the base's y axis: instruments come in steeply at
+best, and often flat.
+"""
 _PLACES = (-0.03, 0.0, 0.03)
 """Along either axis of the tissue, m: a patch of 60 mm."""
 _DIRECTIONS = tuple(radians(30.0 * i) for i in range(12))
 _ENTRIES = (radians(30.0), radians(45.0))
-"""Angles to the surface: bites of 11.4 and 16.2 mm with a needle of 11.44 mm radius; more than 50 degrees would not leave the handle of the arc outside."""
+"""Angles to the surface: bites of 11.4 and 16.2 mm with a needle of 11.44 mm radius; more than 50 degrees
+would not leave the handle of the arc outside.
+"""
 _HOLDS = (2.0 / 3.0, 5.0 / 6.0)
-"""Where the needle is held, as parts of its arc behind the tip: about two thirds is what is taught; farther back leaves more room."""
+"""Where the needle is held, as parts of its arc behind the tip: about two thirds is what is taught; farther
+back leaves more room.
+"""
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,9 @@ def tissue(tilt: float) -> Vector:
 
 
 def path(stitch: Stitch, needle: Needle) -> Vector:
-    """Return the poses of the needle, shape (n, 4, 4), in the arm's base frame, from the tip's touching the tissue until it has come out."""
+    """Return the poses of the needle, shape (n, 4, 4), in the arm's base frame, from the tip's touching the
+    tissue until it has come out.
+    """
     way = 2.0 * stitch.entry + EMERGE
     tip = np.linspace(pi / 2.0 - stitch.entry, pi / 2.0 - stitch.entry + way, ceil(way / _STEP - 1e-9) + 1)
     middle = tip - needle.arc / 2.0  # angle of the wire's middle, from the side of the entry downwards

@@ -1,8 +1,9 @@
 """Which stitches a needle driver can make, with and without rolling the needle in hand.
 
-A stitch is feasible if the needle can go all its path with every joint in range, the instrument outside the tissue, and no joint faster
-than it may be at `DRIVE`; the arm stays in one branch of its inverse kinematics, so that it never has to jump. Without rolling the needle keeps
-the roll with which it was grasped; with rolling that may change on the way as fast as the roller turns. All ways over the lattice of rolls are
+A stitch is feasible if the needle can go all its path with every joint in range, the instrument outside the
+tissue, and no joint faster than it may be at `DRIVE`; the arm stays in one branch of its inverse kinematics,
+so that it never has to jump. Without rolling the needle keeps the roll with which it was grasped; with
+rolling that may change on the way as fast as the roller turns. All ways over the lattice of rolls are
 followed at once, point by point.
 """
 
@@ -31,7 +32,9 @@ DRIVE = radians(30.0)
 """How fast the needle is turned through the tissue, rad/s: a stitch of 105 degrees takes 3.5 s."""
 
 _JUMP = radians(45.0)
-"""Most that a joint may turn between two points of a path, which are at most 5 degrees of the needle apart: beyond, nobody knows what is in between."""
+"""Most that a joint may turn between two points of a path, which are at most 5 degrees of the needle apart:
+beyond, nobody knows what is in between.
+"""
 
 Mask = NDArray[np.bool_]
 
@@ -56,18 +59,26 @@ class Study:
 
     @property
     def without(self) -> Mask:
-        """By stitch, shape (n,): with the standard needle driver, the needle in the one grasp that serves most stitches."""
+        """By stitch, shape (n,): with the standard needle driver, the needle in the one grasp that serves
+        most stitches.
+        """
         return self.constant[:, self.best]
 
     @property
     def regrasped(self) -> Mask:
-        """By stitch, shape (n,): with the standard needle driver, the needle grasped anew for each stitch as suits it."""
+        """By stitch, shape (n,): with the standard needle driver, the needle grasped anew for each stitch as
+        suits it.
+        """
         return _any(self.constant, 1)
 
     def shares(self, of: Mask | None = None) -> dict[str, float]:
         """Return the shares of feasible stitches, of all or of those in the mask `of`, shape (n,)."""
         chosen = np.ones(len(self.stitches), bool) if of is None else of
-        masks = {"feasible_share": self.rolling, "feasible_share_without": self.without, "feasible_share_regrasped": self.regrasped}
+        masks = {
+            "feasible_share": self.rolling,
+            "feasible_share_without": self.without,
+            "feasible_share_regrasped": self.regrasped,
+        }
         return {name: float(mask[chosen].mean()) for name, mask in masks.items()}
 
     def shares_by(self, what: str) -> dict[float, dict[str, float]]:
@@ -78,7 +89,11 @@ class Study:
 
 def study(stitches: tuple[Stitch, ...] | None = None, needle: Needle | None = None) -> Study:
     """Return the study of these stitches, or of `stitch.lattice()`, with `needle`."""
-    stitches, needle, tool = stitch.lattice() if stitches is None else stitches, needle or Needle(), instrument(NAME)
+    stitches, needle, tool = (
+        stitch.lattice() if stitches is None else stitches,
+        needle or Needle(),
+        instrument(NAME),
+    )
     rolls = held_needle.rolls(held_needle.chain(tool, needle, 0.0))
     constant, rolling = np.zeros((len(stitches), len(rolls)), bool), np.zeros(len(stitches), bool)
     alike: dict[tuple[float, float, float], list[int]] = {}
@@ -90,19 +105,25 @@ def study(stitches: tuple[Stitch, ...] | None = None, needle: Needle | None = No
 
 
 def _feasible(tool: Instrument, needle: Needle, alike: Sequence[Stitch], rolls: Vector) -> tuple[Mask, Mask]:
-    """Return which of k stitches of one tilt, entry and hold are feasible, by roll without rolling, shape (k, m), and with rolling, shape (k,)."""
+    """Return which of k stitches of one tilt, entry and hold are feasible, by roll without rolling, shape (k,
+    m), and with rolling, shape (k,).
+    """
     one = alike[0]
     paths = np.stack([stitch.path(each, needle) for each in alike])  # (k, points, 4, 4)
     seven = held_needle.chain(tool, needle, one.hold * needle.arc)
     q = held_needle.solutions(tool, seven, paths, rolls)  # (4, k, points, m, 6)
     allowed = _allowed(tool, q, stitch.tissue(one.tilt))
-    whole = np.flatnonzero(_any(allowed, (0, 3)).sum(axis=1) == paths.shape[1])  # worth following: somehow possible at each point
+    # worth following: somehow possible at each point
+    whole = np.flatnonzero(_any(allowed, (0, 3)).sum(axis=1) == paths.shape[1])
     branches = np.flatnonzero(_any(allowed, (1, 2, 3)))
     states, valid = _wound(tool, q[branches][:, whole], allowed[branches][:, whole])
     seconds = (2.0 * one.entry + stitch.EMERGE) / (paths.shape[1] - 1) / DRIVE
     reach, turns = _reach(seven, seconds), int(seven.velocity[-1] * seconds / (rolls[1] - rolls[0]) + 1e-9)
     constant, rolling = np.zeros((len(alike), len(rolls)), bool), np.zeros(len(alike), bool)
-    constant[whole], rolling[whole] = _ways(states, valid, reach, 0), _any(_ways(states, valid, reach, turns), 1)
+    constant[whole], rolling[whole] = (
+        _ways(states, valid, reach, 0),
+        _any(_ways(states, valid, reach, turns), 1),
+    )
     return constant, rolling
 
 
@@ -119,7 +140,8 @@ def _reach(seven: SerialChain, seconds: float) -> Vector:
 
 
 def _allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
-    """Say at which `q`, shape (..., 6), all joints but the shaft's roll are in range and the instrument is outside the tissue; shape (...).
+    """Say at which `q`, shape (..., 6), all joints but the shaft's roll are in range and the instrument is
+    outside the tissue; shape (...).
 
     Jaw, wrist yaw and wrist pitch are each a ball as thick as they are.
     """
@@ -127,14 +149,22 @@ def _allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
     allowed: Mask = np.all(((arm.lower <= q) & (q <= arm.upper))[..., [0, 1, 2, 4, 5]], axis=-1)
     frames = arm.frames(q[allowed])
     jaw = 0.0 if tool.jaw is None else tool.jaw.length - FINGER_HALF_WIDTH
-    yaw, pitch, end = frames[:, 5, :3, 3], frames[:, 4, :3, 3], frames[:, 6, :3, 3] + jaw * frames[:, 6, :3, 2]
+    yaw, pitch, end = (
+        frames[:, 5, :3, 3],
+        frames[:, 4, :3, 3],
+        frames[:, 6, :3, 3] + jaw * frames[:, 6, :3, 2],
+    )
     balls = ((yaw, WRIST_RADIUS), (pitch, SHAFT_RADIUS), (end, FINGER_HALF_WIDTH))
-    allowed[allowed] = np.all([(centre - surface[:3, 3]) @ surface[:3, 2] >= radius for centre, radius in balls], axis=0)
+    allowed[allowed] = np.all(
+        [(centre - surface[:3, 3]) @ surface[:3, 2] >= radius for centre, radius in balls], axis=0
+    )
     return allowed
 
 
 def _wound(tool: Instrument, q: Vector, allowed: Mask) -> tuple[Vector, Mask]:
-    """Return positions with the shaft's roll also a turn less and a turn more, shape (3, ..., 6), and which of them may be, shape (3, ...)."""
+    """Return positions with the shaft's roll also a turn less and a turn more, shape (3, ..., 6), and which
+    of them may be, shape (3, ...).
+    """
     roll = psm.chain(tool).joints[3]
     wound = np.stack([q] * 3)
     wound[..., 3] += np.array([-2.0 * pi, 0.0, 2.0 * pi]).reshape(3, *[1] * (q.ndim - 1))
@@ -142,7 +172,8 @@ def _wound(tool: Instrument, q: Vector, allowed: Mask) -> tuple[Vector, Mask]:
 
 
 def _ways(q: Vector, valid: Mask, reach: Vector, turns: int) -> Mask:
-    """Return by stitch and roll at the end, shape (k, m), whether a way leads there that rolls by at most `turns` of the lattice from point to point.
+    """Return by stitch and roll at the end, shape (k, m), whether a way leads there that rolls by at most
+    `turns` of the lattice from point to point.
 
     Args:
         q: arm joints, shape (windings, branches, k, points, m, 6).

@@ -18,16 +18,43 @@ from schemas.ros import Header
 from schemas.trocar_msgs import SoftBodyState
 
 H = 1_000_000
-CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32) * [0.03, 0.02, 0.01]
-BOX = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]], np.uint32)
-NODES = SoftBodyState(header=Header(frame_id="world"), body="box", nodes_m=CORNERS.astype(np.float32).ravel(), triangles=BOX.ravel())
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32) * [
+    0.03,
+    0.02,
+    0.01,
+]
+BOX = np.array(
+    [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ],
+    np.uint32,
+)
+NODES = SoftBodyState(
+    header=Header(frame_id="world"),
+    body="box",
+    nodes_m=CORNERS.astype(np.float32).ravel(),
+    triangles=BOX.ravel(),
+)
 
 
 class Run:
     """A caliper around a rigid box: a finger feels it when the tip's surface is inside."""
 
     def __init__(self, tmp_path, half_width=0.02, **params):
-        self.caliper = Caliper("caliper", CaliperParams.model_validate({"arm": "PSM1", "rate": 0.5, **params}))
+        self.caliper = Caliper(
+            "caliper", CaliperParams.model_validate({"arm": "PSM1", "rate": 0.5, **params})
+        )
         self.outputs, self.t, self.half_width = self.caliper.configure(Setup(H, tmp_path)), 0, half_width
         self.command = HAND.command("caliper", 0.1)
 
@@ -36,9 +63,16 @@ class Run:
         contacts = HAND.contacts(q)
         force = np.zeros((3, 3, 3))
         for finger in range(2):
-            force[finger, 2, 1] = 100.0 * max(0.0, self.half_width + HAND.radius - np.hypot(*contacts[finger, 2, :2]))
-        world = contacts[..., [1, 0, 2]] - [0.0, 0.0, contacts[0, 2, 2]]  # fingers open along y, fingertips at z = 0
-        values = {"start": np.array([start]), "hand": np.concatenate([self.command, np.zeros(12)]), "phalanges": np.concatenate([q.ravel(), np.zeros(18)])}
+            force[finger, 2, 1] = 100.0 * max(
+                0.0, self.half_width + HAND.radius - np.hypot(*contacts[finger, 2, :2])
+            )
+        # fingers open along y, fingertips at z = 0
+        world = contacts[..., [1, 0, 2]] - [0.0, 0.0, contacts[0, 2, 2]]
+        values = {
+            "start": np.array([start]),
+            "hand": np.concatenate([self.command, np.zeros(12)]),
+            "phalanges": np.concatenate([q.ravel(), np.zeros(18)]),
+        }
         inputs = Inputs({**values, "position": world.ravel(), "force": force.ravel(), "nodes": NODES})
         self.outputs = dict(self.caliper.step(self.t, H, inputs))
         self.t += H
@@ -74,7 +108,9 @@ def test_after_the_measurement_the_fingers_stay(tmp_path):
 
 def test_the_third_finger_stays_away(tmp_path):
     run = Run(tmp_path).step()
-    assert run.command.reshape(2, 3)[:, 2].tolist() == HAND.command("caliper", 0.0).reshape(2, 3)[:, 2].tolist()
+    assert (
+        run.command.reshape(2, 3)[:, 2].tolist() == HAND.command("caliper", 0.0).reshape(2, 3)[:, 2].tolist()
+    )
 
 
 def test_closing_on_nothing_ends_the_session(tmp_path):
@@ -101,7 +137,9 @@ def test_it_keeps_the_contract_of_a_controller():
 @given(st.floats(-0.0099, 0.0099), st.floats(-0.0299, 0.0299))
 def test_the_width_of_a_box_is_its_edge_wherever_it_is_measured(z, x):
     triangles = CORNERS[BOX]
-    assert width_of_mesh(triangles, np.array([x, -1.0, z]), np.array([x, 1.0, z])) == pytest.approx(0.04, rel=1e-6)
+    assert width_of_mesh(triangles, np.array([x, -1.0, z]), np.array([x, 1.0, z])) == pytest.approx(
+        0.04, rel=1e-6
+    )
 
 
 def test_a_line_that_misses_has_no_width():
@@ -116,24 +154,53 @@ def test_a_block_is_measured_through_both_engines():
         "duration": "0.7 s",
         "order": ["tissue", "caliper", "motion", "robot"],
         "connections": [
-            *("caliper.* -> motion.*", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*", "tissue.hand/force -> caliper.force"),
-            *("robot.PSM1/hand/measured_js -> caliper.hand", "robot.PSM1/hand/phalanges/measured_js -> caliper.phalanges"),
-            *("robot.PSM1/contact/position -> caliper.position", "tissue.block/nodes -> caliper.nodes", "clock.done -> caliper.start"),
+            *(
+                "caliper.* -> motion.*",
+                "motion.drive/* -> robot.*",
+                "robot.* -> motion.sense/*",
+                "tissue.hand/force -> caliper.force",
+            ),
+            *(
+                "robot.PSM1/hand/measured_js -> caliper.hand",
+                "robot.PSM1/hand/phalanges/measured_js -> caliper.phalanges",
+            ),
+            *(
+                "robot.PSM1/contact/position -> caliper.position",
+                "tissue.block/nodes -> caliper.nodes",
+                "clock.done -> caliper.start",
+            ),
         ],
         "bonds": [{"motion": "robot.PSM1/contact", "force": "tissue.hand", "algorithm": "impulse"}],
-        "measure": {"width": {"kind": "final", "of": "caliper.width"}, "true_width": {"kind": "final", "of": "caliper.true_width"}},
+        "measure": {
+            "width": {"kind": "final", "of": "caliper.width"},
+            "true_width": {"kind": "final", "of": "caliper.true_width"},
+        },
     }
-    arm = {"instrument": "MUSHA_HAND", "position": [0, 0, "153 mm"], "start": [0, 0, 0.13, 0], "hand": HAND.command("caliper", 0.38).tolist()}
+    arm = {
+        "instrument": "MUSHA_HAND",
+        "position": [0, 0, "153 mm"],
+        "start": [0, 0, 0.13, 0],
+        "hand": HAND.command("caliper", 0.38).tolist(),
+    }
     block = {"size": ["30 mm", "40 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": 60}
     participants = {
         "clock": Routine("clock", RoutineParams.model_validate({"steps": [{"do": "wait", "time": 0}]})),
         "caliper": Caliper("caliper", CaliperParams(arm="PSM1", rate=0.25)),
-        "motion": MotionController("motion", MotionParams.model_validate({"mounting": "free", "initial_state": "homed", "arms": {"PSM1": arm}})),
+        "motion": MotionController(
+            "motion",
+            MotionParams.model_validate(
+                {"mounting": "free", "initial_state": "homed", "arms": {"PSM1": arm}}
+            ),
+        ),
         "robot": MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": arm}, "looks": False})),
         "tissue": BulletEngine(
             "tissue",
             BulletParams.model_validate(
-                {"timestep": "0.5 ms", "organs": {"block": block}, "probes": {"hand": {"spheres": 9, "radius": "2.4 mm", "stiffness": "500 N/m"}}}
+                {
+                    "timestep": "0.5 ms",
+                    "organs": {"block": block},
+                    "probes": {"hand": {"spheres": 9, "radius": "2.4 mm", "stiffness": "500 N/m"}},
+                }
             ),
         ),
     }

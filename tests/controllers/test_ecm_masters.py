@@ -21,8 +21,15 @@ HOME = np.array([0.1, -0.1, 0.1, 0.0])
 class Rig:
     def __init__(self, **params):
         self.participant = EcmMasters("camera", EcmMastersParams.model_validate(params))
-        ports = [port for port in self.participant.ports if port.causality == "input" and port.variability == "signal"]
-        self.values = {port.name: VectorCodec(port).neutral.copy() if port.start is None else np.array(port.start) for port in ports}
+        ports = [
+            port
+            for port in self.participant.ports
+            if port.causality == "input" and port.variability == "signal"
+        ]
+        self.values = {
+            port.name: VectorCodec(port).neutral.copy() if port.start is None else np.array(port.start)
+            for port in ports
+        }
         self.values["measured_js"][:4] = HOME
         self.inputs, self.outputs = Inputs(self.values), {}
         self.put(LEFT, RIGHT)
@@ -99,7 +106,11 @@ def test_it_follows_only_while_the_pedal_is_held_the_arm_is_ready_and_both_are_h
 
 
 def test_it_is_a_participant_whose_state_can_be_saved():
-    poses = {"MTML/measured_cp": [*LEFT, 0, 0, 0, 1], "MTMR/measured_cp": [*RIGHT, 0, 0, 0, 1], "buttons": (Joy(buttons=[1]),)}
+    poses = {
+        "MTML/measured_cp": [*LEFT, 0, 0, 0, 1],
+        "MTMR/measured_cp": [*RIGHT, 0, 0, 0, 1],
+        "buttons": (Joy(buttons=[1]),),
+    }
     check_engine(lambda: EcmMasters("camera", EcmMastersParams()), period_ns=H, inputs=poses)
     with pytest.raises(StateError, match="participant 'camera': a saved state of 1 bytes"):
         Rig().participant.restore(b"0")

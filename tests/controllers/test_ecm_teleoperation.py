@@ -29,7 +29,9 @@ class Session:
         self.outputs = self.controller.configure(Setup(period_ns=H, directory=Path()))
         self.head, self.twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), np.zeros(6)
         self.measured, self.scale = np.array([*q, *np.zeros(8)]), np.array([self.controller.params.scale])
-        self.inputs = Inputs({"pose": self.head, "twist": self.twist, "measured_js": self.measured, "scale": self.scale})
+        self.inputs = Inputs(
+            {"pose": self.head, "twist": self.twist, "measured_js": self.measured, "scale": self.scale}
+        )
         self.modes, self.warnings, self.t = [], [], 0
 
     def step(self, *modes, buttons=(), state=(), stale=(), count=1):
@@ -57,13 +59,17 @@ class Session:
 
 
 def camera(scope, q):
-    """Orientation of the picture (x right, y down, z ahead) in ECM_base, from the link's pose and the cameras' mounting."""
+    """Orientation of the picture (x right, y down, z ahead) in ECM_base, from the link's pose and the
+    cameras' mounting.
+    """
     roll = CHAIN.forward(np.array(q)) @ np.linalg.inv(ecm.tip("straight"))
     return (roll @ endoscope.optical_in_roll(scope))[:3, :3]
 
 
 def numeric_jacobian(scope, q, h=1e-3):
-    """Angular velocity of the camera, in its own picture's frame, by joints 1, 2 and 4: fourth-order differences, shape (3, 3)."""
+    """Angular velocity of the camera, in its own picture's frame, by joints 1, 2 and 4: fourth-order
+    differences, shape (3, 3).
+    """
     here, columns = camera(scope, q), []
     for joint in (0, 1, 3):
 
@@ -79,7 +85,12 @@ def numeric_jacobian(scope, q, h=1e-3):
 OPTICAL_IN_HEAD = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """What is right (-y), down (-z) and ahead (x) for a head."""
 
-configurations = st.tuples(*[st.floats(low + 0.01 * (high - low), high - 0.01 * (high - low)) for low, high in zip(CHAIN.lower, CHAIN.upper, strict=True)])
+configurations = st.tuples(
+    *[
+        st.floats(low + 0.01 * (high - low), high - 0.01 * (high - low))
+        for low, high in zip(CHAIN.lower, CHAIN.upper, strict=True)
+    ]
+)
 vectors = st.tuples(*[st.floats(-0.1, 0.1)] * 3).map(np.array)
 turns = st.tuples(*[st.floats(-1.5, 1.5)] * 3).map(np.array)
 scopes = st.sampled_from(["straight", "up", "down"])
@@ -88,7 +99,9 @@ scopes = st.sampled_from(["straight", "up", "down"])
 @settings(max_examples=150, deadline=None)
 @given(scopes, configurations, turns, vectors, vectors)
 def test_the_equations_of_the_paper(scope, q, turn, v, w):
-    """w_C = w_R with the insertion at rest; dq_3 = v_R,z with the others at rest; each to 1e-9, whatever the head looks at."""
+    """w_C = w_R with the insertion at rest; dq_3 = v_R,z with the others at rest; each to 1e-9, whatever the
+    head looks at.
+    """
     session = Session(q, endoscope=scope)
     session.head[3:] = rotation.exp(turn)
     to_base = Rotation.from_rotvec(turn).as_matrix()
@@ -118,7 +131,9 @@ def test_a_straight_endoscope_sees_what_the_head_would():
     session.twist[:] = [0.05, 0, 0, 0, 0, 0]
     tip = CHAIN.forward(session.q)[:3, 3]
     session.step("position", count=100)
-    assert camera("straight", session.q)[:, 2] @ (CHAIN.forward(session.q)[:3, 3] - tip) == pytest.approx(0.005, rel=1e-9)
+    assert camera("straight", session.q)[:, 2] @ (CHAIN.forward(session.q)[:3, 3] - tip) == pytest.approx(
+        0.005, rel=1e-9
+    )
 
 
 def test_the_camera_turns_with_the_head_by_the_same_angle():
@@ -150,7 +165,13 @@ def test_a_scale_that_would_turn_the_camera_the_other_way_is_refused_once():
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.sampled_from(["orientation", "position", "stale"]), *[st.floats(-4, 4)] * 6), min_size=1, max_size=12))
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["orientation", "position", "stale"]), *[st.floats(-4, 4)] * 6),
+        min_size=1,
+        max_size=12,
+    )
+)
 def test_no_joint_is_ever_too_fast_or_out_of_its_range(moves):
     session = Session()
     for mode, *twist in moves:
@@ -214,10 +235,14 @@ def test_the_dead_man_is_to_be_held():
 
 def test_the_mode_is_switched_by_word_and_by_button():
     session = Session()
-    session.step("position").step("position").step(buttons=[[1]]).step(buttons=[[1]]).step(buttons=[[0], [1]]).step(buttons=[[0]])
+    session.step("position").step("position").step(buttons=[[1]]).step(buttons=[[1]]).step(
+        buttons=[[0], [1]]
+    ).step(buttons=[[0]])
     assert session.modes == ["position", "orientation", "position"]
     session.step("positon")
-    assert session.warnings == ["there is no mode 'positon'. Did you mean 'position'? Known: orientation, position."]
+    assert session.warnings == [
+        "there is no mode 'positon'. Did you mean 'position'? Known: orientation, position."
+    ]
     assert session.modes[3:] == []
 
 
@@ -264,7 +289,14 @@ def test_restore_returns_to_the_same_bits():
 
 
 @pytest.mark.parametrize(
-    "params", [{"scale": 0}, {"start": [0, 2.0, 0.1, 0]}, {"mode": "both"}, {"buttons": {"mode": 1, "dead_man": 1}}, {"buttons": {"jaw": 1}}]
+    "params",
+    [
+        {"scale": 0},
+        {"start": [0, 2.0, 0.1, 0]},
+        {"mode": "both"},
+        {"buttons": {"mode": 1, "dead_man": 1}},
+        {"buttons": {"jaw": 1}},
+    ],
 )
 def test_parameters_out_of_range(params):
     with pytest.raises(ValidationError):

@@ -1,4 +1,6 @@
-"""A mirror between a real arm that a test moves and the motion controller of a simulated one, whose robot is where it is told to be."""
+"""A mirror between a real arm that a test moves and the motion controller of a simulated one, whose robot is
+where it is told to be.
+"""
 
 import numpy as np
 import pytest
@@ -21,13 +23,22 @@ OMEGA = 2.0 * np.pi * 0.5
 
 def real_arm(seconds):
     """Positions and velocities of an arm that swings at 0.5 Hz."""
-    return np.concatenate([CENTRE + SWING * np.sin(OMEGA * seconds), SWING * OMEGA * np.cos(OMEGA * seconds), np.zeros(6)])
+    return np.concatenate(
+        [CENTRE + SWING * np.sin(OMEGA * seconds), SWING * OMEGA * np.cos(OMEGA * seconds), np.zeros(6)]
+    )
 
 
 class Pair:
     def __init__(self):
-        self.mirror, self.motion = Mirror("mirror", MirrorParams.model_validate({"arms": ARMS})), Rig(publish_period="1 ms")
-        self.values = {p.name: np.array(p.start) for p in self.mirror.ports if p.causality == "input" and p.variability == "signal"}
+        self.mirror, self.motion = (
+            Mirror("mirror", MirrorParams.model_validate({"arms": ARMS})),
+            Rig(publish_period="1 ms"),
+        )
+        self.values = {
+            p.name: np.array(p.start)
+            for p in self.mirror.ports
+            if p.causality == "input" and p.variability == "signal"
+        }
         self.inputs, self.outputs, self.said = Inputs(self.values), {}, []
 
     def step(self, t_ms, silent=False):
@@ -38,7 +49,11 @@ class Pair:
         self.outputs = self.mirror.step(t_ms * H, H, self.inputs)
         self.inputs._events = {}
         self.said += [message.data for message in self.outputs["PSM1/warning"]]
-        orders = {port.removeprefix("PSM1/").replace("/", "__"): self.outputs[port] for port in ("PSM1/servo_jp", "PSM1/hold") if self.outputs[port]}
+        orders = {
+            port.removeprefix("PSM1/").replace("/", "__"): self.outputs[port]
+            for port in ("PSM1/servo_jp", "PSM1/hold")
+            if self.outputs[port]
+        }
         self.motion.step(**orders)
         assert not self.motion.said("error")
         return self.motion.setpoint

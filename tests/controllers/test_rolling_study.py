@@ -39,8 +39,14 @@ def test_the_command_says_what_the_library_says(tmp_path):
     found, made = json.loads(done.stdout), study()
     assert found["stitches"] == len(FEW)
     assert {name: found[name] for name in made.shares()} == made.shares()
-    assert found["only_by_rolling_share"] == pytest.approx(found["feasible_share"] - found["feasible_share_without"])
-    assert max(found["by_grasp_deg"].values()) == found["feasible_share_without"] == found["by_grasp_deg"][f"{found['grasp_without_deg']:.6g}"]
+    assert found["only_by_rolling_share"] == pytest.approx(
+        found["feasible_share"] - found["feasible_share_without"]
+    )
+    assert (
+        max(found["by_grasp_deg"].values())
+        == found["feasible_share_without"]
+        == found["by_grasp_deg"][f"{found['grasp_without_deg']:.6g}"]
+    )
     assert (tmp_path / "shares.png").read_bytes().startswith(b"\x89PNG")
 
 

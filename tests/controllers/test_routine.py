@@ -96,17 +96,25 @@ def test_a_restored_routine_goes_on_where_it_was(tmp_path):
 
 def test_it_keeps_the_contract_of_a_controller():
     steps = [{"do": "wait", "time": 0}, *STEPS]
-    check_engine(lambda: Routine("routine", RoutineParams.model_validate({"steps": steps})), period_ns=H, counts_steps=True)
+    check_engine(
+        lambda: Routine("routine", RoutineParams.model_validate({"steps": steps})),
+        period_ns=H,
+        counts_steps=True,
+    )
 
 
-@pytest.mark.parametrize("step", [{"do": "jump"}, {"do": "jaw", "arm": "MTML", "angle": 0}, {"do": "together", "orders": []}])
+@pytest.mark.parametrize(
+    "step", [{"do": "jump"}, {"do": "jaw", "arm": "MTML", "angle": 0}, {"do": "together", "orders": []}]
+)
 def test_steps_that_mean_nothing_are_refused(step):
     with pytest.raises(ValidationError):
         RoutineParams.model_validate({"steps": [step]})
 
 
 def test_a_jaw_with_a_roller_is_told_two_angles():
-    step = RoutineParams.model_validate({"steps": [{"do": "jaw", "arm": "PSM1", "angle": "-20 deg", "roll": "90 deg"}]}).steps[0]
+    step = RoutineParams.model_validate(
+        {"steps": [{"do": "jaw", "arm": "PSM1", "angle": "-20 deg", "roll": "90 deg"}]}
+    ).steps[0]
     port, message = step.message()
     assert port == "PSM1/jaw/move_jp"
     assert message.position == pytest.approx(np.radians([-20, 90]))

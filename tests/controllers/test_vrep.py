@@ -23,7 +23,11 @@ class Rig:
     def __init__(self):
         self.paper = Paper("paper", PaperParams.model_validate({"arms": ARMS}))
         self.outputs = dict(self.paper.configure(Setup(H, Path())))
-        self.values = {p.name: np.array(p.start) for p in self.paper.ports if p.causality == "input" and p.variability == "signal"}
+        self.values = {
+            p.name: np.array(p.start)
+            for p in self.paper.ports
+            if p.causality == "input" and p.variability == "signal"
+        }
         self.inputs = Inputs(self.values)
 
     def step(self, events=()):
@@ -48,13 +52,20 @@ def test_every_topic_of_the_table_is_a_port_of_the_same_type_and_size():
     for row in paper_face(GatewayParams.model_validate({"profile": "paper", "arms": ARMS})):
         if not row.port.name.startswith(heard_only):
             port = there[row.port.name]
-            assert (port.type, port.variability, port.size, port.fields) == (row.type, row.port.variability, row.port.size, row.port.fields), row.topic
+            assert (port.type, port.variability, port.size, port.fields) == (
+                row.type,
+                row.port.variability,
+                row.port.size,
+                row.port.fields,
+            ), row.topic
             assert (port.causality == "output") is (row.way == "publish")
 
 
 @pytest.mark.parametrize("topic", ["state_joint_desired", "set_position_joint", "set_position_goal_joint"])
 def test_desired_positions_go_straight_to_the_joints(topic):
-    rig = Rig().step({f"dvrk/PSM1/{topic}": jp(0.3, -0.2, 0.1, 0.4, 0.5, 0.6), f"dvrk/ECM/{topic}": jp(0.1, 0.2, 0.1, 0.3)})
+    rig = Rig().step(
+        {f"dvrk/PSM1/{topic}": jp(0.3, -0.2, 0.1, 0.4, 0.5, 0.6), f"dvrk/ECM/{topic}": jp(0.1, 0.2, 0.1, 0.3)}
+    )
     assert rig.outputs["PSM1/servo_jp"].tolist() == [0.3, -0.2, 0.1, 0.4, 0.5, 0.6]
     assert rig.step().state("PSM1/state_joint_current") == [0.3, -0.2, 0.1, 0.4, 0.5, 0.6] + [0.0] * 6
     assert rig.state("ECM/state_joint_current")[:4] == [0.1, 0.2, 0.1, 0.3]
@@ -78,8 +89,12 @@ def test_the_jaw_is_told_in_units_of_0_4106_rad_of_half_its_opening():
 
 def test_a_needle_is_released_by_opening_the_jaws():
     rig = Rig().step({"dvrk/PSM1/state_jaw_desired": jp(0.0)})
-    assert rig.step({"release_needle": BoolMessage(data=False)}).outputs["PSM1/jaw/servo_jp"].tolist() == [0.0]
-    assert rig.step({"release_needle": BoolMessage(data=True)}).outputs["PSM1/jaw/servo_jp"].tolist() == pytest.approx([0.8212])
+    assert rig.step({"release_needle": BoolMessage(data=False)}).outputs["PSM1/jaw/servo_jp"].tolist() == [
+        0.0
+    ]
+    assert rig.step({"release_needle": BoolMessage(data=True)}).outputs[
+        "PSM1/jaw/servo_jp"
+    ].tolist() == pytest.approx([0.8212])
 
 
 def test_words_are_echoed():
@@ -92,15 +107,24 @@ def test_words_are_echoed():
 
 
 def test_setup_joints_stand_right_left_camera():
-    expected = [*setup_joints.SIMULATED["PSM1"][:5], *setup_joints.SIMULATED["PSM2"][:5], *setup_joints.SIMULATED["ECM"][:4]]
+    expected = [
+        *setup_joints.SIMULATED["PSM1"][:5],
+        *setup_joints.SIMULATED["PSM2"][:5],
+        *setup_joints.SIMULATED["ECM"][:4],
+    ]
     assert Rig().state("setup_joint/state_joint_current") == expected
 
 
 def test_positions_out_of_range_are_cut_and_what_is_none_is_dropped():
     rig = Rig()
     before = rig.outputs["PSM1/servo_jp"].tolist()
-    assert rig.step({"dvrk/PSM1/state_joint_desired": jp(1.0, 2.0)}).outputs["PSM1/servo_jp"].tolist() == before
-    assert rig.step({"dvrk/PSM1/state_joint_desired": jp(9.0, 0, 0.1, 0, 0, 0)}).outputs["PSM1/servo_jp"][0] < 2.0
+    assert (
+        rig.step({"dvrk/PSM1/state_joint_desired": jp(1.0, 2.0)}).outputs["PSM1/servo_jp"].tolist() == before
+    )
+    assert (
+        rig.step({"dvrk/PSM1/state_joint_desired": jp(9.0, 0, 0.1, 0, 0, 0)}).outputs["PSM1/servo_jp"][0]
+        < 2.0
+    )
 
 
 def test_it_is_a_participant_whose_state_can_be_saved():

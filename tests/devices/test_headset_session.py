@@ -1,4 +1,6 @@
-"""A headset that falls asleep in the middle of a session: the camera holds, the diagnosis says what to do, and it goes on by itself."""
+"""A headset that falls asleep in the middle of a session: the camera holds, the diagnosis says what to do,
+and it goes on by itself.
+"""
 
 import ctypes
 
@@ -30,7 +32,12 @@ class Wearer(Stepped):
         velocity = {"names": ecm.JOINT_NAMES, "fields": ("velocity",)}
         return (
             Port(name="velocity", causality="input", type="sensor_msgs/msg/JointState", **velocity),
-            Port(name="diagnostics", causality="input", type="diagnostic_msgs/msg/DiagnosticStatus", variability="event"),
+            Port(
+                name="diagnostics",
+                causality="input",
+                type="diagnostic_msgs/msg/DiagnosticStatus",
+                variability="event",
+            ),
         )
 
     def configure(self, setup):
@@ -54,8 +61,15 @@ class Wearer(Stepped):
 def test_a_headset_asleep_holds_the_camera_and_comes_back(tmp_path):
     library = compile_library("ovr.c", tmp_path / "libOVRRT64.so.1")
     wearer = Wearer(Standin.in_dll(ctypes.CDLL(str(library)), "standin"))
-    head, camera = LibOvr("head", LibOvrParams(library=library)), EcmTeleoperation("camera", EcmTeleoperationParams())
-    connections = ["head.pose -> camera.pose", "head.twist -> camera.twist", "camera.joint_velocity -> wearer.velocity"]
+    head, camera = (
+        LibOvr("head", LibOvrParams(library=library)),
+        EcmTeleoperation("camera", EcmTeleoperationParams()),
+    )
+    connections = [
+        "head.pose -> camera.pose",
+        "head.twist -> camera.twist",
+        "camera.joint_velocity -> wearer.velocity",
+    ]
     scenario = {
         "name": "asleep",
         "step": "4 ms",
@@ -69,7 +83,9 @@ def test_a_headset_asleep_holds_the_camera_and_comes_back(tmp_path):
     assert (asleep == 0.0).all()
     assert np.median(speed[round(300 / 4) : round(390 / 4)]) == pytest.approx(0.2, rel=0.05)
     assert np.median(speed[round(1200 / 4) :]) == pytest.approx(0.2, rel=0.05)
-    assert [message.split(";")[0] for message in wearer.told if "tracked" in message or "wears" in message][-2:] == [
+    assert [message.split(";")[0] for message in wearer.told if "tracked" in message or "wears" in message][
+        -2:
+    ] == [
         "nobody wears the headset, it sleeps",
         "the head is tracked",
     ]

@@ -47,7 +47,9 @@ class Desk:
 
     def press(self, *keys, up=False):
         for key in keys:
-            pygame.event.post(pygame.event.Event(pygame.KEYUP if up else pygame.KEYDOWN, key=pygame.key.key_code(key)))
+            pygame.event.post(
+                pygame.event.Event(pygame.KEYUP if up else pygame.KEYDOWN, key=pygame.key.key_code(key))
+            )
 
     def focus(self, gained):
         pygame.event.post(pygame.event.Event(pygame.WINDOWFOCUSGAINED if gained else pygame.WINDOWFOCUSLOST))
@@ -76,7 +78,11 @@ def test_it_starts_level_and_at_rest(desk):
     assert (position == 0.0).all()
     assert np.allclose(turn, [[0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # columns: x right, y down, z ahead
     assert got["twist"].twist.linear.x == got["twist"].twist.angular.z == 0.0
-    assert (got["gripper"].data, got["pose"].header.frame_id, got["pose"].header.stamp.ns) == (1.0, "keys_base", desk.t)
+    assert (got["gripper"].data, got["pose"].header.frame_id, got["pose"].header.stamp.ns) == (
+        1.0,
+        "keys_base",
+        desk.t,
+    )
 
 
 WAYS = {"w": (0, 1), "s": (0, -1), "a": (1, 1), "d": (1, -1), "r": (2, 1), "f": (2, -1)}
@@ -98,7 +104,9 @@ def test_a_held_key_moves_the_stylus(desk, key):
 
 
 TURNS = {"left": (2, 1), "right": (2, -1), "up": (1, -1), "down": (1, 1), "e": (0, 1), "q": (0, -1)}
-"""About which axis of the base frame a level stylus turns: to the left about z, up about -y, a screw that goes in about x."""
+"""About which axis of the base frame a level stylus turns: to the left about z, up about -y, a screw that
+goes in about x.
+"""
 
 
 @pytest.mark.parametrize("key", TURNS)
@@ -119,8 +127,13 @@ def test_what_stands_for_a_head_starts_and_turns_as_a_head_does():
     assert np.allclose(_numbers(desk.read()["pose"])[1], np.eye(3), atol=1e-12)
     desk.press("left", "w")
     got = desk.read(100)
-    assert np.allclose(_numbers(got["pose"])[1], rotation.matrix(rotation.exp(np.array([0, 0, 0.4]))), atol=1e-9)
-    assert (got["twist"].twist.angular.z, got["twist"].twist.linear.x) == (pytest.approx(1.0), pytest.approx(0.1))
+    assert np.allclose(
+        _numbers(got["pose"])[1], rotation.matrix(rotation.exp(np.array([0, 0, 0.4]))), atol=1e-9
+    )
+    assert (got["twist"].twist.angular.z, got["twist"].twist.linear.x) == (
+        pytest.approx(1.0),
+        pytest.approx(0.1),
+    )
     desk.device.close()
 
 
@@ -195,7 +208,10 @@ device.open(Path())
 assert any(sample.port == "pose" for sample in device.read(0))
 os.kill(os.getpid(), signal.SIGTERM)
 """
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=False, timeout=60).returncode == -signal.SIGTERM
+    assert (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=False, timeout=60).returncode
+        == -signal.SIGTERM
+    )
 
 
 def test_one_window_a_process(desk):
@@ -226,7 +242,10 @@ class Pad:
 def pad(monkeypatch):
     from devices.keyboard import gamepad
 
-    one, module = Pad(), SimpleNamespace(init=lambda: None, quit=lambda: None, is_controller=lambda number: True, count=1)
+    one, module = (
+        Pad(),
+        SimpleNamespace(init=lambda: None, quit=lambda: None, is_controller=lambda number: True, count=1),
+    )
     module.get_count, module.Controller = lambda: module.count, lambda number: one
     monkeypatch.setattr(gamepad, "controller", module)
     one.module = module
@@ -236,11 +255,16 @@ def pad(monkeypatch):
 def test_a_gamepad_moves_the_stylus_too(pad):
     desk = Desk()
     desk.read()
-    pad.axes = {pygame.CONTROLLER_AXIS_LEFTY: -32768, pygame.CONTROLLER_AXIS_LEFTX: 5000, pygame.CONTROLLER_AXIS_TRIGGERRIGHT: 32767}
+    pad.axes = {
+        pygame.CONTROLLER_AXIS_LEFTY: -32768,
+        pygame.CONTROLLER_AXIS_LEFTX: 5000,
+        pygame.CONTROLLER_AXIS_TRIGGERRIGHT: 32767,
+    }
     pad.buttons = {pygame.CONTROLLER_BUTTON_LEFTSHOULDER, pygame.CONTROLLER_BUTTON_DPAD_RIGHT}
     got = desk.read(25)
     v, w = got["twist"].twist.linear, got["twist"].twist.angular
-    assert np.allclose([v.x, v.y, v.z, w.x, w.y, w.z], [0.1, 0, 0, 1, 0, 0], atol=1e-9)  # the other axis is inside its dead zone
+    # the other axis is inside its dead zone
+    assert np.allclose([v.x, v.y, v.z, w.x, w.y, w.z], [0.1, 0, 0, 1, 0, 0], atol=1e-9)
     assert got["gripper"].data == pytest.approx(0.9)
     assert list(dict(desk.all)["buttons"].buttons) == [1, 1]
     pad.there = False
@@ -277,7 +301,9 @@ def test_the_twist_is_the_rate_of_the_pose():
         stylus.advance(wish, dt)
     (p0, q0), (p1, q1), (v, w) = before, stylus.pose, stylus.twist
     assert np.allclose((np.array(p1) - p0) / dt, v, atol=1e-9)
-    assert np.allclose(rotation.log(rotation.product(np.array(q1), rotation.conjugate(np.array(q0)))) / dt, w, atol=1e-4)
+    assert np.allclose(
+        rotation.log(rotation.product(np.array(q1), rotation.conjugate(np.array(q0)))) / dt, w, atol=1e-4
+    )
 
 
 def test_every_key_is_known_to_pygame():
@@ -295,4 +321,10 @@ def test_without_the_package_the_line_that_brings_it(monkeypatch):
 
 def test_ports_are_known_without_the_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
-    assert [port.name for port in Keyboard("keys", KeyboardParams()).ports] == ["pose", "twist", "buttons", "gripper", "diagnostics"]
+    assert [port.name for port in Keyboard("keys", KeyboardParams()).ports] == [
+        "pose",
+        "twist",
+        "buttons",
+        "gripper",
+        "diagnostics",
+    ]

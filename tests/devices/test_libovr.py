@@ -20,7 +20,10 @@ MS = 1_000_000
 
 
 class Status(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_byte) for name in ("visible", "present", "mounted", "lost", "quit", "recenter", "focus", "overlay", "depth")]
+    _fields_ = [
+        (name, ctypes.c_byte)
+        for name in ("visible", "present", "mounted", "lost", "quit", "recenter", "focus", "overlay", "depth")
+    ]
 
 
 class Standin(ctypes.Structure):
@@ -97,7 +100,12 @@ def test_the_library_is_asked_as_the_sdk_does(make, head):
 
 
 def test_without_a_requested_version_the_library_refuses(library, head):
-    assert api.load(str(library)).ovr_Initialize(ctypes.byref(api.InitParams(Flags=api.INVISIBLE, RequestedMinorVersion=32))) == -1005
+    assert (
+        api.load(str(library)).ovr_Initialize(
+            ctypes.byref(api.InitParams(Flags=api.INVISIBLE, RequestedMinorVersion=32))
+        )
+        == -1005
+    )
 
 
 def test_pose_and_twist_are_in_the_axes_of_rep_103(make, head):
@@ -120,7 +128,8 @@ def test_pose_and_twist_are_in_the_axes_of_rep_103(make, head):
 @pytest.mark.parametrize("frame", ["base", "head"])
 def test_the_angular_velocity_may_be_along_either_frame(make, head, frame):
     head.orientation[:], head.angular[:] = rotation.exp(np.array([0.0, np.pi / 2, 0.0])), (0.0, 0.0, -0.5)
-    _, got = Reader(make(angular_velocity=frame), head)()  # looks left and rolls about what is ahead in that frame
+    # looks left and rolls about what is ahead in that frame
+    _, got = Reader(make(angular_velocity=frame), head)()
     w = got["twist"].twist.angular
     assert np.allclose([w.x, w.y, w.z], [0.5, 0, 0] if frame == "base" else [0, 0.5, 0], atol=1e-6)
 
@@ -174,7 +183,9 @@ def _set(head, name, value):
         setattr(head, last, value)
 
 
-@pytest.mark.parametrize(("call", "code", "message"), [("initialize", -3000, "start the Oculus"), ("create", -1007, "plug it in")])
+@pytest.mark.parametrize(
+    ("call", "code", "message"), [("initialize", -3000, "start the Oculus"), ("create", -1007, "plug it in")]
+)
 def test_no_runtime_or_no_headset_is_looked_for_again(make, head, call, code, message):
     setattr(head, call, code)
     read = Reader(make(), head)

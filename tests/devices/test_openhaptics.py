@@ -1,4 +1,7 @@
-"""Kind `touch` with its servo process and the stand-in of HDAPI, on good days and bad ones. In wall time: each wait ends as soon as it can."""
+"""Kind `touch` with its servo process and the stand-in of HDAPI, on good days and bad ones.
+
+In wall time: each wait ends as soon as it can.
+"""
 
 from __future__ import annotations
 
@@ -102,7 +105,9 @@ def hands(library: Path, world: HdWorld, tmp_path: Path) -> Iterator[Callable[..
 
 
 def _press(world: HdWorld, hands: Hands, *styluses: str) -> None:
-    """Bring the hands into the contact, from above, until they feel it; again, if a busy machine was silent for so long that the force went."""
+    """Bring the hands into the contact, from above, until they feel it; again, if a busy machine was silent
+    for so long that the force went.
+    """
     while not all(hands.force(s) > 1.2 for s in styluses):
         for device in world.devices:
             device.buttons, device.target[1] = 1, 0.03
@@ -114,7 +119,13 @@ def _press(world: HdWorld, hands: Hands, *styluses: str) -> None:
 
 
 def test_it_keeps_the_contract_of_a_device(library: Path, world: HdWorld) -> None:
-    params = {"library": str(library), "styluses": {"right": {"dead_man": "safety-switch"}, "left": {"device": "left", "safety": {"force": "1 N"}}}}
+    params = {
+        "library": str(library),
+        "styluses": {
+            "right": {"dead_man": "safety-switch"},
+            "left": {"device": "left", "safety": {"force": "1 N"}},
+        },
+    }
     check_device(lambda: Touch("touch", TouchParams.model_validate(params)))
 
 
@@ -139,7 +150,9 @@ def test_pose_buttons_and_diagnosis(world: HdWorld, hands: Callable[..., Hands])
     assert (diagnosis.name, diagnosis.hardware_id) == ("touch/right", "Touch STANDIN-0")
 
 
-def test_a_short_click_is_not_lost_while_the_host_is_busy(world: HdWorld, hands: Callable[..., Hands]) -> None:
+def test_a_short_click_is_not_lost_while_the_host_is_busy(
+    world: HdWorld, hands: Callable[..., Hands]
+) -> None:
     one = hands()
     one.until(lambda: bool(one.samples["right/buttons"]))
     world.devices[0].buttons = 1
@@ -167,8 +180,16 @@ def test_a_stylus_that_is_unplugged_and_plugged_in_again(world: HdWorld, hands: 
     one.until(one.gives)
 
 
-@pytest.mark.parametrize(("silent", "words"), [(0, "another program uses it (HD_TIMER_ERROR (0x0304))"), (1, "another program uses it: end that program")])
-def test_another_program_has_the_stylus(world: HdWorld, hands: Callable[..., Hands], silent: int, words: str) -> None:
+@pytest.mark.parametrize(
+    ("silent", "words"),
+    [
+        (0, "another program uses it (HD_TIMER_ERROR (0x0304))"),
+        (1, "another program uses it: end that program"),
+    ],
+)
+def test_another_program_has_the_stylus(
+    world: HdWorld, hands: Callable[..., Hands], silent: int, words: str
+) -> None:
     with subprocess.Popen([sys.executable, "-c", LIVING], stdout=subprocess.PIPE) as other:
         assert other.stdout
         other.stdout.readline()
@@ -205,9 +226,15 @@ def test_a_storm_of_warnings_is_told_once(world: HdWorld, hands: Callable[..., H
 
 @pytest.mark.parametrize(
     ("blow", "words"),
-    [(signal.SIGKILL, "the servo process has ended"), (signal.SIGTERM, "the servo process has ended"), (signal.SIGSTOP, "no frame for 1 s")],
+    [
+        (signal.SIGKILL, "the servo process has ended"),
+        (signal.SIGTERM, "the servo process has ended"),
+        (signal.SIGSTOP, "no frame for 1 s"),
+    ],
 )
-def test_the_servo_process_is_lost(world: HdWorld, hands: Callable[..., Hands], blow: signal.Signals, words: str) -> None:
+def test_the_servo_process_is_lost(
+    world: HdWorld, hands: Callable[..., Hands], blow: signal.Signals, words: str
+) -> None:
     one = hands()
     one.until(lambda: one.gives() and one.gives("left"))
     process = world.devices[0].owner
@@ -219,8 +246,13 @@ def test_the_servo_process_is_lost(world: HdWorld, hands: Callable[..., Hands], 
 
 
 def test_the_host_is_killed_with_force_on_the_hands(library: Path, world: HdWorld) -> None:
-    """The hub's end is silence of the contact models, in test_openhaptics_servo; this is the end of the process that passes them on."""
-    with subprocess.Popen([sys.executable, host.__file__, str(library), "1"], env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}) as process:
+    """The hub's end is silence of the contact models, in test_openhaptics_servo; this is the end of the
+    process that passes them on.
+    """
+    with subprocess.Popen(
+        [sys.executable, host.__file__, str(library), "1"],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    ) as process:
         try:
             while not all((_forces(world.rows(i))[-1:] > 1.2).any() for i in (0, 1)):
                 _lift_and_press(world)
@@ -232,12 +264,15 @@ def test_the_host_is_killed_with_force_on_the_hands(library: Path, world: HdWorl
         rows = world.rows(index)
         force = _forces(rows)
         assert force[-1] == 0.0
-        assert rows[force > 0.0, Row.TIME].max() - killed < 0.15 + rows[:, Row.GAP].max()  # a tick may come late on a busy machine
+        # a tick may come late on a busy machine
+        assert rows[force > 0.0, Row.TIME].max() - killed < 0.15 + rows[:, Row.GAP].max()
         assert np.diff(force).max() < 0.1 + 1e-9
 
 
 def _lift_and_press(world: HdWorld) -> None:
-    """Let both hands, with their dead-men held, go up and down; a busy host may be silent meanwhile, so this may need more than one try."""
+    """Let both hands, with their dead-men held, go up and down; a busy host may be silent meanwhile, so this
+    may need more than one try.
+    """
     for height in (0.03, -0.005):
         for device in world.devices:
             device.buttons, device.target[1] = 1, height
@@ -273,7 +308,14 @@ def test_the_callback_does_not_wait_for_the_host(world: HdWorld, hands: Callable
 def test_a_stylus_that_is_not_there_is_told_of_and_comes(world: HdWorld, hands: Callable[..., Hands]) -> None:
     world.devices[1].plugged = 0
     one = hands()
-    one.until(lambda: one.gives() and one.has_told("it cannot be opened (HD_COMM_ERROR (0x0302)): see that it is plugged in", "left"))
+    one.until(
+        lambda: (
+            one.gives()
+            and one.has_told(
+                "it cannot be opened (HD_COMM_ERROR (0x0302)): see that it is plugged in", "left"
+            )
+        )
+    )
     assert "knows it as 'left'" in one.told("left")[0]
     world.devices[1].plugged = 1
     one.until(lambda: one.gives("left"))
@@ -282,7 +324,11 @@ def test_a_stylus_that_is_not_there_is_told_of_and_comes(world: HdWorld, hands: 
 def test_limits_above_those_of_the_device_are_refused(world: HdWorld, hands: Callable[..., Hands]) -> None:
     world.devices[0].max_force = 1.0
     one = hands(right={"safety": {"force": "1.5 N"}}, left={"device": "left"})
-    one.until(lambda: one.has_told("no force: safety.force is 1.5 N, but the device bears 0.6 N. A scenario may only lower a limit."))
+    one.until(
+        lambda: one.has_told(
+            "no force: safety.force is 1.5 N, but the device bears 0.6 N. A scenario may only lower a limit."
+        )
+    )
     assert one.gives()
 
 
@@ -301,7 +347,9 @@ def test_no_scenario_raises_a_limit(change: dict[str, Any], words: str) -> None:
 
 
 def test_two_styluses_are_two_devices() -> None:
-    with pytest.raises(ValidationError, match="'right' and 'left' are both the default device; give each a 'device'"):
+    with pytest.raises(
+        ValidationError, match="'right' and 'left' are both the default device; give each a 'device'"
+    ):
         TouchParams.model_validate({"styluses": {"right": {}, "left": {}}})
 
 
@@ -317,5 +365,7 @@ def test_a_wrong_library_is_an_error(tmp_path: Path) -> None:
 def test_only_contact_models_are_taken() -> None:
     touch = Touch("touch", TouchParams.model_validate({"styluses": {"right": {}}}))
     touch.write("right/contact", ContactModel(header=host.floor(0, 1).header))  # before `open`
-    with pytest.raises(MessageError, match="takes a ContactModel on right/contact, not Sample on 'right/pose'"):
+    with pytest.raises(
+        MessageError, match="takes a ContactModel on right/contact, not Sample on 'right/pose'"
+    ):
         touch.write("right/pose", Sample("x", host.floor(0, 1)))  # pyright: ignore[reportArgumentType]

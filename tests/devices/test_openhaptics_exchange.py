@@ -43,7 +43,9 @@ def _ring() -> tuple[memoryview, RingWriter, RingReader]:
 
 
 @given(bursts=st.lists(st.integers(0, 3 * SLOTS)))
-def test_a_reader_gets_each_record_once_in_order_and_misses_only_what_is_overwritten(bursts: list[int]) -> None:
+def test_a_reader_gets_each_record_once_in_order_and_misses_only_what_is_overwritten(
+    bursts: list[int],
+) -> None:
     _, writer, reader = _ring()
     written = 0
     for burst in bursts:
@@ -82,7 +84,9 @@ def test_a_writer_that_dies_half_way_leaves_the_record_before() -> None:
 def test_no_torn_record_gets_through_while_another_process_writes_as_fast_as_it_can() -> None:
     shared, handle = exchange.create(ring_size(2, 40))
     assert isinstance(handle, int)
-    process = subprocess.Popen([sys.executable, "-c", HAMMER, str(handle)], pass_fds=(handle,), stdout=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, "-c", HAMMER, str(handle)], pass_fds=(handle,), stdout=subprocess.PIPE
+    )
     try:
         assert process.stdout
         process.stdout.readline()
@@ -110,7 +114,19 @@ def test_contact_models_cross_unchanged(model: list[Plane], stamp: int, arrived:
 
 def test_states_cross_unchanged_and_styluses_do_not_mix() -> None:
     memory = memoryview(bytearray(2 * STYLUS_BYTES))
-    state = State(1.5, 3, 0x203, 2, 1, 4, (1.0, 2.0, 3.0), tuple(range(9)), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (0.1, 0.2, -inf))
+    state = State(
+        1.5,
+        3,
+        0x203,
+        2,
+        1,
+        4,
+        (1.0, 2.0, 3.0),
+        tuple(range(9)),
+        (4.0, 5.0, 6.0),
+        (7.0, 8.0, 9.0),
+        (0.1, 0.2, -inf),
+    )
     _, writer = servo_ends(memory, 1)
     writer.write([*state[:6], *state.position, *state.rotation, *state.linear, *state.angular, *state.force])
     assert [State.of(record) for record in device_ends(memory, 1)[1].read()] == [state]

@@ -40,7 +40,9 @@ def test_a_stylus_that_points_away_from_the_user() -> None:
 
 
 @given(turn=vectors, position=vectors)
-def test_pose_of_the_tip_in_the_axes_of_rep_103(turn: NDArray[np.float64], position: NDArray[np.float64]) -> None:
+def test_pose_of_the_tip_in_the_axes_of_rep_103(
+    turn: NDArray[np.float64], position: NDArray[np.float64]
+) -> None:
     tip, given_turn = Tip(OFFSET), Rotation.from_rotvec(3.0 * turn).as_matrix()
     assert tip.move(_transform(given_turn, position), (0.0, 0.0, 0.0), 0.0)
     expected = BASE @ given_turn @ np.diag([1.0, -1.0, -1.0])
@@ -51,10 +53,14 @@ def test_pose_of_the_tip_in_the_axes_of_rep_103(turn: NDArray[np.float64], posit
 
 @settings(max_examples=20)
 @given(rate=vectors.filter(lambda v: np.linalg.norm(v) > 0.1), start=vectors, velocity=vectors)
-def test_twist_of_a_stylus_that_turns_evenly(rate: NDArray[np.float64], start: NDArray[np.float64], velocity: NDArray[np.float64]) -> None:
+def test_twist_of_a_stylus_that_turns_evenly(
+    rate: NDArray[np.float64], start: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> None:
     """The angular velocity settles on the true one, and the tip's velocity is what its positions say."""
     tip, dt, steps = Tip(OFFSET), 0.001, 150
-    turns = (Rotation.from_rotvec(np.outer(np.arange(steps) * dt, rate)) * Rotation.from_rotvec(start)).as_matrix()
+    turns = (
+        Rotation.from_rotvec(np.outer(np.arange(steps) * dt, rate)) * Rotation.from_rotvec(start)
+    ).as_matrix()
     positions, linear = np.zeros((steps, 3)), np.zeros((steps, 3))
     for k, turn in enumerate(turns):
         assert tip.move(_transform(turn, velocity * k * dt), 1e3 * velocity, k * dt)

@@ -1,4 +1,6 @@
-"""The servo callback against the stand-in of HDAPI, tick by tick: the test is the scheduler, so nothing here depends on how long it takes."""
+"""The servo callback against the stand-in of HDAPI, tick by tick: the test is the scheduler, so nothing here
+depends on how long it takes.
+"""
 
 from __future__ import annotations
 
@@ -74,12 +76,22 @@ class Rig:
         for index, device in enumerate((None, "left")):
             handle = self.hd.hdInitDevice(device.encode() if device else None)
             assert handle != INVALID_HANDLE
-            self.styluses.append(Stylus(self.hd, handle, Spec("right", device, **{"dead_man": 0, "tip_offset": 0.0, **spec}), *servo_ends(memory, index)))
+            self.styluses.append(
+                Stylus(
+                    self.hd,
+                    handle,
+                    Spec("right", device, **{"dead_man": 0, "tip_offset": 0.0, **spec}),
+                    *servo_ends(memory, index),
+                )
+            )
             models, states = device_ends(memory, index)
             self.models.append(models)
             self._states.append(states)
         self.servo = Servo(self.hd, self.styluses)
-        self._last: list[State] = [None, None]  # pyright: ignore[reportAttributeAccessIssue]  # there is one after the first tick
+        self._last: list[State] = [
+            None,
+            None,
+        ]  # pyright: ignore[reportAttributeAccessIssue]  # there is one after the first tick
         self.now = 100.0
         self.answer = CALLBACK_CONTINUE
         self.sent: list[float] = []
@@ -90,7 +102,10 @@ class Rig:
             stylus.allow(Limits(), passivity=False)
 
     def run(self, ticks: int = 5, *, planes: list[Plane] | None = None, touching: bool = False) -> State:
-        """Go on; return the last state of the first stylus. `planes`: contact models of these arrive; `touching`: of the floor."""
+        """Go on; return the last state of the first stylus.
+
+        `planes`: contact models of these arrive; `touching`: of the floor.
+        """
         planes = [FLOOR] if touching else planes
         for _ in range(ticks):
             self.now += DT
@@ -104,7 +119,9 @@ class Rig:
         return self.state(0)
 
     def state(self, stylus: int) -> State:
-        self._last[stylus] = next((State.of(record) for record in reversed(self._states[stylus].read())), self._last[stylus])
+        self._last[stylus] = next(
+            (State.of(record) for record in reversed(self._states[stylus].read())), self._last[stylus]
+        )
         return self._last[stylus]
 
     def press(self, ticks: int = 2000) -> State:
@@ -123,7 +140,9 @@ def rig(library: Path, tmp_path: Path) -> Callable[..., Rig]:
     return lambda **spec: Rig(library, tmp_path / "world", **spec)
 
 
-def test_a_stylus_is_ready_after_three_clean_frames_and_gives_no_force_before_it_is_allowed(rig: Callable[..., Rig]) -> None:
+def test_a_stylus_is_ready_after_three_clean_frames_and_gives_no_force_before_it_is_allowed(
+    rig: Callable[..., Rig],
+) -> None:
     one = rig()
     assert Phase(one.run(2).phase) is Phase.SETTLING
     state = one.run(1)
@@ -137,7 +156,8 @@ def test_force_comes_in_slowly_holds_the_hand_and_is_what_was_told(rig: Callable
     one = rig()
     state = one.press()
     assert Condition.ON is tuple(Condition)[state.cause]
-    assert state.force == pytest.approx((0.0, 0.0, 1.5), abs=0.05)  # hand and floor, both 200 N/m, 15 mm apart
+    # hand and floor, both 200 N/m, 15 mm apart
+    assert state.force == pytest.approx((0.0, 0.0, 1.5), abs=0.05)
     assert np.array(one.world.motors(0)) == pytest.approx((0.0, 1.5, 0.0), abs=0.05)  # HDAPI's y is up
     assert max(np.diff(one.sent)) < 0.1 + 1e-9
 
@@ -152,7 +172,16 @@ def test_the_servo_stops_with_a_frame_without_force(rig: Callable[..., Rig]) -> 
     assert one.sent[-1] == 0.0
 
 
-@pytest.mark.parametrize("code", [Code.WARM_MOTORS, Code.EXCEEDED_MAX_FORCE, Code.EXCEEDED_MAX_FORCE_IMPULSE, Code.EXCEEDED_MAX_VELOCITY, Code.INVALID_VALUE])
+@pytest.mark.parametrize(
+    "code",
+    [
+        Code.WARM_MOTORS,
+        Code.EXCEEDED_MAX_FORCE,
+        Code.EXCEEDED_MAX_FORCE_IMPULSE,
+        Code.EXCEEDED_MAX_VELOCITY,
+        Code.INVALID_VALUE,
+    ],
+)
 def test_a_warning_takes_the_force_and_lets_it_come_back(rig: Callable[..., Rig], code: Code) -> None:
     one = rig()
     one.press()
@@ -179,8 +208,13 @@ def test_a_storm_of_warnings_keeps_the_force_away(rig: Callable[..., Rig]) -> No
     assert not any(one.sent[calm:])
 
 
-@pytest.mark.parametrize(("code", "phase"), [(Code.COMM_ERROR, Phase.FAULT), (Code.DEVICE_FAULT, Phase.FAULT), (Code.TIMER_ERROR, Phase.BUSY)])
-def test_a_fault_ends_the_schedule_with_a_frame_without_force(rig: Callable[..., Rig], code: Code, phase: Phase) -> None:
+@pytest.mark.parametrize(
+    ("code", "phase"),
+    [(Code.COMM_ERROR, Phase.FAULT), (Code.DEVICE_FAULT, Phase.FAULT), (Code.TIMER_ERROR, Phase.BUSY)],
+)
+def test_a_fault_ends_the_schedule_with_a_frame_without_force(
+    rig: Callable[..., Rig], code: Code, phase: Phase
+) -> None:
     one = rig()
     one.press()
     one.world.devices[0].error, one.world.devices[0].error_frames = code, 1
@@ -206,13 +240,21 @@ def test_inkwell(rig: Callable[..., Rig]) -> None:
     device.calibration, device.buttons = NEEDS_MANUAL_INPUT, 1
     one.allow()
     state = one.run(200, touching=True)
-    assert (Phase(state.phase), state.code, state.force, device.force_output) == (Phase.UNCALIBRATED, INKWELL, (0.0, 0.0, 0.0), 0)
+    assert (Phase(state.phase), state.code, state.force, device.force_output) == (
+        Phase.UNCALIBRATED,
+        INKWELL,
+        (0.0, 0.0, 0.0),
+        0,
+    )
     device.inkwell = 1
     assert Phase(one.run(5).phase) is Phase.READY
     assert (device.updates, device.force_output) == (1, 1)
 
 
-@pytest.mark.parametrize(("offered", "used"), [(AUTO | INKWELL | ENCODER_RESET, AUTO), (INKWELL | ENCODER_RESET, INKWELL), (INKWELL, INKWELL)])
+@pytest.mark.parametrize(
+    ("offered", "used"),
+    [(AUTO | INKWELL | ENCODER_RESET, AUTO), (INKWELL | ENCODER_RESET, INKWELL), (INKWELL, INKWELL)],
+)
 def test_the_best_calibration_style_is_used(rig: Callable[..., Rig], offered: int, used: int) -> None:
     one = rig()
     one.world.devices[0].styles = offered
@@ -220,7 +262,9 @@ def test_the_best_calibration_style_is_used(rig: Callable[..., Rig], offered: in
     assert (one.world.devices[0].updates, one.world.devices[0].last_style) == (1, used)
 
 
-def test_an_encoder_reset_waits_for_the_person_who_holds_the_stylus_in_its_place(rig: Callable[..., Rig]) -> None:
+def test_an_encoder_reset_waits_for_the_person_who_holds_the_stylus_in_its_place(
+    rig: Callable[..., Rig],
+) -> None:
     one = rig()
     device = one.world.devices[0]
     device.styles = ENCODER_RESET
@@ -241,10 +285,13 @@ def test_a_stylus_that_loses_its_calibration_gives_neither_pose_nor_force(rig: C
 
 
 @pytest.mark.parametrize("code", [Code.EXCEEDED_MAX_FORCE, Code.COMM_ERROR])
-def test_a_stylus_that_waits_for_its_calibration_does_not_hide_what_another_complains_of(rig: Callable[..., Rig], code: Code) -> None:
+def test_a_stylus_that_waits_for_its_calibration_does_not_hide_what_another_complains_of(
+    rig: Callable[..., Rig], code: Code
+) -> None:
     one = rig()
     one.press()
-    one.world.devices[1].calibration, one.world.devices[1].styles = NEEDS_UPDATE, 0  # asks, tick by tick, and is refused
+    # asks, tick by tick, and is refused
+    one.world.devices[1].calibration, one.world.devices[1].styles = NEEDS_UPDATE, 0
     assert one.run(200, touching=True).force[2] > 1.0
     assert Phase(one.state(1).phase) is Phase.UNCALIBRATED
     one.world.devices[0].error, one.world.devices[0].error_frames = code, 1
@@ -260,11 +307,16 @@ def test_a_stylus_that_is_unplugged_while_it_is_not_calibrated_is_lost(rig: Call
     assert Phase(one.run(2).phase) is Phase.FAULT
 
 
-def test_a_complaint_of_a_stylus_that_is_not_calibrated_leaves_what_to_do_about_that(rig: Callable[..., Rig]) -> None:
+def test_a_complaint_of_a_stylus_that_is_not_calibrated_leaves_what_to_do_about_that(
+    rig: Callable[..., Rig],
+) -> None:
     one = rig()
     device = one.world.devices[0]
     device.calibration, device.error, device.error_frames = NEEDS_MANUAL_INPUT, Code.WARM_MOTORS, 100
-    assert diagnoses.present(one.run(50), "") == (Level.WARN, "it is not calibrated: put the stylus into the inkwell")
+    assert diagnoses.present(one.run(50), "") == (
+        Level.WARN,
+        "it is not calibrated: put the stylus into the inkwell",
+    )
 
 
 def test_a_warning_is_no_letting_go_for_a_hand_that_was_too_fast(rig: Callable[..., Rig]) -> None:
@@ -277,14 +329,20 @@ def test_a_warning_is_no_letting_go_for_a_hand_that_was_too_fast(rig: Callable[.
     one.run(1200, touching=True)
     device.target[1] = -0.005
     state = one.run(1500, touching=True)
-    assert (Phase(state.phase), tuple(Condition)[state.cause], state.force) == (Phase.READY, Condition.TOO_FAST, (0.0, 0.0, 0.0))
+    assert (Phase(state.phase), tuple(Condition)[state.cause], state.force) == (
+        Phase.READY,
+        Condition.TOO_FAST,
+        (0.0, 0.0, 0.0),
+    )
 
 
 @pytest.mark.parametrize(
     ("dead_man", "field", "held"),
     [(0, "buttons", 1), (1, "buttons", 2), ("safety-switch", "safety_switch", 1)],
 )
-def test_what_is_held_permits_force(rig: Callable[..., Rig], dead_man: int | str, field: str, held: int) -> None:
+def test_what_is_held_permits_force(
+    rig: Callable[..., Rig], dead_man: int | str, field: str, held: int
+) -> None:
     one = rig(dead_man=dead_man)
     setattr(one.world.devices[0], field, held)
     assert one.run().permitted == 1
@@ -310,7 +368,9 @@ def test_silence_of_the_simulation_takes_the_force_within_150_ms(rig: Callable[.
     assert np.diff(quiet).max() < 0.1
 
 
-def test_an_exception_in_the_callback_ends_in_a_frame_without_force_on_every_hand(rig: Callable[..., Rig], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_exception_in_the_callback_ends_in_a_frame_without_force_on_every_hand(
+    rig: Callable[..., Rig], monkeypatch: pytest.MonkeyPatch
+) -> None:
     one = rig()
     one.press()
 
@@ -339,8 +399,12 @@ events = st.one_of(
 
 @settings(max_examples=10, phases=[HypothesisPhase.generate])
 @given(days=st.lists(st.tuples(events, st.integers(1, 60)), max_size=12))
-def test_whatever_happens_the_force_keeps_its_limits(library: Path, tmp_path_factory: pytest.TempPathFactory, days: list[tuple[tuple[str, Any], int]]) -> None:
-    """From a hand with force in it, through random bad days: never above the limit, never up by more than the slew, zero where nothing permits it."""
+def test_whatever_happens_the_force_keeps_its_limits(
+    library: Path, tmp_path_factory: pytest.TempPathFactory, days: list[tuple[tuple[str, Any], int]]
+) -> None:
+    """From a hand with force in it, through random bad days: never above the limit, never up by more than the
+    slew, zero where nothing permits it.
+    """
     one = Rig(library, tmp_path_factory.mktemp("world") / "world")
     one.press(ticks=1000)
     assert one.sent[-1] > 0.5
@@ -381,8 +445,16 @@ def test_errors_come_with_their_handle_the_newest_first(rig: Callable[..., Rig])
 
 
 def test_the_servo_process_holds_nothing_that_could_delay_a_callback() -> None:
-    code = "import sys, devices.openhaptics.servo; print(*{m.split('.')[0] for m in sys.modules} & {'numpy', 'pydantic', 'zenoh', 'hub', 'logging'})"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == ""
+    code = (
+        "import sys, devices.openhaptics.servo; print(*{m.split('.')[0] for m in sys.modules} & {'numpy',"
+        " 'pydantic', 'zenoh', 'hub', 'logging'})"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == ""
+    )
 
 
 def test_names_of_errors() -> None:

@@ -1,4 +1,6 @@
-"""OpenXR: the real loader and pyopenxr, with a runtime of our own behind them; nothing here is a real headset."""
+"""OpenXR: the real loader and pyopenxr, with a runtime of our own behind them; nothing here is a real
+headset.
+"""
 
 import ctypes
 import json
@@ -27,7 +29,17 @@ class Standin(ctypes.Structure):
         ("orientation", ctypes.c_float * 4),
         *((name, ctypes.c_float * 3) for name in ("position", "linear", "angular")),
         *((name, ctypes.c_uint64) for name in ("location_flags", "velocity_flags")),
-        *((name, ctypes.c_int32) for name in ("create_instance", "get_system", "create_session", "create_space", "locate", "convert")),
+        *(
+            (name, ctypes.c_int32)
+            for name in (
+                "create_instance",
+                "get_system",
+                "create_session",
+                "create_space",
+                "locate",
+                "convert",
+            )
+        ),
         *((name, ctypes.c_int32) for name in ("without_headless", "without_presence", "asleep")),
         *((name, ctypes.c_int32) for name in ("instances", "sessions", "running", "base", "wrong")),
         ("time", ctypes.c_int64),
@@ -46,11 +58,17 @@ def runtime(library, monkeypatch):
     standin = Standin.in_dll(loaded, "standin")
     fresh = bytes(standin)
     manifest = library.parent / "active_runtime.json"
-    manifest.write_text(json.dumps({"file_format_version": "1.0.0", "runtime": {"library_path": str(library)}}))
+    manifest.write_text(
+        json.dumps({"file_format_version": "1.0.0", "runtime": {"library_path": str(library)}})
+    )
     monkeypatch.setenv("XR_RUNTIME_JSON", str(manifest))
     standin.event = loaded.standin_event
     yield standin
-    assert (standin.instances, standin.sessions, standin.wrong) == (0, 0, 0), "all is closed, and nothing was asked that may not be"
+    assert (standin.instances, standin.sessions, standin.wrong) == (
+        0,
+        0,
+        0,
+    ), "all is closed, and nothing was asked that may not be"
     ctypes.memmove(ctypes.addressof(standin), fresh, len(fresh))
 
 
@@ -286,5 +304,9 @@ def test_doctor_is_told_of_the_runtime_without_starting_it(forgotten, runtime, c
             here.setattr("devices.openxr.device.find_spec", lambda name: None)
         works, detail, remedy = check()
     assert works == (case == "works")
-    assert {"works": "gives poses", "lacks": "does not offer XR_MND_headless", "absent": "no OpenXR runtime answers"}.get(case, "pyopenxr") in detail
+    assert {
+        "works": "gives poses",
+        "lacks": "does not offer XR_MND_headless",
+        "absent": "no OpenXR runtime answers",
+    }.get(case, "pyopenxr") in detail
     assert ("trocar[openxr]" in remedy) == (case == "not installed")

@@ -1,4 +1,6 @@
-"""The head that the scenarios play: its velocity is that of its poses, and the endoscope can follow all of it."""
+"""The head that the scenarios play: its velocity is that of its poses, and the endoscope can follow all of
+it.
+"""
 
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +16,9 @@ from robots.dvrk import ecm
 
 @pytest.fixture(scope="module")
 def head():
-    params = ScriptedParams.model_validate({"samples": "data/head"}, context={"directory": installed_scenarios()["cart"].parent})
+    params = ScriptedParams.model_validate(
+        {"samples": "data/head"}, context={"directory": installed_scenarios()["cart"].parent}
+    )
     with ScriptedDevice("head", params) as device:
         device.open(Path())
         return device.read(25 * 10**9)
@@ -28,7 +32,10 @@ def _poses(head):
 
 def _twists(head):
     for twist in (sample.message.twist for sample in head if sample.port == "twist"):
-        yield np.array([twist.linear.x, twist.linear.y, twist.linear.z]), np.array([twist.angular.x, twist.angular.y, twist.angular.z])
+        yield (
+            np.array([twist.linear.x, twist.linear.y, twist.linear.z]),
+            np.array([twist.angular.x, twist.angular.y, twist.angular.z]),
+        )
 
 
 def test_the_twist_is_the_rate_of_the_pose(head):
@@ -37,7 +44,9 @@ def test_the_twist_is_the_rate_of_the_pose(head):
         (v0, w0), (v1, w1) = next(twists)
         dt = t1 - t0
         assert np.allclose((p1 - p0) / dt, (v0 + v1) / 2, atol=1e-4)
-        assert np.allclose(rotation.log(rotation.product(q1, rotation.conjugate(q0))) / dt, (w0 + w1) / 2, atol=1e-3)
+        assert np.allclose(
+            rotation.log(rotation.product(q1, rotation.conjugate(q0))) / dt, (w0 + w1) / 2, atol=1e-3
+        )
 
 
 def test_the_endoscope_can_follow_and_comes_back(head):

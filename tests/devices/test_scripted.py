@@ -24,33 +24,49 @@ def _write(file: Path, messages: list[tuple[str, int, Message]]) -> None:
         channels: dict[str, int] = {}
         for topic, time_ns, message in messages:
             if topic not in channels:
-                schema = writer.register_schema(message.ros_type, "ros2msg", ros2msg_definition(message.ros_type).encode())
+                schema = writer.register_schema(
+                    message.ros_type, "ros2msg", ros2msg_definition(message.ros_type).encode()
+                )
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
             writer.add_message(channels[topic], time_ns, encode(message), time_ns)
         writer.finish()
 
 
 def _pose(time_ns: int, x: float) -> PoseStamped:
-    return PoseStamped(header=Header(stamp=Time.from_ns(time_ns), frame_id="stylus_base"), pose=Pose(position=Point(x=x)))
+    return PoseStamped(
+        header=Header(stamp=Time.from_ns(time_ns), frame_id="stylus_base"), pose=Pose(position=Point(x=x))
+    )
 
 
 @pytest.fixture(scope="module")
 def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A second of poses at 100 Hz and two button events, stamped by a wall clock."""
     file = tmp_path_factory.mktemp("hand") / "hand.mcap"
-    poses = [("/pose", EPOCH + i * SECOND // 100, _pose(EPOCH + i * SECOND // 100, i / 100)) for i in range(101)]
-    joys = [("/buttons", EPOCH + ms * SECOND // 1000, Joy(buttons=np.array([ms], np.int32))) for ms in (205, 705)]
+    poses = [
+        ("/pose", EPOCH + i * SECOND // 100, _pose(EPOCH + i * SECOND // 100, i / 100)) for i in range(101)
+    ]
+    joys = [
+        ("/buttons", EPOCH + ms * SECOND // 1000, Joy(buttons=np.array([ms], np.int32))) for ms in (205, 705)
+    ]
     _write(file, sorted([*poses, *joys], key=lambda m: m[1]))
     return file
 
 
 def _device(file: Path, **params: Any) -> ScriptedDevice:
-    return ScriptedDevice("stylus", ScriptedParams.model_validate({"samples": file.name, **params}, context={"directory": file.parent}))
+    return ScriptedDevice(
+        "stylus",
+        ScriptedParams.model_validate({"samples": file.name, **params}, context={"directory": file.parent}),
+    )
 
 
 def test_ports_are_known_before_it_is_opened(hand: Path) -> None:
     buttons, pose = _device(hand, max_age="100 ms", time="wall").ports
-    assert (pose.name, pose.type, pose.variability, pose.frame) == ("pose", PoseStamped.ros_type, "signal", "stylus_base")
+    assert (pose.name, pose.type, pose.variability, pose.frame) == (
+        "pose",
+        PoseStamped.ros_type,
+        "signal",
+        "stylus_base",
+    )
     assert (pose.max_age_ns, pose.clock, pose.causality) == (10**8, "wall", "output")
     assert (buttons.name, buttons.variability, buttons.max_age_ns) == ("buttons", "event", 0)
 
@@ -60,7 +76,11 @@ def test_samples_come_when_they_are_due(hand: Path) -> None:
         device.open(hand.parent)
         (first,) = device.read(0)
         assert isinstance(first.message, PoseStamped)
-        assert (first.port, first.message.header.stamp.ns, first.message.header.frame_id) == ("pose", 0, "stylus_base")
+        assert (first.port, first.message.header.stamp.ns, first.message.header.frame_id) == (
+            "pose",
+            0,
+            "stylus_base",
+        )
         assert device.read(SECOND // 100 - 1) == []
         assert [s.port for s in device.read(SECOND // 100)] == ["pose"]
         rest = device.read(2 * SECOND)
@@ -117,7 +137,9 @@ def test_what_cannot_be_played(tmp_path: Path) -> None:
     with (tmp_path / "foreign.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start("ros2")
-        channel = writer.register_channel("/cloud", "cdr", writer.register_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b""))
+        channel = writer.register_channel(
+            "/cloud", "cdr", writer.register_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b"")
+        )
         writer.add_message(channel, 0, b"", 0)
         writer.finish()
     problems = {
@@ -132,12 +154,16 @@ def test_what_cannot_be_played(tmp_path: Path) -> None:
             _device(tmp_path / name)
 
 
-@pytest.mark.parametrize("params", [{"rate": 0}, {"rate": float("inf")}, {"time": "later"}, {"max_age": "0 s"}, {"speed": 2}])
+@pytest.mark.parametrize(
+    "params", [{"rate": 0}, {"rate": float("inf")}, {"time": "later"}, {"max_age": "0 s"}, {"speed": 2}]
+)
 def test_parameters_out_of_range(hand: Path, params: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
         _device(hand, **params)
 
 
-def test_relative_to_the_working_directory_without_a_scenario(hand: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_relative_to_the_working_directory_without_a_scenario(
+    hand: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(hand.parent)
     assert ScriptedParams.model_validate({"samples": "hand.mcap"}).samples == hand.resolve()

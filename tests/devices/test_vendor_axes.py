@@ -27,7 +27,9 @@ def test_single_precision_is_normalised():
     assert abs(x * x + y * y + z * z + w * w - 1.0) < 1e-15
 
 
-@pytest.mark.parametrize("nothing", [(0, 0, 0, 0), (float("nan"), 0, 0, 1), (float("inf"), 0, 0, 0), (3, 0, 0, 0)])
+@pytest.mark.parametrize(
+    "nothing", [(0, 0, 0, 0), (float("nan"), 0, 0, 1), (float("inf"), 0, 0, 0), (3, 0, 0, 0)]
+)
 def test_what_is_no_rotation(nothing):
     with pytest.raises(ValueError, match="no unit quaternion"):
         quaternion(*nothing)

@@ -66,15 +66,25 @@ InstallPlugin = Callable[..., None]
 Prepare = Callable[..., Session]
 
 _HANGS_S = 180
-"""A test of the hub that takes longer hangs: every thread's stack is printed, and the run of the tests ends."""
+"""A test of the hub that takes longer hangs: every thread's stack is printed, and the run of the tests ends.
+"""
 
 
 @pytest.fixture
 def install_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[InstallPlugin]:
-    """Return a function that installs a distribution with the given entry points and module text, for one test."""
+    """Return a function that installs a distribution with the given entry points and module text, for one
+    test.
+    """
     modules: list[str] = []
 
-    def install(name: str, entries: dict[str, dict[str, str]], *, text: str = PENDULUM, requires: tuple[str, ...] = (), extras: tuple[str, ...] = ()) -> None:
+    def install(
+        name: str,
+        entries: dict[str, dict[str, str]],
+        *,
+        text: str = PENDULUM,
+        requires: tuple[str, ...] = (),
+        extras: tuple[str, ...] = (),
+    ) -> None:
         site = tmp_path / f"site_{name}"
         info = site / f"{name}-1.0.dist-info"
         info.mkdir(parents=True)
@@ -87,7 +97,10 @@ def install_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
             *(f"Requires-Dist: {r}" for r in requires),
         ]
         (info / "METADATA").write_text("\n".join(lines) + "\n")
-        sections = [f"[{group}]\n" + "".join(f"{kind} = {value}\n" for kind, value in kinds.items()) for group, kinds in entries.items()]
+        sections = [
+            f"[{group}]\n" + "".join(f"{kind} = {value}\n" for kind, value in kinds.items())
+            for group, kinds in entries.items()
+        ]
         (info / "entry_points.txt").write_text("\n".join(sections))
         monkeypatch.syspath_prepend(site)
         modules.append(name)

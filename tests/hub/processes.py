@@ -11,7 +11,9 @@ def processes(endpoint):
 
 def hosts(endpoint):
     """Return the process ids of the living hosts that joined at `endpoint`."""
-    return [number for number, command in _commands(endpoint).items() if "hub.hosting.host_process" in command]
+    return [
+        number for number, command in _commands(endpoint).items() if "hub.hosting.host_process" in command
+    ]
 
 
 def _commands(endpoint):

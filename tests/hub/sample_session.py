@@ -1,4 +1,6 @@
-"""A recorded palpation session made of formulas: a tip pressed three times against a spring with losses, and its books."""
+"""A recorded palpation session made of formulas: a tip pressed three times against a spring with losses, and
+its books.
+"""
 
 import json
 from pathlib import Path
@@ -39,17 +41,28 @@ ATTACHMENTS = {
 def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
     """Record a session of `seconds` of simulated time."""
     keys = Keys("palpation")
-    pose, twist, _ = (VectorCodec(port) for port in bond_ports(BondSide(name="PSM1/probe", side="motion", frame="PSM1_base")))
+    pose, twist, _ = (
+        VectorCodec(port)
+        for port in bond_ports(BondSide(name="PSM1/probe", side="motion", frame="PSM1_base"))
+    )
     wrench = VectorCodec(bond_ports(BondSide(name="probe", side="force", frame="PSM1_base"))[2])
-    stylus = VectorCodec(Port(name="pose", causality="output", type="geometry_msgs/msg/PoseStamped", frame="stylus_base"))
+    stylus = VectorCodec(
+        Port(name="pose", causality="output", type="geometry_msgs/msg/PoseStamped", frame="stylus_base")
+    )
     steps = round(seconds * 1e9) // STEP_NS
     times, tip, force, powers = _press(steps, seconds)
     noise = np.random.default_rng(1)
     with Recorder(directory, attachments=ATTACHMENTS) as recorder:
         ports = {
-            "pose": recorder.channel(topic(keys.output("engine", "robot", "PSM1/probe/pose")), pose.port.type),
-            "twist": recorder.channel(topic(keys.output("engine", "robot", "PSM1/probe/twist")), twist.port.type),
-            "wrench": recorder.channel(topic(keys.output("engine", "tissue", "probe/wrench")), wrench.port.type),
+            "pose": recorder.channel(
+                topic(keys.output("engine", "robot", "PSM1/probe/pose")), pose.port.type
+            ),
+            "twist": recorder.channel(
+                topic(keys.output("engine", "robot", "PSM1/probe/twist")), twist.port.type
+            ),
+            "wrench": recorder.channel(
+                topic(keys.output("engine", "tissue", "probe/wrench")), wrench.port.type
+            ),
             "stylus": recorder.channel(topic(keys.output("device", "stylus", "pose")), stylus.port.type),
             "grant": recorder.channel(topic(keys.grant), Grant.ros_type),
             "robot": recorder.channel(topic(keys.ack("robot")), Ack.ros_type),
@@ -63,27 +76,48 @@ def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
             if step % 4 == 0:
                 sample = stylus.encode(np.append(5 * tip[step], [0, 0, 0, 1]), start)
                 recorder.write(ports["stylus"], start, sample)
-                inlets = [InletSample(participant="stylus", port="pose", payload=np.frombuffer(sample, np.uint8))]
-            recorder.write(ports["grant"], start, encode(Grant(run=7, epoch=0, step=step, start_ns=start, horizon_ns=end, inlets=inlets)))
+                inlets = [
+                    InletSample(participant="stylus", port="pose", payload=np.frombuffer(sample, np.uint8))
+                ]
+            recorder.write(
+                ports["grant"],
+                start,
+                encode(Grant(run=7, epoch=0, step=step, start_ns=start, horizon_ns=end, inlets=inlets)),
+            )
             recorder.write(ports["pose"], end, pose.encode(np.append(tip[step], [0, 0, 0, 1]), end))
             recorder.write(ports["twist"], end, twist.encode(np.zeros(6), end))
             recorder.write(ports["wrench"], end, wrench.encode(np.append(force[step], np.zeros(3)), end))
             for name, typical in (("robot", 70e3), ("tissue", 450e3)):
-                compute = np.array([noise.lognormal(np.log(typical), 0.15 + 0.6 * (noise.random() < 0.01))], np.uint64)
+                compute = np.array(
+                    [noise.lognormal(np.log(typical), 0.15 + 0.6 * (noise.random() < 0.01))], np.uint64
+                )
                 work = powers[name][step : step + 1]
-                ack = Ack(run=7, epoch=0, step=step, state_hash=np.array([step], np.uint64), compute_ns=compute, work_j=work)
+                ack = Ack(
+                    run=7,
+                    epoch=0,
+                    step=step,
+                    state_hash=np.array([step], np.uint64),
+                    compute_ns=compute,
+                    work_j=work,
+                )
                 recorder.write(ports[name], end, encode(ack))
             given, taken = float(powers["robot"][step]), float(powers["tissue"][step])
             header = Header(stamp=Time.from_ns(end))
-            book = CouplingEnergy(header=header, bond=BOND, motion_work_j=given, force_work_j=taken, residual_j=taken - given)
+            book = CouplingEnergy(
+                header=header, bond=BOND, motion_work_j=given, force_work_j=taken, residual_j=taken - given
+            )
             recorder.write(ports["energy"], end, encode(book))
             if step % 100 == 99:
-                recorder.write(ports["status"], end, encode(_status(step + 1, steps, 1.4 + 0.2 * np.sin(times[step]))))
+                recorder.write(
+                    ports["status"], end, encode(_status(step + 1, steps, 1.4 + 0.2 * np.sin(times[step])))
+                )
         return recorder.close()
 
 
 def _press(steps: int, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Times (s), tip positions (m), reactions on the tip (N) and works (J) of three presses of growing depth along -z."""
+    """Times (s), tip positions (m), reactions on the tip (N) and works (J) of three presses of growing depth
+    along -z.
+    """
     times = np.arange(1, steps + 1) * (STEP_NS * 1e-9)
     phase = 3 * times / seconds
     depth = (0.002 * (np.floor(phase) + 1) * np.sin(np.pi * (phase % 1)) ** 2) - 0.001

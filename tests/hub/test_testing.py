@@ -42,7 +42,11 @@ class TestOwnParticipants:
 
     @pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
     def test_fmu(self, tmp_path):
-        fmu = build.pack("mass_spring_damper", build.compile_library("mass_spring_damper", tmp_path), tmp_path / "plant.fmu")
+        fmu = build.pack(
+            "mass_spring_damper",
+            build.compile_library("mass_spring_damper", tmp_path),
+            tmp_path / "plant.fmu",
+        )
         check_engine(lambda: FmuEngine("plant", FmuParams(path=fmu)), period_ns=MS, inputs={"F": 3.0})
 
     def test_teleoperation(self):
@@ -50,17 +54,31 @@ class TestOwnParticipants:
 
     def test_scripted(self):
         configs = installed_scenarios()["palpation"].parent
-        params = ScriptedParams.model_validate({"samples": "data/palpation_hand"}, context={"directory": configs})
+        params = ScriptedParams.model_validate(
+            {"samples": "data/palpation_hand"}, context={"directory": configs}
+        )
         check_device(lambda: ScriptedDevice("stylus", params))
 
-    @pytest.mark.parametrize("plan", [BondPlan("velocity", mean=True), BondPlan("slope", mean=True), BondPlan("hold", mean=False)])
+    @pytest.mark.parametrize(
+        "plan", [BondPlan("velocity", mean=True), BondPlan("slope", mean=True), BondPlan("hold", mean=False)]
+    )
     def test_the_masses_of_the_example(self, monkeypatch, plan):
         monkeypatch.syspath_prepend(Path(__file__).parents[2] / "examples" / "two_mass")
         mass = {"mass": 1.0, "stiffness": 10.0, "damping": 0.1, "x": 1.0}
-        check_engine(lambda: registry.make("two_mass:Mass", "one", mass, Path()), period_ns=MS, inputs={"tip/force": [-2.0]}, bonds={"tip": plan})
+        check_engine(
+            lambda: registry.make("two_mass:Mass", "one", mass, Path()),
+            period_ns=MS,
+            inputs={"tip/force": [-2.0]},
+            bonds={"tip": plan},
+        )
         sprung = mass | {"x": 0.0, "coupling_stiffness": 100.0, "coupling_damping": 1.0}
         inputs = {"tip/position": [0.5], "tip/velocity": [0.2]}
-        check_engine(lambda: registry.make("two_mass:SprungMass", "two", sprung, Path()), period_ns=MS, inputs=inputs, bonds={"tip": plan})
+        check_engine(
+            lambda: registry.make("two_mass:SprungMass", "two", sprung, Path()),
+            period_ns=MS,
+            inputs=inputs,
+            bonds={"tip": plan},
+        )
 
 
 class GoodParams(Params):
@@ -85,7 +103,11 @@ class Good(Stepped):
         return self.outputs(0) | {"tip/force": np.zeros(1)}
 
     def outputs(self, time_ns):
-        return {"given": self.x.copy(), "words": (StringMessage(data="tick"),), "pose": np.array([0, 0, 0, 0, 0, 0, 1.0])}
+        return {
+            "given": self.x.copy(),
+            "words": (StringMessage(data="tick"),),
+            "pose": np.array([0, 0, 0, 0, 0, 0, 1.0]),
+        }
 
     def step(self, t, h, inputs):
         s = h * 1e-9
@@ -311,7 +333,11 @@ class Pen(Stylus):
     params_model = GoodParams
 
     def __init__(self, name="pen", params=None):
-        super().__init__(name, out("pose", type=PoseStamped.ros_type, frame="pen_base"), Port(name="force", causality="input", size=2))
+        super().__init__(
+            name,
+            out("pose", type=PoseStamped.ros_type, frame="pen_base"),
+            Port(name="force", causality="input", size=2),
+        )
         self.params = params or GoodParams()
         self.written = []
 
@@ -349,7 +375,13 @@ def test_each_breach_of_a_device_is_named(read, message):
 
 def test_a_run_in_this_process_gives_its_summary():
     summary = run_in_process(
-        {"name": "alone", "step": "1 ms", "duration": "5 ms", "measure": {"end": {"kind": "final", "of": "good.given"}}}, {"good": Plain()}
+        {
+            "name": "alone",
+            "step": "1 ms",
+            "duration": "5 ms",
+            "measure": {"end": {"kind": "final", "of": "good.given"}},
+        },
+        {"good": Plain()},
     )
     assert (summary.steps, summary.state, summary.recording) == (5, "done", None)
     assert summary.measures["end"] == pytest.approx(np.hypot(0.25 + 0.005, 0.25 + 0.010))
@@ -382,5 +414,7 @@ def test_a_device_that_follows_the_clock_is_told_and_says_the_same_again():
         def sample(self, t, port="pose", frame="pen_base"):
             return super().sample(t + chance.randrange(2), port, frame)
 
-    with pytest.raises(AssertionError, match="says the same when it is told the same, but two instances differ"):
+    with pytest.raises(
+        AssertionError, match="says the same when it is told the same, but two instances differ"
+    ):
         check_device(Fickle)

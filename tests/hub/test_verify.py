@@ -48,7 +48,11 @@ def test_the_first_difference_is_named(recording, monkeypatch, step, participant
 
     monkeypatch.setattr(engine, "step", step_with_an_error)
     summary = verify(recording)
-    assert (summary.same, summary.first_difference_step, summary.first_difference_participant) == (False, first, participant)
+    assert (summary.same, summary.first_difference_step, summary.first_difference_participant) == (
+        False,
+        first,
+        participant,
+    )
 
 
 def test_a_recording_of_something_else_is_refused(tmp_path):

@@ -1,7 +1,7 @@
 """Small participants for the tests of the hub. Child processes find them as `toys:Name` through PYTHONPATH.
 
-Their states are chaotic or chained hashes, so that a value that comes a step too early or too late, twice or not at all,
-changes every state hash from there on.
+Their states are chaotic or chained hashes, so that a value that comes a step too early or too late, twice or
+not at all, changes every state hash from there on.
 """
 
 from __future__ import annotations
@@ -56,7 +56,15 @@ class Mixer(Bare):
     @property
     def ports(self):
         inputs = (Port(name=name, causality="input", size=SIZE, start=(0.25,) * SIZE) for name in "abc")
-        return (*inputs, Port(name="out", causality="output", size=SIZE, period_ns=self.params.step_ns * self.params.out_every))
+        return (
+            *inputs,
+            Port(
+                name="out",
+                causality="output",
+                size=SIZE,
+                period_ns=self.params.step_ns * self.params.out_every,
+            ),
+        )
 
     def configure(self, setup):
         self.x = np.random.default_rng(self.params.seed).random(SIZE)
@@ -66,7 +74,8 @@ class Mixer(Bare):
         middle = h * 0.5e-9
         taken = inputs["a"] + 2.0 * inputs.at("b", middle) + 3.0 * inputs.at("c", middle)
         slope = sum(float(rate.sum()) for name in "bc" if (rate := inputs.rate(name)) is not None)
-        self.x[:] = (3.9 * self.x * (1.0 - self.x) + 0.1 * taken + 1e-4 * slope + h * 1e-12) % 1.0  # in place: neighbours must not see it early
+        # in place: neighbours must not see it early
+        self.x[:] = (3.9 * self.x * (1.0 - self.x) + 0.1 * taken + 1e-4 * slope + h * 1e-12) % 1.0
         return {"out": self.x}
 
     def state_hash(self):
@@ -220,7 +229,9 @@ class Player(Device):
     def ports(self):
         clock, age = self.params.clock, self.params.max_age_ms * 1_000_000
         return (
-            Port(name="hand", causality="output", type=POSE, frame="stylus_base", clock=clock, max_age_ns=age),
+            Port(
+                name="hand", causality="output", type=POSE, frame="stylus_base", clock=clock, max_age_ns=age
+            ),
             Port(name="buttons", causality="output", type=JOY, variability="event", clock=clock),
             Port(name="noise", causality="input", size=4096),
         )
@@ -236,10 +247,23 @@ class Player(Device):
         made = []
         while (ms := self.next["hand"]) <= min(t // 1_000_000, self.params.silent_after_ms):
             pose = Pose(position=Point(x=ms / 7.0))
-            made.append((ms, Sample("hand", PoseStamped(header=Header(stamp=Time.from_ns(ms * 1_000_000), frame_id="stylus_base"), pose=pose))))
+            made.append(
+                (
+                    ms,
+                    Sample(
+                        "hand",
+                        PoseStamped(
+                            header=Header(stamp=Time.from_ns(ms * 1_000_000), frame_id="stylus_base"),
+                            pose=pose,
+                        ),
+                    ),
+                )
+            )
             self.next["hand"] += 3
         while (ms := self.next["buttons"]) <= t // 1_000_000:
-            joy = Joy(header=Header(stamp=Time.from_ns(ms * 1_000_000)), buttons=np.array([ms // 2], np.int32))
+            joy = Joy(
+                header=Header(stamp=Time.from_ns(ms * 1_000_000)), buttons=np.array([ms // 2], np.int32)
+            )
             made.append((ms, Sample("buttons", joy)))
             self.next["buttons"] += 2
         return [sample for _, sample in sorted(made, key=lambda row: row[0])]
@@ -249,7 +273,9 @@ class Player(Device):
 
 
 class Hand(Device):
-    """Lives in simulated time and says what it was told, folded: `numbers` in `a`, and how many words in `b`; what is said last was told first."""
+    """Lives in simulated time and says what it was told, folded: `numbers` in `a`, and how many words in `b`;
+    what is said last was told first.
+    """
 
     ports = (
         Port(name="numbers", causality="input", size=SIZE),
@@ -408,7 +434,9 @@ class Mass(Bare):
         self.side.add(force, self.x - before)
         self.steps += 1
         outputs = self.side.result(self.x.copy(), self.v.copy())
-        return outputs | ({self.side.work_port: np.array([np.nan])} if self.steps == self.params.nan_at + 1 else {})
+        return outputs | (
+            {self.side.work_port: np.array([np.nan])} if self.steps == self.params.nan_at + 1 else {}
+        )
 
     def state_hash(self):
         return state_hash(self.x, self.v, self.side.state)

@@ -13,7 +13,9 @@ REFERENCE = json.loads((Path(__file__).parent / "data" / "reference_poses.json")
 AGREES = {"rtol": 0.0, "atol": 1e-9}
 
 
-@pytest.mark.parametrize("case", REFERENCE["local"], ids=lambda case: f"{case['arm']}-{case['tool']}-{case['q']}")
+@pytest.mark.parametrize(
+    "case", REFERENCE["local"], ids=lambda case: f"{case['arm']}-{case['tool']}-{case['q']}"
+)
 def test_every_arm_stands_where_the_reference_says(case):
     pose = fk(case["arm"], case["tool"], case["q"])
     assert np.allclose(pose["p"], case["p"], **AGREES)
@@ -31,7 +33,9 @@ def test_the_homed_cart_looks_to_its_camera_as_the_reference_says():
     camera = cart.camera_pose(ecm.chain().forward(np.array(ecm.HOME)), np.array(SIMULATED["ECM"]))
     seen = {"ECM": camera}
     for arm in ("PSM1", "PSM2", "PSM3"):
-        seen[arm] = cart.base_in_view(arm, np.array(SIMULATED[arm]), camera) @ arms.chain(arm).forward(np.array(psm.HOME))
+        seen[arm] = cart.base_in_view(arm, np.array(SIMULATED[arm]), camera) @ arms.chain(arm).forward(
+            np.array(psm.HOME)
+        )
     for case in REFERENCE["homed_cart"]:
         assert np.allclose(seen[case["arm"]][:3, 3], case["p"], **AGREES)
         assert np.allclose(seen[case["arm"]][:3, :3], case["R"], **AGREES)
@@ -40,26 +44,46 @@ def test_the_homed_cart_looks_to_its_camera_as_the_reference_says():
 @pytest.mark.parametrize("arm", arms.ARMS)
 def test_every_arm_has_a_range_in_which_it_starts(arm):
     chain = arms.chain(arm)
-    q = SIMULATED[arm[4:]] if arm.startswith("SUJ/") else np.clip(np.zeros(len(chain.joints)), chain.lower, chain.upper)
+    q = (
+        SIMULATED[arm[4:]]
+        if arm.startswith("SUJ/")
+        else np.clip(np.zeros(len(chain.joints)), chain.lower, chain.upper)
+    )
     chain.check(np.array(q))
     assert (chain.velocity > 0).all()
-    assert arm.startswith("SUJ/") or np.isfinite([chain.velocity, chain.acceleration, chain.jerk, chain.effort]).all()
+    assert (
+        arm.startswith("SUJ/")
+        or np.isfinite([chain.velocity, chain.acceleration, chain.jerk, chain.effort]).all()
+    )
 
 
 def test_endoscopes_look_thirty_degrees_apart():
     straight, up, down = (ecm.chain(kind).forward(np.array(ecm.HOME)) for kind in ("straight", "up", "down"))
     assert np.allclose(straight[:3, 3], up[:3, 3])
-    assert np.allclose([straight[:3, 2] @ up[:3, 2], straight[:3, 2] @ down[:3, 2], up[:3, 2] @ down[:3, 2]], np.cos(np.radians([30, 30, 60])))
+    assert np.allclose(
+        [straight[:3, 2] @ up[:3, 2], straight[:3, 2] @ down[:3, 2], up[:3, 2] @ down[:3, 2]],
+        np.cos(np.radians([30, 30, 60])),
+    )
 
 
 @pytest.mark.parametrize(
     ("arm", "tool", "q", "reason"),
     [
         ("PSM4", None, [0] * 6, "no arm 'PSM4'. Did you mean 'PSM3'"),
-        ("PSM1", "PROGRASP_400093", [0] * 6, "no instrument 'PROGRASP_400093'. Did you mean 'PROGRASP_FORCEPS_400093'"),
+        (
+            "PSM1",
+            "PROGRASP_400093",
+            [0] * 6,
+            "no instrument 'PROGRASP_400093'. Did you mean 'PROGRASP_FORCEPS_400093'",
+        ),
         ("ECM", "upp", [0] * 4, "no endoscope 'upp'. Did you mean 'up'"),
         ("MTML", "400006", [0] * 7, "arm 'MTML' holds no instrument"),
-        ("PSM1", None, [0] * 4, "PSM1: 4 joint positions, expected 6: yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw"),
+        (
+            "PSM1",
+            None,
+            [0] * 4,
+            "PSM1: 4 joint positions, expected 6: yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw",
+        ),
         ("ECM", None, [0, 0, 0.3, 0], "joint insertion at 0.3 m, allowed are 0 .. 0.255"),
         ("ECM", None, [0, 0, float("inf"), 0], "not all positions are finite"),
     ],

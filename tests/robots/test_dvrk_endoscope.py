@@ -16,7 +16,9 @@ CAMERA = StereoCamera()
 
 
 def camera_in_cart(endoscope: ecm.Endoscope) -> Vector:
-    """The optical frame of a whole cart at rest, with the arm homed: the roll link's frame is the tip's of a straight endoscope."""
+    """The optical frame of a whole cart at rest, with the arm homed: the roll link's frame is the tip's of a
+    straight endoscope.
+    """
     base = setup_joints.base_pose("ECM", np.array(setup_joints.SIMULATED["ECM"]))
     return base @ ecm.chain("straight").forward(np.array(ecm.HOME)) @ optical_in_roll(endoscope)
 
@@ -40,7 +42,10 @@ def test_the_picture_is_upright_and_shows_each_arm_on_the_side_of_the_hand_that_
     assert ahead[2] < -0.5  # it looks down into the patient
     assert abs(right[2]) < 0.1
     assert down[2] < 0.0
-    arms = {arm: setup_joints.base_pose(arm, np.array(setup_joints.SIMULATED[arm]))[:3, 3] - camera[:3, 3] for arm in ("PSM1", "PSM2")}
+    arms = {
+        arm: setup_joints.base_pose(arm, np.array(setup_joints.SIMULATED[arm]))[:3, 3] - camera[:3, 3]
+        for arm in ("PSM1", "PSM2")
+    }
     assert arms["PSM1"] @ right > 0.0 > arms["PSM2"] @ right  # the surgeon's right hand moves PSM1
 
 
@@ -54,11 +59,15 @@ def test_an_endoscope_looks_up_or_down_in_its_own_picture(endoscope: ecm.Endosco
 
 
 def test_the_view_of_a_straight_endoscope_is_a_quarter_turn_from_the_roll_link() -> None:
-    assert optical_in_roll("straight")[:2, :2] == pytest.approx(np.array([[0.0, -1.0], [1.0, 0.0]]), abs=pi * 1e-16)
+    assert optical_in_roll("straight")[:2, :2] == pytest.approx(
+        np.array([[0.0, -1.0], [1.0, 0.0]]), abs=pi * 1e-16
+    )
 
 
 @pytest.mark.parametrize("endoscope", ["straight", "up", "down"])
-def test_in_the_frame_of_the_view_x_is_left_and_y_up_in_the_picture_and_poses_come_back(endoscope: ecm.Endoscope) -> None:
+def test_in_the_frame_of_the_view_x_is_left_and_y_up_in_the_picture_and_poses_come_back(
+    endoscope: ecm.Endoscope,
+) -> None:
     chain, q = ecm.chain(endoscope, "view"), np.array([0.2, -0.1, 0.12, 0.3])
     pose = chain.forward(q)
     picture = ecm.chain("straight").forward(q) @ optical_in_roll(endoscope)

@@ -30,17 +30,28 @@ def test_the_combined_terms_are_those_of_the_identified_model(case):
 
 
 @CASES
-@pytest.mark.parametrize("tool", ["LARGE_NEEDLE_DRIVER_400006", "LARGE_NEEDLE_DRIVER_420006", "PROGRASP_FORCEPS_400093"])
+@pytest.mark.parametrize(
+    "tool", ["LARGE_NEEDLE_DRIVER_400006", "LARGE_NEEDLE_DRIVER_420006", "PROGRASP_FORCEPS_400093"]
+)
 def test_the_bodies_have_the_identified_dynamics(case, tool):
     psm, q = dynamics.of_psm(instrument(tool)), np.array(case["q"])
-    assert np.allclose(psm.inertia_matrix(q)[:3, :3], case["inertia"], rtol=0.0, atol=0.05 * np.max(case["inertia"]))
-    assert np.allclose(psm.gravity(q)[:3], case["gravity"], rtol=0.0, atol=0.05 * np.max(np.abs(case["gravity"])))
+    assert np.allclose(
+        psm.inertia_matrix(q)[:3, :3], case["inertia"], rtol=0.0, atol=0.05 * np.max(case["inertia"])
+    )
+    assert np.allclose(
+        psm.gravity(q)[:3], case["gravity"], rtol=0.0, atol=0.05 * np.max(np.abs(case["gravity"]))
+    )
 
 
 def test_the_bodies_fit_better_than_asked():
-    errors = [np.abs(PSM.inertia_matrix(np.array(case["q"]))[:3, :3] - case["inertia"]).max() for case in REFERENCE["cases"]]
+    errors = [
+        np.abs(PSM.inertia_matrix(np.array(case["q"]))[:3, :3] - case["inertia"]).max()
+        for case in REFERENCE["cases"]
+    ]
     assert max(errors) < 0.02 * 0.4167
-    errors = [np.abs(PSM.gravity(np.array(case["q"]))[:3] - case["gravity"]).max() for case in REFERENCE["cases"]]
+    errors = [
+        np.abs(PSM.gravity(np.array(case["q"]))[:3] - case["gravity"]).max() for case in REFERENCE["cases"]
+    ]
     assert max(errors) < 1e-3
 
 
@@ -56,22 +67,33 @@ def test_every_body_is_one_that_can_be(tool):
 
 def test_a_needle_driver_moves_as_much_mass_as_was_identified():
     masses = {name: body.mass for name, body in inertia.psm(NEEDLE_DRIVER).items()}
-    moving = sum(masses[name] for name in ("insertion", "roll", "wrist_pitch", "wrist_yaw", "jaw_left", "jaw_right"))
+    moving = sum(
+        masses[name] for name in ("insertion", "roll", "wrist_pitch", "wrist_yaw", "jaw_left", "jaw_right")
+    )
     assert moving == pytest.approx(identified.INSERTION_MASS, rel=2e-3)
     assert masses["counterweight"] == pytest.approx(identified.COUNTERWEIGHT_MASS, rel=2e-3)
 
 
 def test_friction_is_that_of_the_identified_model():
     *dq, jaw = REFERENCE["friction"]["dq"]
-    velocities = {**dict(zip((joint.name for joint in dynamics.psm.chain(NEEDLE_DRIVER).joints), dq, strict=True)), "jaw_left": jaw / 2, "jaw_right": jaw / 2}
+    velocities = {
+        **dict(zip((joint.name for joint in dynamics.psm.chain(NEEDLE_DRIVER).joints), dq, strict=True)),
+        "jaw_left": jaw / 2,
+        "jaw_right": jaw / 2,
+    }
     found = drives.friction(drives.psm(NEEDLE_DRIVER), velocities, drives.discs(NEEDLE_DRIVER))
-    assert np.allclose([*list(found.values())[:6], found["jaw_left"]], REFERENCE["friction"]["effort"], rtol=0.0, atol=2e-5)
+    assert np.allclose(
+        [*list(found.values())[:6], found["jaw_left"]], REFERENCE["friction"]["effort"], rtol=0.0, atol=2e-5
+    )
     assert found["jaw_left"] == found["jaw_right"]
 
 
 def test_elasticity_is_that_of_the_identified_model():
     q = np.array([0.3, -0.2, 0.15, 0.5])
-    found = [drive.elasticity * x + drive.offset for drive, x in zip(list(drives.psm(NEEDLE_DRIVER).values())[:4], q, strict=True)]
+    found = [
+        drive.elasticity * x + drive.offset
+        for drive, x in zip(list(drives.psm(NEEDLE_DRIVER).values())[:4], q, strict=True)
+    ]
     assert np.allclose(found, identified.elastic_torque(q), rtol=0.0, atol=1e-9)
 
 
@@ -108,12 +130,20 @@ def test_every_instrument_has_drives_for_all_it_moves(tool):
     found = drives.psm(tool)
     grasping = drives.FINGERS if tool.jaw else (*tool.hand.fingers, *tool.hand.spreads) if tool.hand else ()
     rolling = {"roller"} if tool.roller else set()
-    assert set(found) == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *grasping} | rolling
-    assert all(drive.stiffness > 0 and drive.damping > 0 and drive.effort > 0 and drive.velocity > 0 for drive in found.values())
+    assert (
+        set(found)
+        == {"yaw", "pitch", "insertion", *(joint.name for joint in tool.joints), *grasping} | rolling
+    )
+    assert all(
+        drive.stiffness > 0 and drive.damping > 0 and drive.effort > 0 and drive.velocity > 0
+        for drive in found.values()
+    )
     assert all(set(disc.shares) <= set(found) for disc in drives.discs(tool))
 
 
-@pytest.mark.parametrize(("q", "reason"), [(np.zeros(5), "expected 6: yaw"), (np.full(6, np.nan), "not all positions are finite")])
+@pytest.mark.parametrize(
+    ("q", "reason"), [(np.zeros(5), "expected 6: yaw"), (np.full(6, np.nan), "not all positions are finite")]
+)
 def test_there_are_no_dynamics_of_what_is_no_configuration(q, reason):
     for ask in (PSM.inertia_matrix, PSM.gravity):
         with pytest.raises(MotionError, match=reason):

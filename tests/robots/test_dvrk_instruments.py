@@ -56,7 +56,14 @@ def test_what_does_not_open_has_no_jaw(name):
     assert instrument(name).jaw is None
 
 
-@pytest.mark.parametrize(("word", "meant"), [("40006", "420006"), ("PROGRASP_400093", "PROGRASP_FORCEPS_400093"), ("palpation_probe", "palpation-probe")])
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("40006", "420006"),
+        ("PROGRASP_400093", "PROGRASP_FORCEPS_400093"),
+        ("palpation_probe", "palpation-probe"),
+    ],
+)
 def test_an_unknown_instrument_is_refused_with_what_is_near(word, meant):
     with pytest.raises(MotionError, match=f"no instrument '{word}'. Did you mean '{meant}'"):
         instrument(word)

@@ -9,7 +9,15 @@ from robots.dvrk.inverse import ORIENTATION_TOLERANCE, inverse
 from robots.serial_chain import Joint
 from schemas.errors import MotionError
 
-CASES = [("PSM1", "400006"), ("PSM2", "420006"), ("PSM3", "400205"), ("ECM", "straight"), ("ECM", "up"), ("ECM", "down"), ("PSM1", "MUSHA_HAND")]
+CASES = [
+    ("PSM1", "400006"),
+    ("PSM2", "420006"),
+    ("PSM3", "400205"),
+    ("ECM", "straight"),
+    ("ECM", "up"),
+    ("ECM", "down"),
+    ("PSM1", "MUSHA_HAND"),
+]
 PSM, ECM = arms.chain("PSM1", "400006"), arms.chain("ECM")
 HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
 LOOK = np.array([0.1, -0.2, 0.12, 0.3])
@@ -36,7 +44,9 @@ def test_there_and_back_ten_thousand_times(arm, tool):
 def test_every_instrument_with_a_wrist_of_three_joints_is_solved(name):
     chain = arms.chain("PSM1", name)
     q = random_configurations(chain, 200)
-    assert np.allclose(chain.forward(inverse(chain, chain.forward(q), q)), chain.forward(q), rtol=0.0, atol=1e-12)
+    assert np.allclose(
+        chain.forward(inverse(chain, chain.forward(q), q)), chain.forward(q), rtol=0.0, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(("arm", "tool"), CASES)
@@ -51,7 +61,9 @@ def test_the_solution_is_the_one_at_hand(arm, tool):
 def test_the_psm_comes_back_from_everywhere(q, near):
     try:
         found = inverse(PSM, PSM.forward(q), near)
-    except MotionError:  # only where an axis passes the RCM, and the one solution of many that is near does not fit
+    except (
+        MotionError
+    ):  # only where an axis passes the RCM, and the one solution of many that is near does not fit
         wrist = PSM.frames(q)[4:6, :3, 3]
         assert np.linalg.norm(wrist, axis=1).min() < 2e-9
         return
@@ -63,7 +75,12 @@ def test_many_poses_give_what_each_gives_alone():
     poses = PSM.forward(q).reshape(3, 4, 4, 4)
     found = inverse(PSM, poses, HOME)
     assert found.shape == (3, 4, 6)
-    assert np.allclose(found.reshape(12, 6), [inverse(PSM, pose, HOME) for pose in poses.reshape(12, 4, 4)], rtol=0.0, atol=1e-12)
+    assert np.allclose(
+        found.reshape(12, 6),
+        [inverse(PSM, pose, HOME) for pose in poses.reshape(12, 4, 4)],
+        rtol=0.0,
+        atol=1e-12,
+    )
 
 
 def test_roll_goes_the_short_way_inside_its_range():
@@ -72,7 +89,8 @@ def test_roll_goes_the_short_way_inside_its_range():
     for near, expected in ((3.0, roll), (-3.0, roll - 2 * np.pi), (0.0, roll)):
         assert inverse(PSM, pose, np.add(HOME, [0, 0, 0, near, 0, 0]))[3] == pytest.approx(expected)
     pose = PSM.forward(np.add(HOME, [0, 0, 0, 1.0, 0, 0]))
-    assert inverse(PSM, pose, np.add(HOME, [0, 0, 0, -4.5, 0, 0]))[3] == pytest.approx(1.0)  # 1 - 2 pi is out of range
+    # 1 - 2 pi is out of range
+    assert inverse(PSM, pose, np.add(HOME, [0, 0, 0, -4.5, 0, 0]))[3] == pytest.approx(1.0)
 
 
 def test_where_the_wrist_pitch_axis_passes_the_rcm_the_shaft_stays():
@@ -172,7 +190,9 @@ def test_an_orientation_that_the_endoscope_cannot_have_is_refused():
         turn[:3, :3] = Joint("", "revolute", angle, 0.0, 0.0, 0.0, 0.0, 0.0).transform(0.0)[:3, :3]
         pose = ECM.forward(LOOK) @ turn
         if refused:
-            with pytest.raises(MotionError, match=r"orientation 20.0 degrees away at this position, allowed are 20"):
+            with pytest.raises(
+                MotionError, match=r"orientation 20.0 degrees away at this position, allowed are 20"
+            ):
                 inverse(ECM, pose, LOOK)
         else:
             assert np.allclose(inverse(ECM, pose, LOOK), LOOK, rtol=0.0, atol=1e-9)

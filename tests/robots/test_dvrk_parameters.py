@@ -9,11 +9,19 @@ NAME = TypeAdapter(InstrumentName)
 
 
 def test_an_instrument_goes_by_name_or_number_with_or_without_quotes():
-    assert {NAME.validate_python(name) for name in ("LARGE_NEEDLE_DRIVER_400006", "400006", 400006)} == {"LARGE_NEEDLE_DRIVER_400006"}
+    assert {NAME.validate_python(name) for name in ("LARGE_NEEDLE_DRIVER_400006", "400006", 400006)} == {
+        "LARGE_NEEDLE_DRIVER_400006"
+    }
 
 
 @pytest.mark.parametrize(
-    ("name", "message"), [(399999, "no instrument '399999'. Known: "), (400143, "snake wrist"), (True, "valid string"), (400006.0, "valid string")]
+    ("name", "message"),
+    [
+        (399999, "no instrument '399999'. Known: "),
+        (400143, "snake wrist"),
+        (True, "valid string"),
+        (400006.0, "valid string"),
+    ],
 )
 def test_what_is_no_instrument_is_refused(name, message):
     with pytest.raises(ValidationError, match=message):
@@ -42,7 +50,10 @@ def test_a_setup_joint_is_set_inside_its_range(kind, arm, positions, message):
     ("scene", "message"),
     [
         ({"arms": {"PSM1": {}}, "setup_joints": {"PSM1": [0, 0, 0, 0, 0, 0]}}, "say 'mounting: cart'"),
-        ({"arms": {"PSM1": {}, "ECM": {"position": [0, 0, 0]}}, "mounting": "cart"}, "ECM: position and orientation are for 'mounting: free'"),
+        (
+            {"arms": {"PSM1": {}, "ECM": {"position": [0, 0, 0]}}, "mounting": "cart"},
+            "ECM: position and orientation are for 'mounting: free'",
+        ),
     ],
 )
 def test_where_an_arm_stands_is_said_once(scene, message):

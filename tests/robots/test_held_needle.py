@@ -29,7 +29,9 @@ def test_the_jaw_is_where_the_standard_needle_driver_has_it():
     q = configurations(1)[0]
     frames = CHAIN.frames(q)
     assert np.allclose(frames[5, :3, 3], driver.frames(q[:6])[5, :3, 3], atol=1e-15)
-    assert np.allclose(frames[6, :3, 3], (driver.forward(q[:6]) @ [0.0, 0.0, TOOL.roller.distance, 1.0])[:3], atol=1e-15)
+    assert np.allclose(
+        frames[6, :3, 3], (driver.forward(q[:6]) @ [0.0, 0.0, TOOL.roller.distance, 1.0])[:3], atol=1e-15
+    )
 
 
 def test_rolling_turns_the_needle_about_its_tangent_in_the_jaw_and_leaves_the_held_point():
@@ -74,7 +76,9 @@ def test_of_all_rolls_that_is_taken_which_keeps_the_joints_from_their_limits():
 
 def test_what_cannot_be():
     with pytest.raises(MotionError, match="none of 13 rolls"):
-        held_needle.inverse(TOOL, CHAIN, CHAIN.forward(configurations(1)[0]) + np.array([[0, 0, 0, 1.0]] * 3 + [[0] * 4]))
+        held_needle.inverse(
+            TOOL, CHAIN, CHAIN.forward(configurations(1)[0]) + np.array([[0, 0, 0, 1.0]] * 3 + [[0] * 4])
+        )
     with pytest.raises(MotionError, match="ROLLING_NEEDLE_DRIVER"):
         held_needle.chain(instrument("400006"), NEEDLE, HELD)
     with pytest.raises(MotionError, match="behind its tip"):

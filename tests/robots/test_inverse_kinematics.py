@@ -12,7 +12,9 @@ from robots.inverse_kinematics import pursue
 CHAIN = psm.chain(instrument("palpation-probe"))
 MIDDLE = np.array(psm.HOME)
 ANY_STEP = np.full(6, np.inf)
-near = st.tuples(*(st.floats(-s, s) for s in (0.3, 0.3, 0.05, 0.5, 0.5, 0.5))).map(lambda d: MIDDLE + np.array(d))
+near = st.tuples(*(st.floats(-s, s) for s in (0.3, 0.3, 0.05, 0.5, 0.5, 0.5))).map(
+    lambda d: MIDDLE + np.array(d)
+)
 
 
 def goal_of(q):
@@ -54,7 +56,9 @@ def weighted_error(q, position, orientation):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_goal_out_of_reach_is_followed_as_closely_as_the_ranges_allow(seed):
-    """Pursued along the way out, the command ends where the error is least among all positions inside the ranges."""
+    """Pursued along the way out, the command ends where the error is least among all positions inside the
+    ranges.
+    """
     random = np.random.default_rng(seed)
     q = random.uniform(0.7 * CHAIN.lower, 0.7 * CHAIN.upper)
     q[2] = random.uniform(0.12, 0.22)  # away from the remote centre, where it takes long
@@ -65,7 +69,12 @@ def test_a_goal_out_of_reach_is_followed_as_closely_as_the_ranges_allow(seed):
         q = pursue(CHAIN, q, position, orientation, CHAIN.velocity * 4e-3)
     assert (q >= CHAIN.lower).all()
     assert (q <= CHAIN.upper).all()
-    least = least_squares(weighted_error, np.clip(q, CHAIN.lower + 1e-9, CHAIN.upper - 1e-9), bounds=(CHAIN.lower, CHAIN.upper), args=(position, orientation))
+    least = least_squares(
+        weighted_error,
+        np.clip(q, CHAIN.lower + 1e-9, CHAIN.upper - 1e-9),
+        bounds=(CHAIN.lower, CHAIN.upper),
+        args=(position, orientation),
+    )
     assert np.linalg.norm(weighted_error(q, position, orientation)) <= np.linalg.norm(least.fun) + 1e-5
 
 
@@ -73,7 +82,9 @@ def test_pursuing_meets_a_moving_goal_at_every_step():
     q, tip = MIDDLE, CHAIN.forward(MIDDLE)
     for i in range(200):
         position = tip[:3, 3] + 2e-5 * i * np.array([0.6, -0.64, 0.48])
-        orientation = rotation.product(rotation.exp(1e-3 * i * np.array([0.0, 0.6, 0.8])), rotation.from_matrix(tip))
+        orientation = rotation.product(
+            rotation.exp(1e-3 * i * np.array([0.0, 0.6, 0.8])), rotation.from_matrix(tip)
+        )
         q = pursue(CHAIN, q, position, orientation, CHAIN.velocity * 1e-3)
         assert np.linalg.norm(weighted_error(q, position, orientation)) < 1e-14
 

@@ -37,7 +37,9 @@ def test_forward_is_the_chain_s_own_and_inverse_leads_back_past_the_cannula(shar
     assert np.allclose(PSM.forward(answer.value), PSM.forward(q), atol=1e-9)
 
 
-@pytest.mark.parametrize(("chain", "q"), [(PSM, [0.3, -0.2, 0.15, 0.5, -0.4, 0.25]), (ECM, [0.4, 0.3, 0.1, -0.5])])
+@pytest.mark.parametrize(
+    ("chain", "q"), [(PSM, [0.3, -0.2, 0.15, 0.5, -0.4, 0.25]), (ECM, [0.4, 0.3, 0.1, -0.5])]
+)
 def test_of_fewer_joints_the_link_is_given_with_the_tip_s_offset(chain, q):
     queries = KinematicsQueries(chain)
     for m in range(1, len(q) + 1):
@@ -68,11 +70,28 @@ def test_inverse_takes_the_solution_nearest_to_the_positions_it_is_given():
     [
         (KinematicsQueries(PSM).forward(np.zeros(7)), "too many joints: 7, allowed are up to 6"),
         (KinematicsQueries(PSM).forward(np.array([0.0, np.nan])), "not all joint positions are finite"),
-        (KinematicsQueries(PSM).inverse(np.array([0, 0, -0.1, 0, 0, 0, 1.0]), np.zeros(5)), "incorrect number of joints: 5, expected 6"),
-        (KinematicsQueries(PSM).inverse(np.array([0, 0, -0.9, 0, 0, 0, 1.0]), HOME), "inverse kinematics failed: pose cannot be reached"),
-        (KinematicsQueries(PSM).inverse(np.array([0, 0, -0.1, 0, 0, 0, 0.0]), HOME), "inverse kinematics failed: quaternion"),
-        (KinematicsQueries(PSM).inverse(np.array([0, 0, np.nan, 0, 0, 0, 1.0]), HOME), "inverse kinematics failed: a pose"),
-        (KinematicsQueries(PSM).inverse(KinematicsQueries(PSM).forward(HOME - [0, 0, 0.07, 0, 0, 0]).value, HOME), "inverse kinematics failed: the end of"),
+        (
+            KinematicsQueries(PSM).inverse(np.array([0, 0, -0.1, 0, 0, 0, 1.0]), np.zeros(5)),
+            "incorrect number of joints: 5, expected 6",
+        ),
+        (
+            KinematicsQueries(PSM).inverse(np.array([0, 0, -0.9, 0, 0, 0, 1.0]), HOME),
+            "inverse kinematics failed: pose cannot be reached",
+        ),
+        (
+            KinematicsQueries(PSM).inverse(np.array([0, 0, -0.1, 0, 0, 0, 0.0]), HOME),
+            "inverse kinematics failed: quaternion",
+        ),
+        (
+            KinematicsQueries(PSM).inverse(np.array([0, 0, np.nan, 0, 0, 0, 1.0]), HOME),
+            "inverse kinematics failed: a pose",
+        ),
+        (
+            KinematicsQueries(PSM).inverse(
+                KinematicsQueries(PSM).forward(HOME - [0, 0, 0.07, 0, 0, 0]).value, HOME
+            ),
+            "inverse kinematics failed: the end of",
+        ),
     ],
 )
 def test_what_has_no_answer_says_why_in_the_real_system_s_words(answer, message):
@@ -84,7 +103,14 @@ def at(insertion, chain=PSM):
     return np.array([0.0, 0.0, insertion, 0.0, 0.0, 0.0])[: len(chain.joints)]
 
 
-@pytest.mark.parametrize(("chain", "start", "safe"), [(PSM, 0.0156 + 0.043, 0.0156 + 0.045), (arms.chain("PSM1", "420006"), 0.0078, 0.0098), (ECM, 0.05, 0.04)])
+@pytest.mark.parametrize(
+    ("chain", "start", "safe"),
+    [
+        (PSM, 0.0156 + 0.043, 0.0156 + 0.045),
+        (arms.chain("PSM1", "420006"), 0.0078, 0.0098),
+        (ECM, 0.05, 0.04),
+    ],
+)
 def test_cartesian_control_begins_past_the_cannula_and_goes_no_nearer(chain, start, safe):
     rule = Cannula.of(chain)
     assert rule.not_past(at(start + 1e-6, chain)) == ""

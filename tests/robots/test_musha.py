@@ -64,7 +64,9 @@ def test_contacts_are_where_the_links_are():
         turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
         poses[link.name] = poses[link.parent] @ np.linalg.inv(at_zero[link.parent]) @ link.pose @ turn
         sphere = HAND.spheres[i]
-        assert np.allclose((poses[link.name] @ [*sphere.position, 1.0])[:3], found.reshape(-1, 3)[i], atol=1e-15)
+        assert np.allclose(
+            (poses[link.name] @ [*sphere.position, 1.0])[:3], found.reshape(-1, 3)[i], atol=1e-15
+        )
 
 
 @pytest.mark.parametrize("closing", [0.0, 0.3, 0.7, 0.95])
@@ -90,7 +92,9 @@ def test_modes_go_straight_from_open_to_closed():
             assert joint.lower <= u <= joint.upper
 
 
-@pytest.mark.parametrize(("mode", "closing", "reason"), [("calliper", 0.5, "caliper"), ("grasp", 1.2, "0 .* to 1")])
+@pytest.mark.parametrize(
+    ("mode", "closing", "reason"), [("calliper", 0.5, "caliper"), ("grasp", 1.2, "0 .* to 1")]
+)
 def test_what_is_no_mode_is_refused(mode, closing, reason):
     with pytest.raises(MotionError, match=reason):
         HAND.command(mode, closing)

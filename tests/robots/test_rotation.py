@@ -30,7 +30,9 @@ def test_log_keeps_small_rotations_exact(size, direction):
 
 @given(quaternions, quaternions)
 def test_product_is_that_of_the_matrices(a, b):
-    assert np.allclose(rotation.matrix(rotation.product(a, b)), rotation.matrix(a) @ rotation.matrix(b), atol=1e-12)
+    assert np.allclose(
+        rotation.matrix(rotation.product(a, b)), rotation.matrix(a) @ rotation.matrix(b), atol=1e-12
+    )
 
 
 @given(quaternions)

@@ -16,14 +16,20 @@ CHAINS = {name: arms.chain(name) for name in NAMES}
 
 
 def configurations(chain):
-    return st.tuples(*(st.floats(max(joint.lower, -pi), min(joint.upper, pi)) for joint in chain.joints)).map(np.array)
+    return st.tuples(*(st.floats(max(joint.lower, -pi), min(joint.upper, pi)) for joint in chain.joints)).map(
+        np.array
+    )
 
 
 def many(chain, count=100):
-    return np.random.default_rng(0).uniform(np.maximum(chain.lower, -pi), np.minimum(chain.upper, pi), (count, len(chain.joints)))
+    return np.random.default_rng(0).uniform(
+        np.maximum(chain.lower, -pi), np.minimum(chain.upper, pi), (count, len(chain.joints))
+    )
 
 
-anywhere = st.sampled_from(NAMES).flatmap(lambda name: st.tuples(st.just(CHAINS[name]), configurations(CHAINS[name])))
+anywhere = st.sampled_from(NAMES).flatmap(
+    lambda name: st.tuples(st.just(CHAINS[name]), configurations(CHAINS[name]))
+)
 
 
 @given(configurations(CHAINS["PSM1"]))
@@ -62,7 +68,11 @@ def test_many_configurations_give_what_each_gives_alone(name):
     frames = chain.frames(q.reshape(10, 10, -1)).reshape(100, -1, 4, 4)
     assert np.allclose(frames, [chain.frames(one) for one in q], atol=1e-14)
     for frame in ("base", "tip"):
-        assert np.allclose(chain.jacobian(frames, frame=frame), [chain.jacobian(chain.frames(one), frame=frame) for one in q], atol=1e-14)
+        assert np.allclose(
+            chain.jacobian(frames, frame=frame),
+            [chain.jacobian(chain.frames(one), frame=frame) for one in q],
+            atol=1e-14,
+        )
     assert np.array_equal(chain.forward(q), frames[:, -1])
 
 
@@ -92,7 +102,11 @@ def test_standard_form_is_the_product_of_its_own_links():
         return turn @ Joint("", "revolute", row.alpha, row.a, 0.0, 0.0, 0.0, 0.0).transform(0.0)
 
     expected = link(joint, 0.1 + 0.9, 0.2) @ link(other, 0.6, 0.5 + 0.4)
-    assert np.allclose(SerialChain.from_standard([joint, other], np.eye(4)).forward(np.array([0.9, 0.4])), expected, atol=1e-15)
+    assert np.allclose(
+        SerialChain.from_standard([joint, other], np.eye(4)).forward(np.array([0.9, 0.4])),
+        expected,
+        atol=1e-15,
+    )
 
 
 @pytest.mark.parametrize(
@@ -100,7 +114,13 @@ def test_standard_form_is_the_product_of_its_own_links():
     [
         ([0, 0, 0.1, 0, 0], r"shape \(5,\), expected 6: yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw"),
         ([0, 0, np.nan, 0, 0, 0], "not all positions are finite"),
-        ([0, 1.0, 0.3, 0, 0, 0], r"joint pitch at 1 rad, allowed are -0.925025 .. 0.925025; joint insertion at 0.3 m, allowed are 0 .. 0.24$"),
+        (
+            [0, 1.0, 0.3, 0, 0, 0],
+            (
+                r"joint pitch at 1 rad, allowed are -0.925025 .. 0.925025; joint insertion at 0.3 m, allowed"
+                r" are 0 .. 0.24$"
+            ),
+        ),
     ],
 )
 def test_positions_that_cannot_be_are_refused_with_what_can(q, reason):
@@ -124,5 +144,8 @@ def test_another_number_of_joints_has_no_pose(call, shape):
 def test_a_pose_of_what_is_not_finite_is_refused_naming_the_first():
     q = np.zeros((3, 6))
     q[1, 2] = np.nan
-    with np.errstate(invalid="ignore"), pytest.raises(MotionError, match=r"\[0.0, 0.0, nan, 0.0, 0.0, 0.0\] of yaw, pitch"):
+    with (
+        np.errstate(invalid="ignore"),
+        pytest.raises(MotionError, match=r"\[0.0, 0.0, nan, 0.0, 0.0, 0.0\] of yaw, pitch"),
+    ):
         CHAINS["PSM1"].forward(q)

@@ -22,7 +22,10 @@ def some():
 def ends(pose):
     """Tip and tail of the needle in the tissue's frame."""
     angles = np.array([1.0, -1.0]) * NEEDLE.arc / 2
-    return NEEDLE.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(2)], axis=1) @ pose[:3, :3].T + pose[:3, 3]
+    return (
+        NEEDLE.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(2)], axis=1) @ pose[:3, :3].T
+        + pose[:3, 3]
+    )
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
@@ -67,8 +70,11 @@ def test_a_feasible_stitch_is_feasible_point_by_point():
 
 
 def test_mirrored_stitches_are_feasible_with_the_roll_mirrored():
-    # The arm is its own mirror image but for wrist pitch and yaw being left and right of each other: forehand becomes backhand.
-    mirrored = tuple(replace(one, place=(one.place[0], -one.place[1]), direction=-one.direction) for one in SOME)
+    # The arm is its own mirror image but for wrist pitch and yaw being left and right of each other: forehand
+    # becomes backhand.
+    mirrored = tuple(
+        replace(one, place=(one.place[0], -one.place[1]), direction=-one.direction) for one in SOME
+    )
     there, back = some(), study(mirrored)
     assert np.array_equal(there.constant, back.constant[:, ::-1])
     assert np.array_equal(there.rolling, back.rolling)
@@ -91,4 +97,6 @@ def test_shares_by_a_property_add_up():
     made = some()
     by = made.shares_by("tilt")
     counts = [sum(one.tilt == tilt for one in SOME) for tilt in by]
-    assert np.average([shares["feasible_share"] for shares in by.values()], weights=counts) == pytest.approx(made.shares()["feasible_share"])
+    assert np.average([shares["feasible_share"] for shares in by.values()], weights=counts) == pytest.approx(
+        made.shares()["feasible_share"]
+    )

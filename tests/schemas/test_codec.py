@@ -23,13 +23,16 @@ from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, St
 from schemas.trocar_msgs import Grant
 from tests.strategies import any_message
 
-every_type = pytest.mark.parametrize("name", sorted(name for name in message_types() if "/srv/" not in name))  # parts of services are not recorded
+# parts of services are not recorded
+every_type = pytest.mark.parametrize("name", sorted(name for name in message_types() if "/srv/" not in name))
 STANDARD = sorted(name for name in message_types() if not name.startswith(("crtk_msgs/", "trocar_msgs/")))
 models = st.sampled_from(sorted(message_types())).map(message_type)
 
 
 def same(one: Message, other: Message) -> bool:
-    return type(one) is type(other) and all(_same(getattr(one, name), getattr(other, name)) for name in type(one).model_fields)
+    return type(one) is type(other) and all(
+        _same(getattr(one, name), getattr(other, name)) for name in type(one).model_fields
+    )
 
 
 def _same(one: object, other: object) -> bool:
@@ -63,7 +66,9 @@ def test_bytes_are_a_message_or_a_message_error(model: type[Message], payload: b
 
 @settings(max_examples=300)
 @given(any_message, st.data())
-def test_a_changed_or_cut_message_is_a_message_or_a_message_error(message: Message, data: st.DataObject) -> None:
+def test_a_changed_or_cut_message_is_a_message_or_a_message_error(
+    message: Message, data: st.DataObject
+) -> None:
     payload = bytearray(encode(message))
     cut = data.draw(st.integers(0, len(payload) - 1))
     with pytest.raises(MessageError):
@@ -96,7 +101,9 @@ def test_numbers_that_are_not_finite_are_refused_from_the_wire(bad: float) -> No
     payload = encode(Float64Message(data=1.5)).replace(np.float64(1.5).tobytes(), np.float64(bad).tobytes())
     with pytest.raises(MessageError, match="data: Input should be a finite number"):
         decode(Float64Message, payload)
-    payload = encode(JointState(position=np.array([1.5]))).replace(np.float64(1.5).tobytes(), np.float64(bad).tobytes())
+    payload = encode(JointState(position=np.array([1.5]))).replace(
+        np.float64(1.5).tobytes(), np.float64(bad).tobytes()
+    )
     with pytest.raises(MessageError, match=r"position: .*every number must be finite"):
         decode(JointState, payload)
 
@@ -130,7 +137,10 @@ def test_hashes_follow_from_the_derived_text_alone(name: str) -> None:
 
 def test_a_published_hash() -> None:
     """The hash of std_msgs/msg/String, as `ros2 topic info --verbose` prints it."""
-    assert rihs01("std_msgs/msg/String") == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    assert (
+        rihs01("std_msgs/msg/String")
+        == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    )
 
 
 @every_type
@@ -150,12 +160,24 @@ def test_every_model_has_its_own_ros_type() -> None:
 def test_crtk_types_are_those_that_crtk_publishes() -> None:
     """collaborative-robotics/crtk_msgs, msg/CartesianImpedance.msg and the others."""
     sides = [f"{part}_{side}" for part in ("position", "orientation") for side in ("positive", "negative")]
-    parts = [("geometry_msgs/Pose", "pose"), ("geometry_msgs/Twist", "twist"), ("geometry_msgs/Wrench", "wrench")]
+    parts = [
+        ("geometry_msgs/Pose", "pose"),
+        ("geometry_msgs/Twist", "twist"),
+        ("geometry_msgs/Wrench", "wrench"),
+    ]
     published = {
-        "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "".join(f"geometry_msgs/Vector3 {name}\n" for name in ("p", "d", "bias", "deadband")),
-        "crtk_msgs/msg/CartesianImpedance": "std_msgs/Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3 force_position\n"
-        "geometry_msgs/Quaternion torque_orientation\n" + "".join(f"crtk_msgs/CartesianImpedanceHalfPlaneGains {side}\n" for side in sides),
-        "crtk_msgs/msg/CartesianState": "std_msgs/Header header\n" + "".join(f"{type_} {name}\nstd_msgs/Bool {name}_is_valid\n" for type_, name in parts),
+        "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains": "".join(
+            f"geometry_msgs/Vector3 {name}\n" for name in ("p", "d", "bias", "deadband")
+        ),
+        "crtk_msgs/msg/CartesianImpedance": (
+            "std_msgs/Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3"
+            " force_position\ngeometry_msgs/Quaternion torque_orientation\n"
+            + "".join(f"crtk_msgs/CartesianImpedanceHalfPlaneGains {side}\n" for side in sides)
+        ),
+        "crtk_msgs/msg/CartesianState": (
+            "std_msgs/Header header\n"
+            + "".join(f"{type_} {name}\nstd_msgs/Bool {name}_is_valid\n" for type_, name in parts)
+        ),
         "crtk_msgs/msg/OperatingState": "std_msgs/Header header\nstring state\nbool is_homed\nbool is_busy\n",
         "crtk_msgs/msg/StringStamped": "std_msgs/Header header\nstring string\n",
     }

@@ -29,7 +29,13 @@ def reports(draw: st.DrawFn, error: str = "") -> Report:
 
 
 def ack(report: Report) -> Ack:
-    return Ack.model_validate(report._asdict() | {"state_hash": np.array(report.state_hash, np.uint64), "compute_ns": np.array(report.compute_ns, np.uint64)})
+    return Ack.model_validate(
+        report._asdict()
+        | {
+            "state_hash": np.array(report.state_hash, np.uint64),
+            "compute_ns": np.array(report.compute_ns, np.uint64),
+        }
+    )
 
 
 @given(reports())
@@ -41,7 +47,12 @@ def test_a_packed_report_is_an_ack(report):
 def test_a_report_comes_back_from_either_form(report):
     for payload in (pack_report(report), encode(ack(report))):
         back = unpack_report(payload, len(report.state_hash), len(report.work_j))
-        assert back._replace(state_hash=list(back.state_hash), compute_ns=list(back.compute_ns), work_j=list(back.work_j)) == report
+        assert (
+            back._replace(
+                state_hash=list(back.state_hash), compute_ns=list(back.compute_ns), work_j=list(back.work_j)
+            )
+            == report
+        )
 
 
 @given(reports(), st.integers(0, 3), st.integers(0, 3))
@@ -66,7 +77,12 @@ def test_a_damaged_report_is_refused_or_read_as_the_codec_reads_it(report, data)
     except MessageError:
         return
     expected = decode(Ack, payload)
-    assert (found.run, found.epoch, found.step, found.error) == (expected.run, expected.epoch, expected.step, expected.error)
+    assert (found.run, found.epoch, found.step, found.error) == (
+        expected.run,
+        expected.epoch,
+        expected.step,
+        expected.error,
+    )
     for name in ("state_hash", "compute_ns", "work_j"):
         assert list(getattr(found, name)) == getattr(expected, name).tolist()
 
@@ -78,7 +94,9 @@ def test_a_work_that_is_not_finite_is_refused(work):
 
 
 samples = st.lists(messages(InletSample), max_size=2)
-permissions = st.builds(lambda head, times, inlets: Permission(*head, *times, inlets), heads, st.tuples(int64, int64), samples)
+permissions = st.builds(
+    lambda head, times, inlets: Permission(*head, *times, inlets), heads, st.tuples(int64, int64), samples
+)
 
 
 @given(permissions)

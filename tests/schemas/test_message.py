@@ -37,8 +37,9 @@ class Sample(Message):
 
 
 def test_msg_text_is_derived_from_the_model() -> None:
-    assert msg_text(Sample) == (
-        "std_msgs/Header header\nstd_msgs/Header[] headers\nuint8 level\nuint8[] raw\nint32[] small\n"
+    assert (
+        msg_text(Sample)
+        == "std_msgs/Header header\nstd_msgs/Header[] headers\nuint8 level\nuint8[] raw\nint32[] small\n"
         "uint64[] big\nfloat32[] single\nfloat64[] double\nfloat64[4] matrix\n"
     )
 
@@ -90,7 +91,14 @@ def test_values_out_of_range_or_shape_are_refused(field: str, value: Any) -> Non
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("raw", [0, 255]), ("small", np.array([1.0, -2.0])), ("big", [0, 2**64 - 1]), ("single", [0.5]), ("double", [1, 2]), ("matrix", range(4))],
+    [
+        ("raw", [0, 255]),
+        ("small", np.array([1.0, -2.0])),
+        ("big", [0, 2**64 - 1]),
+        ("single", [0.5]),
+        ("double", [1, 2]),
+        ("matrix", range(4)),
+    ],
 )
 def test_what_has_an_exact_place_is_taken(field: str, value: Any) -> None:
     taken = getattr(Sample.model_validate({field: value}), field)

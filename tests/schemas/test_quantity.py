@@ -12,9 +12,32 @@ from schemas.quantity import Duration, Force, Length, same_unit, to_si
 
 nonsense = st.one_of(
     st.text(max_size=12),
-    st.lists(st.sampled_from(["m", "mm", "kg", "N", "bogus", "degC", "%", "²", "1", "9", "*", "**", "^", "/", "(", ")", "-", " ", "nan"]), max_size=8).map(
-        "".join
-    ),
+    st.lists(
+        st.sampled_from(
+            [
+                "m",
+                "mm",
+                "kg",
+                "N",
+                "bogus",
+                "degC",
+                "%",
+                "²",
+                "1",
+                "9",
+                "*",
+                "**",
+                "^",
+                "/",
+                "(",
+                ")",
+                "-",
+                " ",
+                "nan",
+            ]
+        ),
+        max_size=8,
+    ).map("".join),
 )
 
 
@@ -119,12 +142,16 @@ def test_durations_are_whole_nanoseconds(ns: int) -> None:
     assert Model.model_validate_json(model.model_dump_json()) == model
 
 
-@pytest.mark.parametrize(("text", "ns"), [("1 ms", 10**6), (0.001, 10**6), ("2.5 us", 2500), ("1 min", 60 * 10**9), (1, 10**9)])
+@pytest.mark.parametrize(
+    ("text", "ns"), [("1 ms", 10**6), (0.001, 10**6), ("2.5 us", 2500), ("1 min", 60 * 10**9), (1, 10**9)]
+)
 def test_durations(text: float | str, ns: int) -> None:
     assert Model(duration=text).duration == ns  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("value", ["0.1 ns", "1 m", math.inf, math.nan, "1e300 s", 1e305, "300 years", "a while", None, True])
+@pytest.mark.parametrize(
+    "value", ["0.1 ns", "1 m", math.inf, math.nan, "1e300 s", 1e305, "300 years", "a while", None, True]
+)
 def test_no_duration(value: object) -> None:
     with pytest.raises(ValidationError):
         Model.model_validate({"duration": value})

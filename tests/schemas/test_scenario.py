@@ -17,11 +17,26 @@ FULL: dict[str, Any] = {
     "pace": "realtime",
     "window": 10,
     "participants": {
-        "robot": {"kind": "mujoco", "host": "robot", "period": "2 ms", "arms": {"PSM1": {"instrument": "probe"}}},
+        "robot": {
+            "kind": "mujoco",
+            "host": "robot",
+            "period": "2 ms",
+            "arms": {"PSM1": {"instrument": "probe"}},
+        },
         "tissue": {"kind": "bullet"},
     },
-    "connections": ["robot.PSM1/pose -> tissue.target", {"source": "tissue.wrench", "target": "robot.load", "extrapolation": "linear"}],
-    "bonds": [{"motion": "robot.PSM1/probe", "force": "tissue.probe", "algorithm": "gauss-seidel", "order": ["tissue", "robot"]}],
+    "connections": [
+        "robot.PSM1/pose -> tissue.target",
+        {"source": "tissue.wrench", "target": "robot.load", "extrapolation": "linear"},
+    ],
+    "bonds": [
+        {
+            "motion": "robot.PSM1/probe",
+            "force": "tissue.probe",
+            "algorithm": "gauss-seidel",
+            "order": ["tissue", "robot"],
+        }
+    ],
     "measure": {"peak_n": {"kind": "peak-norm", "of": "tissue.probe/wrench.force", "live": True}},
 }
 
@@ -37,7 +52,13 @@ def scenarios(draw: st.DrawFn) -> dict[str, Any]:
         "duration": draw(st.none() | durations),
         "window": draw(st.integers(1, 1000)),
         "participants": draw(
-            st.dictionaries(names, st.fixed_dictionaries({"kind": st.text(max_size=5)}, optional={"period": durations, "mass": st.integers()}), min_size=1)
+            st.dictionaries(
+                names,
+                st.fixed_dictionaries(
+                    {"kind": st.text(max_size=5)}, optional={"period": durations, "mass": st.integers()}
+                ),
+                min_size=1,
+            )
         ),
         "connections": draw(st.lists(st.tuples(endpoints, endpoints).map(" -> ".join), max_size=3)),
         "bonds": draw(st.lists(st.fixed_dictionaries({"motion": endpoints, "force": endpoints}), max_size=2)),
@@ -53,9 +74,16 @@ def test_json_round_trip(tree: dict[str, Any]) -> None:
 def test_a_full_scenario() -> None:
     scenario = Scenario.model_validate(FULL)
     assert Scenario.model_validate_json(scenario.model_dump_json()) == scenario
-    assert (scenario.step, scenario.duration, scenario.participants["robot"].period) == (10**6, 20 * 10**9, 2 * 10**6)
+    assert (scenario.step, scenario.duration, scenario.participants["robot"].period) == (
+        10**6,
+        20 * 10**9,
+        2 * 10**6,
+    )
     assert scenario.participants["robot"].params == {"arms": {"PSM1": {"instrument": "probe"}}}
-    assert scenario.connections[0] == Connection(source=Endpoint(participant="robot", port="PSM1/pose"), target=Endpoint(participant="tissue", port="target"))
+    assert scenario.connections[0] == Connection(
+        source=Endpoint(participant="robot", port="PSM1/pose"),
+        target=Endpoint(participant="tissue", port="target"),
+    )
     assert scenario.bonds[0].name == "robot/PSM1/probe"
     assert str(scenario.measure["peak_n"].of) == "tissue.probe/wrench.force"
 

@@ -15,7 +15,13 @@ from schemas.vectors import VectorCodec, has_vector
 from tests.strategies import ports, values
 
 stamps = st.integers(0, 2**31 * 10**9 - 1)
-JOINTS = Port(name="js", causality="output", type="sensor_msgs/msg/JointState", names=("yaw", "pitch", "insertion"), fields=("position", "effort"))
+JOINTS = Port(
+    name="js",
+    causality="output",
+    type="sensor_msgs/msg/JointState",
+    names=("yaw", "pitch", "insertion"),
+    fields=("position", "effort"),
+)
 POSE = Port(name="pose", causality="output", type="geometry_msgs/msg/PoseStamped", frame="world")
 
 
@@ -34,7 +40,9 @@ def test_encode_writes_the_bytes_of_the_message(drawn: tuple[VectorCodec, np.nda
 
 @settings(max_examples=200)
 @given(codecs_with_values(), stamps)
-def test_decode_and_from_message_are_the_way_back(drawn: tuple[VectorCodec, np.ndarray], time_ns: int) -> None:
+def test_decode_and_from_message_are_the_way_back(
+    drawn: tuple[VectorCodec, np.ndarray], time_ns: int
+) -> None:
     codec, value = drawn
     payload = codec.encode(value, time_ns)
     assert codec.decode(payload).tobytes() == value.tobytes()
@@ -49,7 +57,9 @@ def test_other_bytes_are_refused(port: Port, payload: bytes) -> None:
 
 @settings(max_examples=300)
 @given(codecs_with_values(), st.data())
-def test_a_changed_byte_is_a_changed_number_or_refused(drawn: tuple[VectorCodec, np.ndarray], data: st.DataObject) -> None:
+def test_a_changed_byte_is_a_changed_number_or_refused(
+    drawn: tuple[VectorCodec, np.ndarray], data: st.DataObject
+) -> None:
     codec, value = drawn
     payload = bytearray(codec.encode(value, 0))
     payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
@@ -65,7 +75,9 @@ def test_a_changed_byte_is_a_changed_number_or_refused(drawn: tuple[VectorCodec,
 
 
 @given(codecs_with_values(), st.sampled_from([np.nan, np.inf, -np.inf]), st.data())
-def test_numbers_that_are_not_finite_are_refused(drawn: tuple[VectorCodec, np.ndarray], bad: float, data: st.DataObject) -> None:
+def test_numbers_that_are_not_finite_are_refused(
+    drawn: tuple[VectorCodec, np.ndarray], bad: float, data: st.DataObject
+) -> None:
     codec, value = drawn
     value = value.copy()
     value[data.draw(st.integers(0, codec.size - 1))] = bad
@@ -79,11 +91,23 @@ def test_numbers_that_are_not_finite_are_refused(drawn: tuple[VectorCodec, np.nd
 def test_named_joints_come_in_any_order(order: list[str], numbers: list[float]) -> None:
     codec, value = VectorCodec(JOINTS), np.array(numbers)
     by_name = dict(zip(JOINTS.names, zip(value[:3], value[3:], strict=True), strict=True))
-    message = JointState(name=order, position=np.array([by_name[n][0] for n in order]), effort=np.array([by_name[n][1] for n in order]))
+    message = JointState(
+        name=order,
+        position=np.array([by_name[n][0] for n in order]),
+        effort=np.array([by_name[n][1] for n in order]),
+    )
     assert np.array_equal(codec.from_message(message), value)
 
 
-@pytest.mark.parametrize("names", [["yaw", "pitch"], ["yaw", "pitch", "roll"], ["yaw", "pitch", "insertion", "insertion"], ["yaw", "yaw", "pitch"]])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["yaw", "pitch"],
+        ["yaw", "pitch", "roll"],
+        ["yaw", "pitch", "insertion", "insertion"],
+        ["yaw", "yaw", "pitch"],
+    ],
+)
 def test_other_joints_are_refused(names: list[str]) -> None:
     with pytest.raises(MessageError, match="expected"):
         VectorCodec(JOINTS).from_message(JointState(name=names, position=np.zeros(3), effort=np.zeros(3)))
@@ -102,7 +126,11 @@ def test_unnamed_joints_come_in_the_order_of_the_port() -> None:
         (POSE, WrenchStamped(), "geometry_msgs/msg/WrenchStamped, expected geometry_msgs/msg/PoseStamped"),
         (POSE, Twist(), "geometry_msgs/msg/Twist, expected"),
         (JOINTS, JointState(position=np.zeros(3)), "0 values in effort, expected 3"),
-        (Port(name="a", causality="output", size=2), Float64MultiArray(data=np.zeros(3)), "3 values in data, expected 2"),
+        (
+            Port(name="a", causality="output", size=2),
+            Float64MultiArray(data=np.zeros(3)),
+            "3 values in data, expected 2",
+        ),
     ],
 )
 def test_a_message_that_does_not_fit_the_port(port: Port, message: Message, said: str) -> None:
@@ -114,7 +142,9 @@ def test_a_message_without_a_frame_is_taken() -> None:
     assert np.array_equal(VectorCodec(POSE).from_message(PoseStamped()), VectorCodec(POSE).neutral)
 
 
-@pytest.mark.parametrize("value", [np.zeros(6), np.zeros((7, 1)), np.zeros(7, np.float32), np.arange(7), np.zeros(7)])
+@pytest.mark.parametrize(
+    "value", [np.zeros(6), np.zeros((7, 1)), np.zeros(7, np.float32), np.arange(7), np.zeros(7)]
+)
 def test_values_of_another_shape_or_type_are_refused(value: np.ndarray) -> None:
     with pytest.raises(MessageError, match="'pose'"):
         VectorCodec(POSE).checked(value)
@@ -143,11 +173,18 @@ def test_types_without_a_vector() -> None:
 @pytest.mark.parametrize("side", ["motion", "force"])
 @pytest.mark.parametrize(("dof", "points"), [(1, 1), (2, 1), (3, 1), (3, 9), (6, 1)])
 def test_every_port_of_a_bond_has_a_vector(side: str, dof: int, points: int) -> None:
-    bond = BondSide.model_validate({"name": "tip", "side": side, "dof": dof, "points": points, "frame": "world"})
+    bond = BondSide.model_validate(
+        {"name": "tip", "side": side, "dof": dof, "points": points, "frame": "world"}
+    )
     position, velocity, force = bond_ports(bond)
     assert VectorCodec(velocity).size == VectorCodec(force).size == bond.size == dof * points
     assert VectorCodec(position).size == (7 if dof == 6 else dof * points)
-    assert position.causality == velocity.causality == ("output" if side == "motion" else "input") != force.causality
+    assert (
+        position.causality
+        == velocity.causality
+        == ("output" if side == "motion" else "input")
+        != force.causality
+    )
 
 
 @pytest.mark.parametrize("dof", [1, 2, 6])

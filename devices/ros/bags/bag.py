@@ -1,4 +1,6 @@
-"""ROS bags of any kind, read through `rosbags`: rosbag2 directories, bare .mcap and .db3 files, .bag files of ROS 1. Nothing in them is trusted."""
+"""ROS bags of any kind, read through `rosbags`: rosbag2 directories, bare .mcap and .db3 files, .bag files of
+ROS 1. Nothing in them is trusted.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ class BagTopic(NamedTuple):
 
 
 class RosBag:
-    """A bag that is open for reading; its messages are read with the definitions that it brings, or, if it brings none, with ours."""
+    """A bag that is open for reading; its messages are read with the definitions that it brings, or, if it
+    brings none, with ours.
+    """
 
     def __init__(self, path: Path) -> None:
         """Open a bag. Raises RecordingError if it is none."""
@@ -36,12 +40,18 @@ class RosBag:
         self.topics: dict[str, BagTopic] = {}
         for one in self._reader.connections:
             known = self.topics.get(one.topic)
-            self.topics[one.topic] = BagTopic(one.msgtype, one.msgcount + (known.messages if known is not None else 0))
-        self.start_ns = self._reader.start_time if any(topic.messages for topic in self.topics.values()) else 0
+            self.topics[one.topic] = BagTopic(
+                one.msgtype, one.msgcount + (known.messages if known is not None else 0)
+            )
+        self.start_ns = (
+            self._reader.start_time if any(topic.messages for topic in self.topics.values()) else 0
+        )
         """Wall time (ns) of the first message."""
 
     def messages(self, topics: Collection[str], start_ns: int) -> Iterator[tuple[str, int, object]]:
-        """Yield topic, time (ns) and the message as `rosbags` has it, or the error that it makes, of all since `start_ns`, by time. Raises RecordingError."""
+        """Yield topic, time (ns) and the message as `rosbags` has it, or the error that it makes, of all
+        since `start_ns`, by time. Raises RecordingError.
+        """
         wanted: list[Connection] = [one for one in self._reader.connections if one.topic in topics]
         if not wanted:
             return
@@ -74,7 +84,10 @@ def _reading(path: Path) -> Generator[None]:
         yield
     except (RecordingError, GeneratorExit):
         raise
-    except Exception as error:  # rosbags raises errors of its own, KeyError, struct.error, sqlite3's and zstd's
+    except (
+        Exception
+    ) as error:  # rosbags raises errors of its own, KeyError, struct.error, sqlite3's and zstd's
         raise RecordingError(
-            f"cannot read the bag '{path}' ({type(error).__name__}: {error}); a rosbag2 directory, an .mcap, .db3 or .bag file is expected"
+            f"cannot read the bag '{path}' ({type(error).__name__}: {error}); a rosbag2 directory, an .mcap,"
+            " .db3 or .bag file is expected"
         ) from error

@@ -1,7 +1,8 @@
-"""A session's recording as a bag with ROS names: what its gateway has published and heard, for `ros2 bag play`.
+"""A session's recording as a bag with ROS names: what its gateway has published and heard, for `ros2 bag
+play`.
 
-Times are the session's start by the wall clock plus simulated time, in stamps too: a bag plays at the pace of the simulation, however fast that ran
-(docs/decisions/0033-bags.md).
+Times are the session's start by the wall clock plus simulated time, in stamps too: a bag plays at the pace of
+the simulation, however fast that ran (docs/decisions/0033-bags.md).
 """
 
 from __future__ import annotations
@@ -50,10 +51,11 @@ class ExportSummary:
 
 
 def export(recording: Recording, directory: Path, gateway: str | None = None) -> ExportSummary:
-    """Write what gateway `gateway` of a recorded session, by default its only one, has published and heard, to a new `directory`.
+    """Write what gateway `gateway` of a recorded session, by default its only one, has published and heard,
+    to a new `directory`.
 
-    Raises RecordingError if the session has no such gateway, if the directory exists or cannot be written, or if the recording is damaged; ScenarioError
-    if the gateway's kind is not installed.
+    Raises RecordingError if the session has no such gateway, if the directory exists or cannot be written, or
+    if the recording is damaged; ScenarioError if the gateway's kind is not installed.
     """
     plan = recording.plan()
     shown = _gateway(recording, plan, gateway)
@@ -67,23 +69,40 @@ def export(recording: Recording, directory: Path, gateway: str | None = None) ->
                 for row, source in routes[message.topic]:
                     retold.take(row, source, message.time_ns, message.payload)
             except MessageError as error:
-                raise RecordingError(f"'{recording.file}': topic '{message.topic}' at {message.time_ns} ns: {error}") from error
+                raise RecordingError(
+                    f"'{recording.file}': topic '{message.topic}' at {message.time_ns} ns: {error}"
+                ) from error
         retold.publish_before(last_ns + 1)
     return ExportSummary(str(directory), shown.name, bag.topics, bag.messages, recording.duration_ns * 1e-9)
 
 
 def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
     """Return the gateway that is meant, as the scenario declares it."""
-    kinds = {member.name: registry.load(member.kind) for member in plan.members.values() if member.role == "device"}
+    kinds = {
+        member.name: registry.load(member.kind) for member in plan.members.values() if member.role == "device"
+    }
     there = [device for device, kind in kinds.items() if issubclass(kind, Gateway)]
     if name is None and len(there) != 1:
-        none = "no gateway to ROS, which would say what its topics are: put one into the scenario, with `motion.* -> ros.*`, and record again"
-        found = f"{len(there)} gateways to ROS ({', '.join(there)}): say which by --gateway" if there else none
+        none = (
+            "no gateway to ROS, which would say what its topics are: put one into the scenario, with"
+            " `motion.* -> ros.*`, and record again"
+        )
+        found = (
+            f"{len(there)} gateways to ROS ({', '.join(there)}): say which by --gateway" if there else none
+        )
         raise RecordingError(f"session '{recording.session()}' in '{recording.file}' has {found}")
     if name is not None and name not in there:
-        raise RecordingError(f"session '{recording.session()}' in '{recording.file}' has no gateway '{name}'.{did_you_mean(name, there)}")
+        raise RecordingError(
+            f"session '{recording.session()}' in '{recording.file}' has no gateway"
+            f" '{name}'.{did_you_mean(name, there)}"
+        )
     meant = there[0] if name is None else name
-    made = registry.make(plan.members[meant].kind, meant, recording.scenario().participants[meant].params, recording.directory())
+    made = registry.make(
+        plan.members[meant].kind,
+        meant,
+        recording.scenario().participants[meant].params,
+        recording.directory(),
+    )
     if not isinstance(made, Gateway):
         raise TypeError(f"{made} is of a kind of gateways, and none itself")
     return made
@@ -95,7 +114,9 @@ def _routes(plan: Plan, gateway: Gateway) -> _Routes:
     for link in plan.outlets:
         if link.device == gateway.name:
             source = plan.members[link.source].port(link.source_port)
-            routes[topic(_KEYS.output("engine", link.source, source.name))].append((rows[link.device_port], source))
+            routes[topic(_KEYS.output("engine", link.source, source.name))].append(
+                (rows[link.device_port], source)
+            )
     for row in rows.values():
         if row.way == "subscribe" and row.port is not None:
             routes[topic(_KEYS.output("device", gateway.name, row.port.name))].append((row, row.port))
@@ -125,10 +146,18 @@ class _Retold:
         self._bag, self._period_ns, self._due_ns = bag, gateway.params.publish_period, 0
         fed = {row.topic: source for rows in routes.values() for row, source in rows}
         periodic = [(row, row.port) for row in gateway.rows if row.periodic and row.port is not None]
-        self._recorded = {row.topic: _Recorded(port, fed[row.topic]) for row, port in periodic if row.topic in fed}
-        states: dict[str, State] = {port.name: self._recorded.get(row.topic) or State(port) for row, port in periodic}
-        whole: Mapping[str, Source] = scenery(gateway.params, states) if gateway.params.profile == "dvrk" else {}
-        self._periodic: list[tuple[Row, Source, int]] = [(row, states[port.name], 1) for row, port in periodic if row.topic in fed]
+        self._recorded = {
+            row.topic: _Recorded(port, fed[row.topic]) for row, port in periodic if row.topic in fed
+        }
+        states: dict[str, State] = {
+            port.name: self._recorded.get(row.topic) or State(port) for row, port in periodic
+        }
+        whole: Mapping[str, Source] = (
+            scenery(gateway.params, states) if gateway.params.profile == "dvrk" else {}
+        )
+        self._periodic: list[tuple[Row, Source, int]] = [
+            (row, states[port.name], 1) for row, port in periodic if row.topic in fed
+        ]
         for row in gateway.rows:
             if row.name in whole:
                 self._periodic.append((row, whole[row.name], stride(row.name, self._period_ns)))
@@ -145,7 +174,9 @@ class _Retold:
         """Take a recorded value. Raises MessageError if it is none of its port."""
         if row.topic in self._recorded:
             self._recorded[row.topic].payload = payload
-        elif row.way == "subscribe" or source.variability == "event" or time_ns > 0:  # a signal's value at time 0 is no message
+        elif (
+            row.way == "subscribe" or source.variability == "event" or time_ns > 0
+        ):  # a signal's value at time 0 is no message
             self._bag.write(row, time_ns, decode(message_type(row.type), payload))
 
     def publish_before(self, time_ns: int) -> None:
@@ -153,6 +184,9 @@ class _Retold:
         while self._due_ns < time_ns:
             period = self._due_ns // self._period_ns
             for row, source, every in self._periodic:
-                if period % every == 0 and (payload := source.cdr(self._bag.stamp_ns(row, self._due_ns))) is not None:
+                if (
+                    period % every == 0
+                    and (payload := source.cdr(self._bag.stamp_ns(row, self._due_ns))) is not None
+                ):
                     self._bag.write(row, self._due_ns, payload)
             self._due_ns += self._period_ns

@@ -25,10 +25,22 @@ _NAMED = 6
 class BagParams(HeardParams):
     """Which bag is played, how, and what of it."""
 
-    bag: Path = Field(description="rosbag2 directory, .mcap, .db3, or .bag of ROS 1, relative to the scenario")
+    bag: Path = Field(
+        description="rosbag2 directory, .mcap, .db3, or .bag of ROS 1, relative to the scenario"
+    )
     start: Duration = Field(default=0, ge=0, description="time of the bag at which playing begins")
-    rate: float = Field(default=1.0, gt=0.0, allow_inf_nan=False, description="speed of playing; 2 is twice as fast as recorded")
-    rename: Mapping[str, str] = Field(default={}, description="topics of the bag to topics of the dVRK: {/dvrk/PSM1/set_position_goal_joint: /PSM1/move_jp}")
+    rate: float = Field(
+        default=1.0,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="speed of playing; 2 is twice as fast as recorded",
+    )
+    rename: Mapping[str, str] = Field(
+        default={},
+        description=(
+            "topics of the bag to topics of the dVRK: {/dvrk/PSM1/set_position_goal_joint: /PSM1/move_jp}"
+        ),
+    )
 
     @field_validator("bag")
     @classmethod
@@ -47,8 +59,13 @@ class BagParams(HeardParams):
         if unknown is not None:
             raise ValueError(f"rename: '{self.bag}' has no topic '{unknown}'.{did_you_mean(unknown, topics)}")
         if not self.played(topics):
-            hearable = ", ".join(row.topic for row in self.heard.values()) or "none: `arms` and `listen` are empty"
-            raise ValueError(f"'{self.bag}' has nothing that could be played here. Its topics: {listed(topics) or 'none'}. Topics that are heard: {hearable}")
+            hearable = (
+                ", ".join(row.topic for row in self.heard.values()) or "none: `arms` and `listen` are empty"
+            )
+            raise ValueError(
+                f"'{self.bag}' has nothing that could be played here. Its topics: {listed(topics) or 'none'}."
+                f" Topics that are heard: {hearable}"
+            )
         return self
 
     @property
@@ -62,8 +79,12 @@ class BagParams(HeardParams):
     def played(self, topics: Mapping[str, BagTopic]) -> Mapping[str, Row]:
         """Return which topics of a bag are played, and as what."""
         heard = self.heard
-        rows = {topic: heard.get(self.rename.get(topic, topic)) for topic, told in topics.items() if told.messages}
-        return {topic: row for topic, row in rows.items() if row is not None and row.type == topics[topic].type}
+        rows = {
+            topic: heard.get(self.rename.get(topic, topic)) for topic, told in topics.items() if told.messages
+        }
+        return {
+            topic: row for topic, row in rows.items() if row is not None and row.type == topics[topic].type
+        }
 
 
 def listed(topics: Mapping[str, BagTopic]) -> str:

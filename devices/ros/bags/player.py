@@ -1,7 +1,8 @@
 """Plays what a ROS bag holds of an operator's commands, and of a real dVRK's states: the kind `ros-bag`.
 
-Time 0 is the first message of the bag, whatever its topic, and the times of recording give the pace, as in `ros2 bag play`. What is played comes out of ports
-that are named as those of a gateway, and is refused by the same rules; stamps become the times of playing. docs/decisions/0033-bags.md.
+Time 0 is the first message of the bag, whatever its topic, and the times of recording give the pace, as in
+`ros2 bag play`. What is played comes out of ports that are named as those of a gateway, and is refused by the
+same rules; stamps become the times of playing. docs/decisions/0033-bags.md.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ __all__ = ["BagPlayer"]
 log = logging.getLogger(__name__)
 
 _LATCHED_NS = 1_000_000_000
-"""A state command that is older when it is recorded came by a late recorder's connection; a CRTK client takes a connection for lost after as long."""
+"""A state command that is older when it is recorded came by a late recorder's connection; a CRTK client takes
+a connection for lost after as long.
+"""
 _REMEMBERED = 8
 """State commands, as a gateway remembers them."""
 
@@ -57,8 +60,15 @@ class BagPlayer(Device):
     def _ports(self) -> tuple[Port, ...]:
         with RosBag(self.params.bag) as bag:
             topics = {row.topic for row in self.params.played(bag.topics).values()}
-        ports = [row.port for row in self.params.heard.values() if row.topic in topics and row.port is not None]
-        return tuple(port.model_copy(update={"clock": "simulated", "max_age_ns": round(port.max_age_ns / self.params.rate)}) for port in ports)
+        ports = [
+            row.port for row in self.params.heard.values() if row.topic in topics and row.port is not None
+        ]
+        return tuple(
+            port.model_copy(
+                update={"clock": "simulated", "max_age_ns": round(port.max_age_ns / self.params.rate)}
+            )
+            for port in ports
+        )
 
     def open(self, directory: Path) -> None:  # noqa: ARG002 - the bag was found when the parameters were validated
         """Open the bag, and say what of it is not played. Raises RecordingError if it cannot be read."""
@@ -67,7 +77,12 @@ class BagPlayer(Device):
         played = self.params.played(bag.topics)
         passed_over = {topic: told for topic, told in bag.topics.items() if topic not in played}
         if passed_over:
-            log.info("device '%s': passed over of '%s', as nothing here hears them: %s", self.name, bag.path, listed(passed_over))
+            log.info(
+                "device '%s': passed over of '%s', as nothing here hears them: %s",
+                self.name,
+                bag.path,
+                listed(passed_over),
+            )
         self._drops = Drops()
         self._playback = Playback(self._play(bag, played))
 
@@ -124,7 +139,10 @@ class _Rule:
         """Raise MessageError for a state command that a connection has brought, though nobody gave it then."""
         ago_ns = recorded_ns - stamp_ns
         if ago_ns > _LATCHED_NS:
-            raise MessageError(f"given {ago_ns / 1e9:.1f} s before it was recorded, so it came by a connection (latched): nobody gave it then")
+            raise MessageError(
+                f"given {ago_ns / 1e9:.1f} s before it was recorded, so it came by a connection (latched):"
+                " nobody gave it then"
+            )
         if stamp_ns in self._heeded:
             raise MessageError(f"heeded before, with the same stamp, {stamp_ns / 1e9:.9f} s")
         self._heeded.append(stamp_ns)

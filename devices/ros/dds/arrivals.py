@@ -25,8 +25,8 @@ _LONGEST_WAIT_NS = duration(hours=1)
 class Arrivals(WaitSet):
     """Waits for readers and hands on what they have, those added first before others.
 
-    Not a listener: that is called in the thread which receives for all, and there it would wait for Python's interpreter, which a simulation in the same
-    process holds for milliseconds.
+    Not a listener: that is called in the thread which receives for all, and there it would wait for Python's
+    interpreter, which a simulation in the same process holds for milliseconds.
     """
 
     def __init__(self, participant: DomainParticipant, name: str) -> None:
@@ -55,7 +55,12 @@ class Arrivals(WaitSet):
     def _run(self) -> None:
         while True:
             triggered = (ctypes.c_ssize_t * (len(self._taken) + 1))()
-            count = self._waitset_wait(self._ref, ctypes.cast(triggered, ctypes.POINTER(ctypes.c_void_p)), len(triggered), _LONGEST_WAIT_NS)
+            count = self._waitset_wait(
+                self._ref,
+                ctypes.cast(triggered, ctypes.POINTER(ctypes.c_void_p)),
+                len(triggered),
+                _LONGEST_WAIT_NS,
+            )
             numbers = sorted(triggered[: min(count, len(triggered))])
             if count < 0 or -1 in numbers:
                 return
@@ -64,7 +69,9 @@ class Arrivals(WaitSet):
                     self._taken[number]()
                 except DDSException as error:
                     log.warning("a reader of DDS fails: %s", error)
-                except Exception:  # one sample that goes wrong in a way nobody thought of is not to end all hearing
+                except (
+                    Exception
+                ):  # one sample that goes wrong in a way nobody thought of is not to end all hearing
                     log.exception("a sample on DDS cannot be taken")
 
     def close(self) -> None:

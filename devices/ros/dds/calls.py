@@ -1,8 +1,13 @@
-"""Answers services. Programs with rmw_fastrtps tell a request from another by parameters beside the message, where Cyclone DDS lets nobody look.
+"""Answers services.
 
-So it is a participant of its own, of which programs see servers and nothing else. It answers those with rmw_cyclonedds, too: of two servers a program would
-take the first that it finds for the one that hears it. Sources of what a request and its response say beside what is asked: ros2/rmw_fastrtps,
-rmw_fastrtps_shared_cpp/src/rmw_request.cpp and rmw_response.cpp; ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
+Programs with rmw_fastrtps tell a request from another by parameters beside the message, where Cyclone DDS
+lets nobody look.
+
+So it is a participant of its own, of which programs see servers and nothing else. It answers those with
+rmw_cyclonedds, too: of two servers a program would take the first that it finds for the one that hears it.
+Sources of what a request and its response say beside what is asked: ros2/rmw_fastrtps,
+rmw_fastrtps_shared_cpp/src/rmw_request.cpp and rmw_response.cpp; ros2/rmw_cyclonedds,
+rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
 """
 
 from __future__ import annotations
@@ -43,7 +48,9 @@ log = logging.getLogger(__name__)
 _FAST_DDS, _CYCLONE_DDS, _NO_VENDOR = b"\x01\x0f", b"\x01\x10", b"\x00\x00"
 """Vendors of a participant, the first two bytes of its id."""
 _HEADER = slice(4, 20)
-"""Of requests and responses of rmw_cyclonedds, behind the encapsulation header: which client, and the number of its request."""
+"""Of requests and responses of rmw_cyclonedds, behind the encapsulation header: which client, and the number
+of its request.
+"""
 
 _PARTICIPANT = b"\x00\x00\x01\xc1"
 _FINDER, _FOUND = b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7"
@@ -52,8 +59,25 @@ _SUBSCRIPTIONS, _SUBSCRIPTIONS_HEARD = b"\x00\x00\x04\xc2", b"\x00\x00\x04\xc7"
 _WRITER_KIND, _READER_KIND = b"\x03", b"\x04"
 """Ids of built-in readers and writers, and the last byte of others, that have no key: DDSI-RTPS 9.3.1."""
 
-_LEASE, _TOPIC, _TYPE, _DOMAIN, _VERSION, _VENDOR, _RELIABILITY, _DURABILITY = 0x02, 0x05, 0x07, 0x0F, 0x15, 0x16, 0x1A, 0x1D
-_UNICAST, _BUILTIN_UNICAST, _PARTICIPANT_ID, _BUILTIN, _ENDPOINT_ID, _KEY_HASH, _STATUS = 0x31, 0x32, 0x50, 0x58, 0x5A, 0x70, 0x71
+_LEASE, _TOPIC, _TYPE, _DOMAIN, _VERSION, _VENDOR, _RELIABILITY, _DURABILITY = (
+    0x02,
+    0x05,
+    0x07,
+    0x0F,
+    0x15,
+    0x16,
+    0x1A,
+    0x1D,
+)
+_UNICAST, _BUILTIN_UNICAST, _PARTICIPANT_ID, _BUILTIN, _ENDPOINT_ID, _KEY_HASH, _STATUS = (
+    0x31,
+    0x32,
+    0x50,
+    0x58,
+    0x5A,
+    0x70,
+    0x71,
+)
 _RELATED, _RELATED_FAST = 0x83, 0x800F
 """Parameters: DDSI-RTPS table 9.13, DDS-RPC 7.8.2; the last is eProsima's own number for the one before."""
 _RELIABLE, _VOLATILE = struct.pack("<iiI", 2, 0, 100_000_000), struct.pack("<i", 0)
@@ -61,8 +85,10 @@ _GONE = b"\x00\x00\x00\x03"
 _ALL_BUILTIN = struct.pack("<I", 0b111111)
 
 _LEASE_S, _PERIOD_S, _REMEMBERED_S = 20.0, 1.0, 3600.0
-"""How long a participant that says nothing is taken to be there, how often we say that we are, and how long the numbers of lines are kept: one that was
-stopped for longer than its lease, as in a debugger, goes on with those that it knows."""
+"""How long a participant that says nothing is taken to be there, how often we say that we are, and how long
+the numbers of lines are kept: one that was stopped for longer than its lease, as in a debugger, goes on with
+those that it knows.
+"""
 _FIRST_PORT, _PORTS, _FIRST_OWN, _PER_PARTICIPANT, _MOST_PROGRAMS = 7400, 250, 10, 2, 32
 _GROUP = "239.255.0.1"
 """Where programs listen for others: DDSI-RTPS 9.6.2.3."""
@@ -103,12 +129,19 @@ class Calls:
     """Servers of one domain, with a socket and a thread of their own."""
 
     def __init__(self, domain: int, *, multicast: bool, hosts: Sequence[str]) -> None:
-        """Begin to look for programs of a domain: on `hosts`, and on the network if `multicast`. Only 127.0.0.1 is heard if nothing else is looked for."""
+        """Begin to look for programs of a domain: on `hosts`, and on the network if `multicast`.
+
+        Only 127.0.0.1 is heard if nothing else is looked for.
+        """
         self._other = b""
         confined = not multicast and all(host == "127.0.0.1" for host in hosts)
         base = _FIRST_PORT + _PORTS * domain
-        own_ports = range(base + _FIRST_OWN, base + _FIRST_OWN + _PER_PARTICIPANT * (_MOST_PROGRAMS + 1), _PER_PARTICIPANT)
-        self._targets = [(host, port) for host in hosts for port in own_ports] + ([(_GROUP, base)] if multicast else [])
+        own_ports = range(
+            base + _FIRST_OWN, base + _FIRST_OWN + _PER_PARTICIPANT * (_MOST_PROGRAMS + 1), _PER_PARTICIPANT
+        )
+        self._targets = [(host, port) for host in hosts for port in own_ports] + (
+            [(_GROUP, base)] if multicast else []
+        )
         self._domain = domain
         self._prefix = _NO_VENDOR + os.urandom(10)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -122,19 +155,29 @@ class Calls:
         self._thread.start()
 
     def ignore(self, participant: bytes) -> None:
-        """Take the participant with this id, which asks nothing, for nobody: the other one of the same gateway."""
+        """Take the participant with this id, which asks nothing, for nobody: the other one of the same
+        gateway.
+        """
         with self._changing:
             self._other = participant[:12]
             self._programs.pop(self._other, None)  # found already
 
     def serve(self, topic: str, ros_type: str, handle: Handler) -> tuple[bytes, bytes]:
-        """Begin to answer the service `topic` (`/PSM1/forward_kinematics`) of type `ros_type` (`crtk_msgs/srv/QueryForwardKinematics`).
+        """Begin to answer the service `topic` (`/PSM1/forward_kinematics`) of type `ros_type`
+        (`crtk_msgs/srv/QueryForwardKinematics`).
 
         Returns the ids (16 bytes) of the reader of requests and of the writer of responses.
         """
         package, group, name = ros_type.split("/")
         key = struct.pack(">I", len(self._services) + 1)[1:]
-        service = _Service(f"rq{topic}Request", f"rr{topic}Reply", f"{package}::{group}::dds_::{name}_", key + _READER_KIND, key + _WRITER_KIND, handle)
+        service = _Service(
+            f"rq{topic}Request",
+            f"rr{topic}Reply",
+            f"{package}::{group}::dds_::{name}_",
+            key + _READER_KIND,
+            key + _WRITER_KIND,
+            handle,
+        )
         with self._changing:
             self._services.append(service)
             for program in self._programs.values():
@@ -158,12 +201,16 @@ class Calls:
                 self._take(received(datagram, self._prefix), address[0])
             except (MessageError, struct.error) as error:
                 log.debug("a datagram from %s is not heeded: %s", address[0], error)
-            except Exception:  # one that goes wrong in a way nobody thought of is not to leave the others without answers
+            except (
+                Exception
+            ):  # one that goes wrong in a way nobody thought of is not to leave the others without answers
                 log.exception("a datagram from %s makes services fail", address[0])
 
     def _tidy(self, now: float) -> None:
         with self._changing:
-            self._programs = {prefix: it for prefix, it in self._programs.items() if now - it.heard_s < _REMEMBERED_S}
+            self._programs = {
+                prefix: it for prefix, it in self._programs.items() if now - it.heard_s < _REMEMBERED_S
+            }
             for program in self._programs.values():
                 if now - program.heard_s < _LEASE_S:
                     for line in program.sending.values():
@@ -194,11 +241,18 @@ class Calls:
         if known is not None:
             known.heard_s = monotonic()
             return
-        builtin, user = ((host, struct.unpack_from("<I", _listed(told)[locator], 4)[0]) for locator in (_BUILTIN_UNICAST, _UNICAST))
+        builtin, user = (
+            (host, struct.unpack_from("<I", _listed(told)[locator], 4)[0])
+            for locator in (_BUILTIN_UNICAST, _UNICAST)
+        )
         program = self._programs[prefix] = _Program(builtin, user, monotonic())
         post = self._poster(prefix, builtin)
-        program.receiving[_PUBLICATIONS] = _line(post, prefix, _PUBLICATIONS_HEARD, _PUBLICATIONS, partial(self._publication, prefix))
-        program.receiving[_SUBSCRIPTIONS] = _line(post, prefix, _SUBSCRIPTIONS_HEARD, _SUBSCRIPTIONS, partial(self._subscription, prefix))
+        program.receiving[_PUBLICATIONS] = _line(
+            post, prefix, _PUBLICATIONS_HEARD, _PUBLICATIONS, partial(self._publication, prefix)
+        )
+        program.receiving[_SUBSCRIPTIONS] = _line(
+            post, prefix, _SUBSCRIPTIONS_HEARD, _SUBSCRIPTIONS, partial(self._subscription, prefix)
+        )
         for writer, reader in ((_PUBLICATIONS, _PUBLICATIONS_HEARD), (_SUBSCRIPTIONS, _SUBSCRIPTIONS_HEARD)):
             program.sending[writer, reader] = Sending(post, writer, reader)
         self._announce([builtin])
@@ -216,7 +270,9 @@ class Calls:
             if listed[_TOPIC].startswith(text(service.request)):
                 writer = listed[_ENDPOINT_ID][12:16]
                 post = self._poster(prefix, program.address)
-                program.receiving[writer] = _line(post, prefix, service.reader, writer, partial(self._asked, service, prefix))
+                program.receiving[writer] = _line(
+                    post, prefix, service.reader, writer, partial(self._asked, service, prefix)
+                )
 
     def _subscription(self, prefix: bytes, told: Data) -> None:
         """Open a line for responses to a client, or close it."""
@@ -229,19 +285,25 @@ class Calls:
         for service in self._services:
             if listed[_TOPIC].startswith(text(service.response)):
                 reader = listed[_ENDPOINT_ID][12:16]
-                program.sending[service.writer, reader] = Sending(self._poster(prefix, program.address), service.writer, reader)
+                program.sending[service.writer, reader] = Sending(
+                    self._poster(prefix, program.address), service.writer, reader
+                )
         early, program.early = program.early, []
         for service, request in early:
             self._asked(service, prefix, request)
 
     def _asked(self, service: _Service, prefix: bytes, request: Data) -> None:
-        """Answer: to the client that is named beside the request, or to all of the program, of which each looks for its header."""
+        """Answer: to the client that is named beside the request, or to all of the program, of which each
+        looks for its header.
+        """
         program, payload = self._programs[prefix], request.payload
         if prefix.startswith(_FAST_DDS):
             reader = (request.qos.get(_RELATED) or request.qos.get(_RELATED_FAST) or b"")[:16]
             identity = reader + sequence_number(request.number)
             header, beside = b"", {_RELATED: identity, _RELATED_FAST: identity}
-            listening = [line for ids, line in program.sending.items() if ids == (service.writer, reader[12:])]
+            listening = [
+                line for ids, line in program.sending.items() if ids == (service.writer, reader[12:])
+            ]
         else:
             header, payload, beside = payload[_HEADER], payload[: _HEADER.start] + payload[_HEADER.stop :], {}
             listening = [line for ids, line in program.sending.items() if ids[0] == service.writer]
@@ -274,8 +336,18 @@ class Calls:
     def _tell(self, program: _Program, service: _Service) -> None:
         """Tell a participant of the reader of requests and the writer of responses."""
         both = (
-            ((_PUBLICATIONS, _PUBLICATIONS_HEARD), service.writer, service.response, f"{service.type}Response_"),
-            ((_SUBSCRIPTIONS, _SUBSCRIPTIONS_HEARD), service.reader, service.request, f"{service.type}Request_"),
+            (
+                (_PUBLICATIONS, _PUBLICATIONS_HEARD),
+                service.writer,
+                service.response,
+                f"{service.type}Response_",
+            ),
+            (
+                (_SUBSCRIPTIONS, _SUBSCRIPTIONS_HEARD),
+                service.reader,
+                service.request,
+                f"{service.type}Request_",
+            ),
         )
         for line, entity, topic, type_ in both:
             told = {
@@ -304,12 +376,17 @@ class Calls:
             self._ended.set()
             self._thread.join(timeout=2.0)
             gone = data(_FINDER, _FOUND, 2, b"", {_KEY_HASH: self._prefix + _PARTICIPANT, _STATUS: _GONE})
-            self._send(message(self._prefix, bytes(12), [gone]), [program.builtin for program in self._programs.values()])
+            self._send(
+                message(self._prefix, bytes(12), [gone]),
+                [program.builtin for program in self._programs.values()],
+            )
             self._socket.close()
 
 
 def _line(post: Post, prefix: bytes, reader: bytes, writer: bytes, take: Callable[[Data], None]) -> Receiving:
-    """Return a line from a program's writer that has begun; Cyclone DDS tells by itself what it has, and takes the question for malformed."""
+    """Return a line from a program's writer that has begun; Cyclone DDS tells by itself what it has, and
+    takes the question for malformed.
+    """
     line = Receiving(post, reader, writer, take)
     if prefix.startswith(_FAST_DDS):
         line.begin()
@@ -330,12 +407,17 @@ def _is_gone(told: Data) -> bool:
 
 
 def _identity(gone: Data) -> bytes:
-    """Return the id (4 bytes) of a reader or writer that is gone: Fast DDS tells it beside what it sends, Cyclone DDS in it."""
+    """Return the id (4 bytes) of a reader or writer that is gone: Fast DDS tells it beside what it sends,
+    Cyclone DDS in it.
+    """
     return (gone.qos.get(_KEY_HASH) or read_parameters(gone.payload[4:])[0].get(_ENDPOINT_ID, b""))[12:16]
 
 
 def _listed(told: Data) -> dict[int, bytes]:
-    """Return what a participant tells of itself or of a part of it. Raises MessageError if it does not tell enough."""
+    """Return what a participant tells of itself or of a part of it.
+
+    Raises MessageError if it does not tell enough.
+    """
     found, _ = read_parameters(told.payload[4:])
     needed = {_BUILTIN_UNICAST, _UNICAST} if told.writer == _FINDER else {_TOPIC, _ENDPOINT_ID}
     if told.payload[:4] != PL_CDR_LE or needed - found.keys():

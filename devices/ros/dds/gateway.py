@@ -19,14 +19,25 @@ __all__ = ["DdsGateway", "DdsParams"]
 class DdsParams(GatewayParams):
     """Which part of the dVRK is shown, and to whom."""
 
-    domain: int = Field(default=0, ge=0, le=232, description="ROS_DOMAIN_ID of the programs; 232 is the largest that ROS 2 allows")
+    domain: int = Field(
+        default=0,
+        ge=0,
+        le=232,
+        description="ROS_DOMAIN_ID of the programs; 232 is the largest that ROS 2 allows",
+    )
     discovery: Literal["localhost", "subnet"] = Field(
         default="localhost",
-        description="as ROS_AUTOMATIC_DISCOVERY_RANGE: programs on this machine, or on its network as well, where anybody may then read and command, "
-        "as no certificate is asked for on DDS",
+        description=(
+            "as ROS_AUTOMATIC_DISCOVERY_RANGE: programs on this machine, or on its network as well, where"
+            " anybody may then read and command, as no certificate is asked for on DDS"
+        ),
     )
     peers: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.:-]+$")], ...] = Field(
-        default=(), description="as ROS_STATIC_PEERS: other machines to look for programs on; that opens the gateway to the network as `subnet` does"
+        default=(),
+        description=(
+            "as ROS_STATIC_PEERS: other machines to look for programs on; that opens the gateway to the"
+            " network as `subnet` does"
+        ),
     )
 
 
@@ -42,7 +53,10 @@ class DdsGateway(Gateway):
         self._where = params
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
-        """Join the domain. Raises MissingExtraError without Cyclone DDS, DeviceError if the domain cannot be joined."""
+        """Join the domain.
+
+        Raises MissingExtraError without Cyclone DDS, DeviceError if the domain cannot be joined.
+        """
         try:
             from devices.ros.dds.calls import Calls
             from devices.ros.dds.domain import configuration, domain
@@ -50,10 +64,13 @@ class DdsGateway(Gateway):
         except ModuleNotFoundError as error:
             raise MissingExtraError(f"device '{self.name}'", "ros2-dds", "cyclonedds") from error
         where = self._where
-        peers = [_address(peer) for peer in where.peers]  # of a name that it does not know Cyclone DDS ends the process
+        # of a name that it does not know Cyclone DDS ends the process
+        peers = [_address(peer) for peer in where.peers]
         joined = domain(where.domain, configuration(where.discovery, peers))
         hosts = ["127.0.0.1", *peers] if where.discovery == "localhost" else peers
-        return DdsTransport(joined, where.domain, Calls(where.domain, multicast=where.discovery == "subnet", hosts=hosts))
+        return DdsTransport(
+            joined, where.domain, Calls(where.domain, multicast=where.discovery == "subnet", hosts=hosts)
+        )
 
 
 def _address(peer: str) -> str:
@@ -61,4 +78,7 @@ def _address(peer: str) -> str:
     try:
         return socket.gethostbyname(peer)
     except (OSError, UnicodeError) as error:
-        raise DeviceError(f"the peer '{peer}' is not known to this machine ({error}); expected a name that it knows, or an address (IPv4)") from error
+        raise DeviceError(
+            f"the peer '{peer}' is not known to this machine ({error}); expected a name that it knows, or an"
+            " address (IPv4)"
+        ) from error

@@ -17,7 +17,9 @@ _KEPT = 64
 
 
 class Sending:
-    """From a writer of ours to one reader, which has numbers of its own: no other reader's samples are gaps to it."""
+    """From a writer of ours to one reader, which has numbers of its own: no other reader's samples are gaps
+    to it.
+    """
 
     def __init__(self, post: Post, writer: bytes, reader: bytes) -> None:
         """Take what sends, and the ids (4 bytes) of both."""
@@ -45,7 +47,11 @@ class Sending:
         """Send again what the reader has not."""
         self._acknowledged = max(self._acknowledged, answer.base - 1)
         missing = set(answer.missing)
-        again = [data(self._writer, self._reader, number, payload, qos) for number, payload, qos in self._kept if number in missing]
+        again = [
+            data(self._writer, self._reader, number, payload, qos)
+            for number, payload, qos in self._kept
+            if number in missing
+        ]
         if again or not answer.base:  # 0: a reader that does not know yet what there is
             self._post([*again, self._beat()])
 
@@ -61,7 +67,9 @@ class Receiving:
         """What came before its turn; None: it will never come."""
 
     def begin(self) -> None:
-        """Ask what there is: something may have come before this line was there, and writers tell of themselves only every few seconds."""
+        """Ask what there is: something may have come before this line was there, and writers tell of
+        themselves only every few seconds.
+        """
         self._answers += 1
         self._post([acknack(self._writer, self._reader, 0, (), self._answers)])
 
@@ -74,7 +82,11 @@ class Receiving:
     def beat(self, told: Heartbeat) -> None:
         """Ask for what is missing of what the writer has."""
         self._go_on_from(told.first)
-        missing = [number for number in range(self._expected, min(told.last + 1, self._expected + _KEPT)) if number not in self._waiting]
+        missing = [
+            number
+            for number in range(self._expected, min(told.last + 1, self._expected + _KEPT))
+            if number not in self._waiting
+        ]
         if missing or not told.is_final:
             self._answers += 1
             self._post([acknack(self._writer, self._reader, self._expected, missing, self._answers)])

@@ -28,7 +28,10 @@ __all__ = ["Programs"]
 log = logging.getLogger(__name__)
 
 _LAST_OF_EACH = Qos(
-    Policy.Reliability.Reliable(0), Policy.Durability.TransientLocal, Policy.History.KeepAll, Policy.DataRepresentation(use_cdrv0_representation=True)
+    Policy.Reliability.Reliable(0),
+    Policy.Durability.TransientLocal,
+    Policy.History.KeepAll,
+    Policy.DataRepresentation(use_cdrv0_representation=True),
 )
 
 

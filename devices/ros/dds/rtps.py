@@ -1,6 +1,8 @@
-"""The part of DDS's wire protocol that `dds_calls` speaks: messages, submessages and parameter lists, little-endian.
+"""The part of DDS's wire protocol that `dds_calls` speaks: messages, submessages and parameter lists,
+little-endian.
 
-Source: OMG DDSI-RTPS 2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters); the identity of a request is a parameter of DDS-RPC 1.0, 7.8.2.
+Source: OMG DDSI-RTPS 2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters); the identity of a request
+is a parameter of DDS-RPC 1.0, 7.8.2.
 """
 
 from __future__ import annotations
@@ -112,16 +114,24 @@ def sequence_number(value: int) -> bytes:
     return struct.pack("<iI", value >> 32, value & 0xFFFFFFFF)
 
 
-def data(writer: bytes, reader: bytes, number: int, payload: bytes, qos: Mapping[int, bytes] | None = None) -> bytes:
+def data(
+    writer: bytes, reader: bytes, number: int, payload: bytes, qos: Mapping[int, bytes] | None = None
+) -> bytes:
     """Return a DATA submessage; `qos`: parameters beside the payload. Without one it says only what they say."""
     beside = parameters(qos) if qos else b""
     flags = (_PAYLOAD if payload else 0) | (_INLINE_QOS if qos else 0)
-    return _submessage(_DATA, flags, struct.pack("<HH", 0, 16) + reader + writer + sequence_number(number) + beside + payload)
+    return _submessage(
+        _DATA, flags, struct.pack("<HH", 0, 16) + reader + writer + sequence_number(number) + beside + payload
+    )
 
 
 def heartbeat(writer: bytes, reader: bytes, first: int, last: int, count: int) -> bytes:
     """Return a HEARTBEAT submessage that wants an answer."""
-    return _submessage(_HEARTBEAT, 0, reader + writer + sequence_number(first) + sequence_number(last) + struct.pack("<I", count))
+    return _submessage(
+        _HEARTBEAT,
+        0,
+        reader + writer + sequence_number(first) + sequence_number(last) + struct.pack("<I", count),
+    )
 
 
 def acknack(writer: bytes, reader: bytes, base: int, missing: Iterable[int], count: int) -> bytes:
@@ -142,7 +152,10 @@ def parameters(values: Mapping[int, bytes]) -> bytes:
 
 
 def read_parameters(encoded: bytes) -> tuple[dict[int, bytes], int]:
-    """Return a parameter list, the first of each kind, and how many bytes it has. Raises MessageError if it has no end."""
+    """Return a parameter list, the first of each kind, and how many bytes it has.
+
+    Raises MessageError if it has no end.
+    """
     found: dict[int, bytes] = {}
     at = 0
     while at + 4 <= len(encoded):
@@ -162,7 +175,10 @@ def text(value: str) -> bytes:
 
 
 def received(datagram: bytes, own: bytes) -> Received:
-    """Return what a datagram has for the participant with the GUID prefix `own`. Raises MessageError if it is no message, or one in big-endian."""
+    """Return what a datagram has for the participant with the GUID prefix `own`.
+
+    Raises MessageError if it is no message, or one in big-endian.
+    """
     if len(datagram) < 20 or datagram[:4] != b"RTPS":
         raise MessageError(f"{len(datagram)} bytes are no message of RTPS")
     try:
@@ -184,7 +200,13 @@ def _submessages(datagram: bytes, own: bytes) -> Iterator[Submessage]:
         elif is_ours and kind == _DATA:
             yield _read_data(content, flags)
         elif is_ours and kind == _HEARTBEAT:
-            yield Heartbeat(content[4:8], content[:4], _read_number(content, 8), _read_number(content, 16), bool(flags & _FINAL))
+            yield Heartbeat(
+                content[4:8],
+                content[:4],
+                _read_number(content, 8),
+                _read_number(content, 16),
+                bool(flags & _FINAL),
+            )
         elif is_ours and kind == _ACKNACK:
             yield Acknack(content[4:8], content[:4], *_read_set(content, 8))
         elif is_ours and kind == _GAP:
@@ -197,7 +219,13 @@ def _read_data(content: bytes, flags: int) -> Data:
     if flags & _INLINE_QOS:
         qos, length = read_parameters(content[at:])
         at += length
-    return Data(content[8:12], content[4:8], _read_number(content, 12), qos, content[at:] if flags & (_PAYLOAD | _KEY) else b"")
+    return Data(
+        content[8:12],
+        content[4:8],
+        _read_number(content, 12),
+        qos,
+        content[at:] if flags & (_PAYLOAD | _KEY) else b"",
+    )
 
 
 def _read_number(content: bytes, at: int) -> int:

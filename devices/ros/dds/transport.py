@@ -1,7 +1,9 @@
-"""ROS 2 as its programs with DDS lay it out, on Eclipse Cyclone DDS: the gateway is one more participant, and needs no ROS.
+"""ROS 2 as its programs with DDS lay it out, on Eclipse Cyclone DDS: the gateway is one more participant, and
+needs no ROS.
 
-Sources: names from ros2/design, articles/140_topic_and_service_name_mapping.md; user data from ros2/rmw_dds_common, rmw_dds_common/src/qos.cpp (hash of a
-type) and ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (enclave of a participant).
+Sources: names from ros2/design, articles/140_topic_and_service_name_mapping.md; user data from
+ros2/rmw_dds_common, rmw_dds_common/src/qos.cpp (hash of a type) and ros2/rmw_cyclonedds,
+rmw_cyclonedds_cpp/src/rmw_node.cpp (enclave of a participant).
 """
 
 from __future__ import annotations
@@ -30,8 +32,12 @@ _ALWAYS = (Policy.Reliability.Reliable(0), Policy.DataRepresentation(use_cdrv0_r
 VOLATILE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(10))
 """As ROS programs have it: the last ten messages."""
 _LARGE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(60))
-"""Of pictures, a second at 60 Hz. What is larger than a packet comes in parts, and a reader of Fast DDS 2.14 that has some of them never returns from its next
-take when it is told that the rest is gone (docs/decisions/0030): so the rest is there while a busy machine loses packets."""
+"""Of pictures, a second at 60 Hz.
+
+What is larger than a packet comes in parts, and a reader of Fast DDS 2.14 that has some of them never returns
+from its next take when it is told that the rest is gone (docs/decisions/0030): so the rest is there while a
+busy machine loses packets.
+"""
 _LAST = Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1)
 LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), _LAST)
 _HEARD = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
@@ -41,7 +47,8 @@ _HEARD = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
 class DdsTransport(Transport):
     """Publishes, listens and answers as one node on one participant.
 
-    Nothing that is published waits for a reader: each topic keeps its last messages for whoever is slow. Messages are taken in a thread of their own.
+    Nothing that is published waits for a reader: each topic keeps its last messages for whoever is slow.
+    Messages are taken in a thread of their own.
     """
 
     def __init__(self, domain: Domain, number: int, calls: Calls) -> None:
@@ -51,7 +58,8 @@ class DdsTransport(Transport):
         self._id = self._participant.guid.bytes
         calls.ignore(self._id)
         self._messages = Arrivals(self._participant, "DDS messages")
-        self._programs = Programs(self._participant, self._messages)  # first: no message comes before its sender
+        # first: no message comes before its sender
+        self._programs = Programs(self._participant, self._messages)
         self._topics: set[str] = set()
         self._readers: list[DataReader[Payload]] = []
         self._writers: list[DataWriter[Payload]] = []
@@ -93,16 +101,23 @@ class DdsTransport(Transport):
             self._closed = True
             self._messages.close()
             self._calls.close()
-            self._participant.__del__()  # now, with all that is on it, and not when somebody lets go of the last part
+            # now, with all that is on it, and not when somebody lets go of the last part
+            self._participant.__del__()
             del self._domain
 
-    def _writer(self, topic: str, type_: type[Payload], quality: Qos, ros_type: str = "") -> DataWriter[Payload]:
+    def _writer(
+        self, topic: str, type_: type[Payload], quality: Qos, ros_type: str = ""
+    ) -> DataWriter[Payload]:
         self._topics.add(topic)
-        return DataWriter(self._participant, Topic(self._participant, topic, type_), quality + _hashed(ros_type))
+        return DataWriter(
+            self._participant, Topic(self._participant, topic, type_), quality + _hashed(ros_type)
+        )
 
     def _reader(self, topic: str, type_: type[Payload], ros_type: str = "") -> DataReader[Payload]:
         self._topics.add(topic)
-        reader = DataReader(self._participant, Topic(self._participant, topic, type_), _HEARD + _hashed(ros_type))
+        reader = DataReader(
+            self._participant, Topic(self._participant, topic, type_), _HEARD + _hashed(ros_type)
+        )
         self._readers.append(reader)
         self._announce()
         return reader

@@ -1,7 +1,7 @@
 """DDS types made of ROS types, whose samples are messages that are CDR already: nothing is serialised twice.
 
-Cyclone DDS announces the type of every topic and lets in only bytes that are such a message, so the whole definition is needed; it comes from the type
-store, where our models are.
+Cyclone DDS announces the type of every topic and lets in only bytes that are such a message, so the whole
+definition is needed; it comes from the type store, where our models are.
 """
 
 from __future__ import annotations
@@ -21,7 +21,21 @@ _BASES: dict[str, Any] = {
     "string": str,
     "octet": types.uint8,
     "char": types.uint8,
-    **{name: getattr(types, name) for name in ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64")},
+    **{
+        name: getattr(types, name)
+        for name in (
+            "int8",
+            "uint8",
+            "int16",
+            "uint16",
+            "int32",
+            "uint32",
+            "int64",
+            "uint64",
+            "float32",
+            "float64",
+        )
+    },
 }
 
 
@@ -32,7 +46,9 @@ class Payload(IdlStruct):
         """Take the message with its encapsulation header."""
         self.cdr = cdr
 
-    def serialize(self, buffer: object = None, endianness: object = None, use_version_2: bool | None = None) -> bytes:  # noqa: ARG002
+    def serialize(
+        self, buffer: object = None, endianness: object = None, use_version_2: bool | None = None
+    ) -> bytes:
         """Return the message as it is."""
         return self.cdr
 
@@ -50,7 +66,9 @@ class Payload(IdlStruct):
 @cache
 def payload_type(ros_type: str) -> type[Payload]:
     """Return the type of messages of `sensor_msgs/msg/JointState`."""
-    return make_idl_struct(_class_name(ros_type), _dds_name(ros_type), _fields(ros_type), dataclassify=False, bases=(Payload,))
+    return make_idl_struct(
+        _class_name(ros_type), _dds_name(ros_type), _fields(ros_type), dataclassify=False, bases=(Payload,)
+    )
 
 
 @cache
@@ -63,7 +81,9 @@ def _fields(ros_type: str) -> dict[str, Any]:
 
 
 def _type(described: Any) -> Any:
-    """Return the type of a field as rosbags describes it: its kind, and what it is made of; bounds and lengths are 0 where there are none."""
+    """Return the type of a field as rosbags describes it: its kind, and what it is made of; bounds and
+    lengths are 0 where there are none.
+    """
     kind, of = described
     if kind == Nodetype.NAME:
         return _struct(of)

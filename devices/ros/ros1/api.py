@@ -1,4 +1,5 @@
-"""How programs of ROS 1 and their master call one another: XML-RPC, with answers of a code, a word and a value.
+"""How programs of ROS 1 and their master call one another: XML-RPC, with answers of a code, a word and a
+value.
 
 Source: wiki.ros.org/ROS/Master_API and wiki.ros.org/ROS/Slave_API.
 """
@@ -77,7 +78,8 @@ class Program:
 
     def _answer(self, answer: Any) -> Answer:
         match answer:
-            case [int(code), str(word), value] | [[int(code), str(word), value]]:  # in a box of its own where several are asked for
+            # in a box of its own where several are asked for
+            case [int(code), str(word), value] | [[int(code), str(word), value]]:
                 return Answer(code, word, value)
             case _:
                 raise self._wrong(answer)
@@ -119,7 +121,9 @@ class ProgramServer:
         for name, method in methods.items():
             self._server.register_function(partial(_listed, method), name)
         self.uri = f"http://{host}:{self._server.server_address[1]}/"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.1,), name="ROS 1 calls", daemon=True)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(0.1,), name="ROS 1 calls", daemon=True
+        )
         self._thread.start()
 
     def close(self) -> None:

@@ -1,4 +1,5 @@
-"""One connection between two programs of ROS 1 (TCPROS): a header each, and then frames of four bytes of length and a message.
+"""One connection between two programs of ROS 1 (TCPROS): a header each, and then frames of four bytes of
+length and a message.
 
 Source: wiki.ros.org/ROS/TCPROS and wiki.ros.org/ROS/Connection Header.
 """
@@ -33,8 +34,10 @@ _READ_BYTES = 1 << 14
 _MOST_HEADER_BYTES = 1 << 20
 _BACKLOG = 1000
 _KEEPALIVE = {"TCP_KEEPIDLE": 60, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 9}
-"""Seconds of silence until it is asked whether the other machine is still there, between two questions, and how many of them; where the system lets them be
-set. As rospy has it (ros/ros_comm, clients/rospy/src/rospy/impl/tcpros_base.py): one that lost its power closes no connection."""
+"""Seconds of silence until it is asked whether the other machine is still there, between two questions, and
+how many of them; where the system lets them be set. As rospy has it (ros/ros_comm,
+clients/rospy/src/rospy/impl/tcpros_base.py): one that lost its power closes no connection.
+"""
 
 
 def header_frame(fields: Fields) -> bytes:
@@ -62,15 +65,26 @@ def _fields(content: bytes) -> Fields:
 
 
 class Connection:
-    """A socket with what is read from and written to it. Nothing waits: what a program does not take is kept for it up to a limit, then the oldest is dropped.
+    """A socket with what is read from and written to it.
 
-    The other side's header goes to `greeted`, which returns what takes the messages that follow; it raises MessageError to hang up.
+    Nothing waits: what a program does not take is kept for it up to a limit, then the oldest is dropped.
+
+    The other side's header goes to `greeted`, which returns what takes the messages that follow; it raises
+    MessageError to hang up.
     """
 
     def __init__(
-        self, loop: Loop, sock: socket.socket, greeted: Callable[[Connection, Fields], Incoming], lost: Callable[[Connection], None], *, keep: int = _BACKLOG
+        self,
+        loop: Loop,
+        sock: socket.socket,
+        greeted: Callable[[Connection, Fields], Incoming],
+        lost: Callable[[Connection], None],
+        *,
+        keep: int = _BACKLOG,
     ) -> None:
-        """Take a connected socket, and what is told when the connection has ended; `keep`: messages that wait for a slow reader."""
+        """Take a connected socket, and what is told when the connection has ended; `keep`: messages that wait
+        for a slow reader.
+        """
         self._loop, self._socket, self._greeted, self._lost, self.keep = loop, sock, greeted, lost, keep
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -1,4 +1,6 @@
-"""A gateway to ROS 1: its own node in pure Python, at the master of the console; nothing of ROS is needed where the hub runs."""
+"""A gateway to ROS 1: its own node in pure Python, at the master of the console; nothing of ROS is needed
+where the hub runs.
+"""
 
 from __future__ import annotations
 
@@ -26,19 +28,28 @@ class Ros1Params(GatewayParams):
     """Which part of the dVRK is shown, and to the programs of which master."""
 
     master: Annotated[str, Field(pattern=r"^http://[^/:\s]+:\d+/?$")] | None = Field(
-        default=None, description=f"address of the ROS master; by default ROS_MASTER_URI of the gateway's environment, or {_MASTER}"
+        default=None,
+        description=(
+            f"address of the ROS master; by default ROS_MASTER_URI of the gateway's environment, or {_MASTER}"
+        ),
     )
     ip: IPv4Address | None = Field(
         default=None,
-        description="address of this machine at which programs reach the gateway, which listens there only; by default that from which the master is reached: "
-        "127.0.0.1 for one on this machine. ROS 1 asks nobody who he is: whoever reaches another address than 127.0.0.1 may command the arms",
+        description=(
+            "address of this machine at which programs reach the gateway, which listens there only; by"
+            " default that from which the master is reached: 127.0.0.1 for one on this machine. ROS 1 asks"
+            " nobody who he is: whoever reaches another address than 127.0.0.1 may command the arms"
+        ),
     )
 
     @field_validator("ip")
     @classmethod
     def _reachable(cls, ip: IPv4Address | None) -> IPv4Address | None:
         if ip is not None and ip.is_unspecified:
-            raise ValueError(f"{ip} is no address that a program could connect to; expected that of one of this machine's networks")
+            raise ValueError(
+                f"{ip} is no address that a program could connect to; expected that of one of this machine's"
+                " networks"
+            )
         return ip
 
 
@@ -54,7 +65,10 @@ class Ros1Gateway(Gateway):
         self._master, self._ip = params.master, params.ip
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
-        """Begin to be a node; its master may come later. Raises DeviceError if there is no way to the master, or if `ip` is not this machine."""
+        """Begin to be a node; its master may come later.
+
+        Raises DeviceError if there is no way to the master, or if `ip` is not this machine.
+        """
         from devices.ros.ros1.transport import Ros1Transport  # it parses all definitions of Noetic
 
         master = self._master or os.environ.get("ROS_MASTER_URI") or _MASTER
@@ -62,11 +76,16 @@ class Ros1Gateway(Gateway):
         try:
             return Ros1Transport(master, f"/trocar_{self.name}", host)
         except OSError as error:
-            raise DeviceError(f"'{self.name}' cannot listen at {host} ({error}); `ip` must be an address of this machine") from error
+            raise DeviceError(
+                f"'{self.name}' cannot listen at {host} ({error}); `ip` must be an address of this machine"
+            ) from error
 
 
 def _way_to(master: str) -> str:
-    """Return the address of this machine from which a master is reached. Raises DeviceError if there is no way to it."""
+    """Return the address of this machine from which a master is reached.
+
+    Raises DeviceError if there is no way to it.
+    """
     try:
         address = urlsplit(master)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
@@ -74,5 +93,6 @@ def _way_to(master: str) -> str:
             return str(sock.getsockname()[0])
     except (OSError, ValueError, TypeError) as error:
         raise DeviceError(
-            f"there is no way to the ROS master at '{master}' ({error}); expected http://HOST:PORT, with a host that this machine knows"
+            f"there is no way to the ROS master at '{master}' ({error}); expected http://HOST:PORT, with a"
+            " host that this machine knows"
         ) from error

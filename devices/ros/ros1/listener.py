@@ -64,7 +64,9 @@ class Listener:
 
 
 def _allow_many() -> None:
-    """Let this process open as many files as the system grants it, within reason: in ROS 1 each topic of each program is one."""
+    """Let this process open as many files as the system grants it, within reason: in ROS 1 each topic of each
+    program is one.
+    """
     if sys.platform != "win32":
         import resource
 

@@ -1,4 +1,6 @@
-"""One thread that waits for all sockets of a ROS 1 node: for bytes to read, for room to write, for programs that connect."""
+"""One thread that waits for all sockets of a ROS 1 node: for bytes to read, for room to write, for programs
+that connect.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ class Loop:
             self._wake.send(b"\0")
 
     def watch(self, sock: socket.socket, ears: Ears, *, writing: bool = False) -> None:
-        """Call `ears` when there is something to read on `sock` and, if `writing`, room to write; in the loop's thread only."""
+        """Call `ears` when there is something to read on `sock` and, if `writing`, room to write; in the
+        loop's thread only.
+        """
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writing else 0)
         if sock in self._selector.get_map():
             self._selector.modify(sock, events, ears)
@@ -87,7 +91,9 @@ class Loop:
             self._guarded(ears.readable)
 
     def _guarded(self, do: Callable[[], None]) -> None:
-        """Call what must not end the loop: one program that goes wrong in a way nobody thought of is not to cut off the others."""
+        """Call what must not end the loop: one program that goes wrong in a way nobody thought of is not to
+        cut off the others.
+        """
         try:
             do()
         except Exception:

@@ -33,7 +33,9 @@ class Publication:
             "topic": self.topic,
             "type": self.type,
         }
-        self._keep = _STATES_KEPT if row.periodic or row.is_picture or row.type == _CAMERA_INFO else _EVENTS_KEPT
+        self._keep = (
+            _STATES_KEPT if row.periodic or row.is_picture or row.type == _CAMERA_INFO else _EVENTS_KEPT
+        )
         self._readers: list[Connection] = []
         self._last: bytearray | None = None
         self._count = 0

@@ -16,7 +16,9 @@ __all__ = ["Registration", "Thing"]
 log = logging.getLogger(__name__)
 
 _LOOK_S = 1.0
-"""How often it is looked whether the master still knows us: programs of ROS 1 do not register again by themselves, and find nobody after a restart."""
+"""How often it is looked whether the master still knows us: programs of ROS 1 do not register again by
+themselves, and find nobody after a restart.
+"""
 
 _AT_ONCE = 100
 """Things told in one call: a master is to answer within seconds."""
@@ -68,7 +70,10 @@ class Registration:
             try:
                 self._look()
                 self._obstacle = ""
-            except (DeviceError, TypeError) as error:  # TypeError: a master that tells of no list of publishers
+            except (
+                DeviceError,
+                TypeError,
+            ) as error:  # TypeError: a master that tells of no list of publishers
                 self._known = 0
                 if str(error) != self._obstacle:
                     self._obstacle = str(error)
@@ -90,13 +95,18 @@ class Registration:
             answers = self._master.call_all([thing.registering(self._uri) for thing in fresh])
             for thing, answer in zip(fresh, answers, strict=True):
                 if answer.code != 1:
-                    raise DeviceError(f"{self._master.uri} does not take {thing.kind.lower()} '{thing.name}': {answer.word}")
+                    raise DeviceError(
+                        f"{self._master.uri} does not take {thing.kind.lower()} '{thing.name}': {answer.word}"
+                    )
                 if thing.told is not None:
                     thing.told(answer.value)
             self._known += len(fresh)
 
     def _yield(self, uri: str) -> None:
-        """Leave its name to another node that lives: a master has the elder of two of one name shut down. Raises DeviceError if there is one."""
+        """Leave its name to another node that lives: a master has the elder of two of one name shut down.
+
+        Raises DeviceError if there is one.
+        """
         other = Program(uri, self._node)
         try:
             other.call("getPid")
@@ -104,7 +114,10 @@ class Registration:
             return
         finally:
             other.close()
-        raise DeviceError(f"another program is '{self._node}' there, at {uri}: call one of the two gateways otherwise in its scenario")
+        raise DeviceError(
+            f"another program is '{self._node}' there, at {uri}: call one of the two gateways otherwise in"
+            " its scenario"
+        )
 
     def close(self) -> None:
         """Take everything back, if the master is there."""

@@ -36,7 +36,9 @@ class Service:
         """Take a program that wants to ask. Raises MessageError if it takes the service for something else."""
         ours, theirs = self._header["md5sum"], fields.get("md5sum", "*")
         if theirs not in (ours, "*"):
-            raise MessageError(f"service {self._name} is {self._header['type']} with MD5 {ours}, not {theirs}")
+            raise MessageError(
+                f"service {self._name} is {self._header['type']} with MD5 {ours}, not {theirs}"
+            )
         caller.send(header_frame(self._header))
         return partial(self._answer, caller)
 

@@ -23,11 +23,16 @@ log = logging.getLogger(__name__)
 
 _CONNECT_S = 2.0
 _SOONEST_S, _LATEST_S = 0.5, 30.0
-"""How long it takes until a connection that failed is tried again, at first and at last; rospy has the same."""
+"""How long it takes until a connection that failed is tried again, at first and at last; rospy has the same.
+"""
 _KEPT_S = 0.5
-"""What a publisher has kept for those who come later follows its header at once: within a few milliseconds, or some tens on a busy machine. What comes later
-than this is meant now."""
-_UNREACHED = "ROS 1: the program at %s, which publishes %s, is not reached: %s. Its ROS_IP or ROS_HOSTNAME must be an address that this machine knows"
+"""What a publisher has kept for those who come later follows its header at once: within a few milliseconds,
+or some tens on a busy machine. What comes later than this is meant now.
+"""
+_UNREACHED = (
+    "ROS 1: the program at %s, which publishes %s, is not reached: %s. Its ROS_IP or ROS_HOSTNAME must be an"
+    " address that this machine knows"
+)
 _NO_MESSAGE = b"\xff\xff"
 """Stands before bytes that could not be made CDR, which it cannot begin with."""
 
@@ -53,7 +58,10 @@ class Subscription:
         if "error" in fields:
             raise MessageError(f"{self.topic}: {fields['error']}")
         if fields.get("md5sum", "*") not in (self._md5, "*"):
-            raise MessageError(f"{self.topic} has MD5 {self._md5}, not {fields['md5sum']}: its messages are of another version")
+            raise MessageError(
+                f"{self.topic} has MD5 {self._md5}, not {fields['md5sum']}: its messages are of another"
+                " version"
+            )
 
     def hear(self, message: bytes, program: str, *, linked_ns: int) -> None:
         """Hand on a message as CDR, or as bytes that are none."""
@@ -77,7 +85,8 @@ class _Link:
 
     def retry(self) -> None:
         """Have the connection made again, later each time that it fails."""
-        self.connection, self.there_before = None, True  # what the program has kept by then was heard, or could not be told while it was meant
+        # what the program has kept by then was heard, or could not be told while it was meant
+        self.connection, self.there_before = None, True
         self.delay = min(max(2 * self.delay, _SOONEST_S), _LATEST_S)
         self.due = monotonic() + self.delay
 
@@ -97,7 +106,11 @@ class _Link:
 
 
 class Subscriptions:
-    """All topics. Each program that publishes any of them has a thread that connects to it, so that one that does not answer holds up no other."""
+    """All topics.
+
+    Each program that publishes any of them has a thread that connects to it, so that one that does not answer
+    holds up no other.
+    """
 
     def __init__(self, loop: Loop, node: str) -> None:
         """Take what watches the connections, and the name of our node."""
@@ -113,24 +126,35 @@ class Subscriptions:
     @property
     def topics(self) -> list[list[str]]:
         """Names and types."""
-        return [[topic, subscription.header["type"]] for topic, subscription in self._subscriptions.copy().items()]
+        return [
+            [topic, subscription.header["type"]] for topic, subscription in self._subscriptions.copy().items()
+        ]
 
     @property
     def connections(self) -> list[tuple[str, Connection]]:
         """Topics with the connections to their publishers."""
         with self._changing:
-            found = [(link.subscription.topic, link.connection) for links in self._links.values() for link in links.values()]
-        return [(topic, connection) for topic, connection in found if connection is not None and connection.is_greeted]
+            found = [
+                (link.subscription.topic, link.connection)
+                for links in self._links.values()
+                for link in links.values()
+            ]
+        return [
+            (topic, connection)
+            for topic, connection in found
+            if connection is not None and connection.is_greeted
+        ]
 
     def add(self, subscription: Subscription) -> None:
         """Listen to a topic, once its publishers are known."""
         self._subscriptions[subscription.topic] = subscription
 
     def update(self, topic: str, uris: Iterable[str], *, there_before: bool) -> None:
-        """Take the addresses of all programs that publish a topic; `there_before`: it is a master's answer to our registration, so they did before we listened.
+        """Take the addresses of all programs that publish a topic; `there_before`: it is a master's answer to
+        our registration, so they did before we listened.
 
-        Of whom it tells before that, it is not known. One that is not among them and still connected is heard until it goes: a master that has started again
-        knows nobody.
+        Of whom it tells before that, it is not known. One that is not among them and still connected is heard
+        until it goes: a master that has started again knows nobody.
         """
         subscription, publishing = self._subscriptions.get(topic), set(uris)
         if subscription is None:
@@ -143,7 +167,9 @@ class Subscriptions:
                 links = self._links.get(uri)
                 if links is None and not self._closed:
                     links = self._links[uri] = {}
-                    threading.Thread(target=self._connect_all, args=(uri,), name=f"ROS 1 {uri}", daemon=True).start()
+                    threading.Thread(
+                        target=self._connect_all, args=(uri,), name=f"ROS 1 {uri}", daemon=True
+                    ).start()
                 if links is not None:
                     links.setdefault(topic, _Link(subscription, there_before=kept_before))
             for uri, links in self._links.items():
@@ -159,8 +185,15 @@ class Subscriptions:
                 try:
                     self._connect(program, link)
                 except (OSError, DeviceError, ValueError) as error:
-                    is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)  # it has ended without a word to the master
-                    log.log(logging.DEBUG if is_gone or told else logging.WARNING, _UNREACHED, uri, link.subscription.topic, error)
+                    # it has ended without a word to the master
+                    is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)
+                    log.log(
+                        logging.DEBUG if is_gone or told else logging.WARNING,
+                        _UNREACHED,
+                        uri,
+                        link.subscription.topic,
+                        error,
+                    )
                     told = told or not is_gone
                     with self._changing:
                         link.retry()
@@ -171,7 +204,9 @@ class Subscriptions:
         """Wait for a link that is to be connected now; None when there are no links any more."""
         with self._changing:
             while not self._closed:
-                for topic in [topic for topic, link in links.items() if link.connection is None and not link.wanted]:
+                for topic in [
+                    topic for topic, link in links.items() if link.connection is None and not link.wanted
+                ]:
                     del links[topic]
                 if not links:
                     break
@@ -184,7 +219,10 @@ class Subscriptions:
             return None
 
     def _connect(self, program: Program, link: _Link) -> None:
-        """Connect to a topic of a program. Raises OSError, DeviceError, or of a host's name that is none ValueError, if that cannot be."""
+        """Connect to a topic of a program.
+
+        Raises OSError, DeviceError, or of a host's name that is none ValueError, if that cannot be.
+        """
         answer = program.call("requestTopic", link.subscription.topic, [["TCPROS"]])
         match answer:
             case (1, _, [_, str(host), int(port)]) if 0 < port < 1 << 16:

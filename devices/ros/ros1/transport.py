@@ -31,10 +31,14 @@ log = logging.getLogger(__name__)
 
 
 class Ros1Transport(Transport):
-    """Publishes, listens and answers as one node, at one address, which it tells a master as soon as there is one."""
+    """Publishes, listens and answers as one node, at one address, which it tells a master as soon as there is
+    one.
+    """
 
     def __init__(self, master: str, node: str, host: str) -> None:
-        """Take the master's address, `http://host:port`, the node's name, and the address of this machine at which programs reach it."""
+        """Take the master's address, `http://host:port`, the node's name, and the address of this machine at
+        which programs reach it.
+        """
         self._node, self._host, self._master = node, host, master
         self._publications: dict[str, Publication] = {}
         self._services: dict[str, Service] = {}
@@ -62,8 +66,14 @@ class Ros1Transport(Transport):
         self._registration.add(Thing("Service", row.topic, (f"rosrpc://{self._host}:{self._listener.port}",)))
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
-        connections = (*self._connections.copy(), *(connection for _, connection in self._subscriptions.connections))
-        return tuple(Client(name, address) for name, address in {each.program: each.address for each in connections}.items())
+        connections = (
+            *self._connections.copy(),
+            *(connection for _, connection in self._subscriptions.connections),
+        )
+        return tuple(
+            Client(name, address)
+            for name, address in {each.program: each.address for each in connections}.items()
+        )
 
     def close(self) -> None:  # noqa: D102
         if self._closed:
@@ -85,7 +95,9 @@ class Ros1Transport(Transport):
         answering = publication or self._services.get(service)
         try:
             if answering is None:
-                raise MessageError(f"'{self._node}' has no topic or service '{topic or service}' for others to connect to")
+                raise MessageError(
+                    f"'{self._node}' has no topic or service '{topic or service}' for others to connect to"
+                )
             takes = answering.greet(connection, fields)
         except MessageError as error:
             connection.send(header_frame({"error": str(error)}))
@@ -105,7 +117,9 @@ class Ros1Transport(Transport):
             "getBusStats": _telling(lambda: ((), (), ())),
             "getMasterUri": _telling(lambda: self._master),
             "getPid": _telling(os.getpid),
-            "getPublications": _telling(lambda: [[each.topic, each.type] for each in tuple(self._publications.values())]),
+            "getPublications": _telling(
+                lambda: [[each.topic, each.type] for each in tuple(self._publications.values())]
+            ),
             "getSubscriptions": _telling(lambda: self._subscriptions.topics),
             "paramUpdate": lambda *_: said(),
             "publisherUpdate": self._publisher_update,
@@ -115,9 +129,16 @@ class Ros1Transport(Transport):
 
     def _bus(self) -> list[list[Any]]:
         """Return our connections as `rosnode info` shows them."""
-        readers = [(reader.program, "o", publication.topic) for reader, publication in self._connections.copy().items() if publication is not None]
+        readers = [
+            (reader.program, "o", publication.topic)
+            for reader, publication in self._connections.copy().items()
+            if publication is not None
+        ]
         writers = [(writer.program, "i", topic) for topic, writer in self._subscriptions.connections]
-        return [[index, program, way, "TCPROS", topic, True] for index, (program, way, topic) in enumerate(readers + writers)]
+        return [
+            [index, program, way, "TCPROS", topic, True]
+            for index, (program, way, topic) in enumerate(readers + writers)
+        ]
 
     def _publisher_update(self, _: str, topic: str, uris: list[str]) -> Answer:
         self._subscriptions.update(topic, uris, there_before=False)
@@ -131,7 +152,9 @@ class Ros1Transport(Transport):
         return said(["TCPROS", self._host, self._listener.port])
 
     def _shut_down(self, caller: str, reason: str = "") -> Answer:
-        log.warning("ROS 1: '%s' asks '%s' to end (%s); it does when its session does", caller, self._node, reason)
+        log.warning(
+            "ROS 1: '%s' asks '%s' to end (%s); it does when its session does", caller, self._node, reason
+        )
         return said()
 
 

@@ -1,7 +1,9 @@
-"""Messages and services as ROS 1 has them: names, definitions, checksums, and what its wire has in place of CDR.
+"""Messages and services as ROS 1 has them: names, definitions, checksums, and what its wire has in place of
+CDR.
 
-ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, and knows the definitions of Noetic, in which some
-fields have other names than in ROS 2 (`CameraInfo`); what it does not know (CRTK, tf2) is the same in both and comes from our models.
+ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, and
+knows the definitions of Noetic, in which some fields have other names than in ROS 2 (`CameraInfo`); what it
+does not know (CRTK, tf2) is the same in both and comes from our models.
 """
 
 from __future__ import annotations
@@ -52,8 +54,12 @@ def checksum(type_: str) -> str:
 
 
 def service_checksum(type_: str) -> str:
-    """Return the MD5 sum of a service: that of the texts of its request and response, one after the other (genmsg, gentools.py)."""
-    return md5((_summed(f"{type_}_Request") + _summed(f"{type_}_Response")).encode(), usedforsecurity=False).hexdigest()
+    """Return the MD5 sum of a service: that of the texts of its request and response, one after the other
+    (genmsg, gentools.py).
+    """
+    return md5(
+        (_summed(f"{type_}_Request") + _summed(f"{type_}_Response")).encode(), usedforsecurity=False
+    ).hexdigest()
 
 
 def _summed(type_: str) -> str:
@@ -77,7 +83,9 @@ class Wire:
         self._counted = bool(fields) and fields[0][1][1] == _HEADER
 
     def frame(self, cdr: bytes, count: int) -> bytearray:
-        """Return the frame of a message of ours; `count` goes into its header, if it has one, as the publishers of ROS 1 do it."""
+        """Return the frame of a message of ours; `count` goes into its header, if it has one, as the
+        publishers of ROS 1 do it.
+        """
         message = self._store.cdr_to_ros1(memoryview(cdr), self._type)
         frame = bytearray(_LENGTH.size + len(message))
         frame[_LENGTH.size :] = message
@@ -88,8 +96,13 @@ class Wire:
         return frame
 
     def cdr(self, message: bytes) -> bytes:
-        """Return a message of ROS 1, without its length, as CDR. Raises MessageError if the bytes are no such message."""
+        """Return a message of ROS 1, without its length, as CDR.
+
+        Raises MessageError if the bytes are no such message.
+        """
         try:
             return bytes(self._store.ros1_to_cdr(message, self._type))
         except (SerdeError, AssertionError, IndexError, struct.error, ValueError) as error:
-            raise MessageError(f"{self._type}: {len(message)} bytes are no such message of ROS 1 ({error})") from error
+            raise MessageError(
+                f"{self._type}: {len(message)} bytes are no such message of ROS 1 ({error})"
+            ) from error

@@ -11,14 +11,17 @@ __all__ = ["description"]
 
 
 def description(file: Path) -> str:
-    """Return the URDF in `file`, with the names of its meshes as addresses: a program does not know where the file was.
+    """Return the URDF in `file`, with the names of its meshes as addresses: a program does not know where the
+    file was.
 
     Raises DeviceError if it is none.
     """
     try:
         robot = ElementTree.fromstring(file.read_text("utf-8"))
     except (OSError, ElementTree.ParseError) as error:
-        raise DeviceError(f"robot_description '{file}' is no URDF: {error}; `trocar model export` writes one") from error
+        raise DeviceError(
+            f"robot_description '{file}' is no URDF: {error}; `trocar model export` writes one"
+        ) from error
     for mesh in robot.iter("mesh"):
         name = mesh.get("filename", "")
         if "://" not in name:

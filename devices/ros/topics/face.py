@@ -1,9 +1,12 @@
-"""The dVRK as ROS programs see it: every topic and service of the simulated arms, the console, the pedals and the cameras, in one table.
+"""The dVRK as ROS programs see it: every topic and service of the simulated arms, the console, the pedals and
+the cameras, in one table.
 
-Sources: what is published and subscribed to, and its types, from jhu-cisst/cisst-ros (commit 73aca61c, mts_ros_crtk_bridge_provided.cpp) and
-jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp and core/components/code/mtsIntuitiveResearchKit{Arm,PSM,ECM,MTM,SUJ}.cpp);
-what programs in Python cannot do without from jhu-dvrk/dvrk_python (a1b337b3) and crtk_python_client (33b4c387); cameras from
-jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst). All events are latched, as there.
+Sources: what is published and subscribed to, and its types, from jhu-cisst/cisst-ros (commit 73aca61c,
+mts_ros_crtk_bridge_provided.cpp) and jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68,
+ros/dvrk_robot/src/system_ROS.cpp and core/components/code/mtsIntuitiveResearchKit{Arm,PSM,ECM,MTM,SUJ}.cpp);
+what programs in Python cannot do without from jhu-dvrk/dvrk_python (a1b337b3) and crtk_python_client
+(33b4c387); cameras from jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst). All events
+are latched, as there.
 """
 
 from __future__ import annotations
@@ -28,7 +31,9 @@ _JOINT_STATE, _POSE, _TWIST, _WRENCH = (
     "geometry_msgs/msg/TwistStamped",
     "geometry_msgs/msg/WrenchStamped",
 )
-_EMPTY, _STRING, _BOOL, _FLOAT, _ARRAY = (f"std_msgs/msg/{name}" for name in ("Empty", "String", "Bool", "Float64", "Float64MultiArray"))
+_EMPTY, _STRING, _BOOL, _FLOAT, _ARRAY = (
+    f"std_msgs/msg/{name}" for name in ("Empty", "String", "Bool", "Float64", "Float64MultiArray")
+)
 _STATE_COMMAND, _OPERATING_STATE = "crtk_msgs/msg/StringStamped", "crtk_msgs/msg/OperatingState"
 _FORWARD, _INVERSE = "crtk_msgs/srv/QueryForwardKinematics", "crtk_msgs/srv/QueryInverseKinematics"
 
@@ -83,7 +88,12 @@ _PSM_EVENTS = {
     "IO/tool": BUTTON,
 }
 _PSM_COMMANDS = {"set_tool_type": _STRING, "emulate_adapter_present": _BOOL, "emulate_tool_present": _BOOL}
-_ECM_EVENTS = {"endoscope_type": _STRING, "arm_clutch": BUTTON, "IO/arm_clutch": BUTTON, "IO/SUJ_clutch": BUTTON}
+_ECM_EVENTS = {
+    "endoscope_type": _STRING,
+    "arm_clutch": BUTTON,
+    "IO/arm_clutch": BUTTON,
+    "IO/SUJ_clutch": BUTTON,
+}
 _ECM_COMMANDS = {"set_endoscope_type": _STRING}
 _MTM_EVENTS = {"gripper/pinch": _EMPTY, "gripper/closed": _BOOL, "orientation_locked": _BOOL}
 _MTM_COMMANDS = {"lock_orientation": "geometry_msgs/msg/Quaternion", "unlock_orientation": _EMPTY}
@@ -91,14 +101,21 @@ _MTM_COMMANDS = {"lock_orientation": "geometry_msgs/msg/Quaternion", "unlock_ori
 _SUJ_EVENTS = {"operating_state": _OPERATING_STATE, "error": _STRING, "warning": _STRING, "status": _STRING}
 _SUJ_COMMANDS = {"state_command": _STATE_COMMAND, "servo_jp": _JOINT_STATE, "move_jp": _JOINT_STATE}
 
-_PARTS = {"system": SYSTEM, "console": CONSOLE, "footpedals": PEDALS, "SUJ": Topics({}, {"set_reference_arm": _STRING})}
+_PARTS = {
+    "system": SYSTEM,
+    "console": CONSOLE,
+    "footpedals": PEDALS,
+    "SUJ": Topics({}, {"set_reference_arm": _STRING}),
+}
 """What there is once."""
 
 _PICTURES = {"image_raw": "sensor_msgs/msg/Image", "image_raw/compressed": "sensor_msgs/msg/CompressedImage"}
 
 
 def face(params: GatewayParams) -> tuple[Row, ...]:
-    """Return every row of what `params` show and listen to; port names are topic names without namespace and leading slash."""
+    """Return every row of what `params` show and listen to; port names are topic names without namespace and
+    leading slash.
+    """
     rows: list[Row] = []
     for name, arm in params.arms.shown.items():
         rows += _shown(name, arm, _reference(name, params))
@@ -116,11 +133,15 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         Row("/joint_states", _JOINT_STATE, "publish", periodic=True),
         Row("/robot_description", _STRING, "publish", latched=True),
     )
-    return tuple(_named(row, params.namespace) for row in rows) + tuple(replace(row, is_real=True) for name in params.listen for row in _listened(name))
+    return tuple(_named(row, params.namespace) for row in rows) + tuple(
+        replace(row, is_real=True) for name in params.listen for row in _listened(name)
+    )
 
 
 def _reference(arm: CartArm, params: GatewayParams) -> str:
-    """Return the `frame_id` of Cartesian states that are not `local/`, by the motion controller's rule; the plan refuses a scenario where the two differ."""
+    """Return the `frame_id` of Cartesian states that are not `local/`, by the motion controller's rule; the
+    plan refuses a scenario where the two differ.
+    """
     world = "Cart" if params.mounting == "cart" else "world"
     if params.reference == "world":
         return world
@@ -130,7 +151,11 @@ def _reference(arm: CartArm, params: GatewayParams) -> str:
 
 
 def _named(row: Row, namespace: str) -> Row:
-    return Row(f"/{namespace}{row.topic}", row.type, row.way, row.port, row.latched, row.periodic, row.owner) if namespace else row
+    return (
+        Row(f"/{namespace}{row.topic}", row.type, row.way, row.port, row.latched, row.periodic, row.owner)
+        if namespace
+        else row
+    )
 
 
 def _state(owner: str, name: str, type_: str, **more: object) -> Row:
@@ -146,7 +171,9 @@ def _event(owner: str, name: str, type_: str, *, latched: bool = True) -> Row:
 
 def _command(owner: str, name: str, type_: str, joints: tuple[str, ...] = ()) -> Row:
     names = joints if type_ == _JOINT_STATE else ()
-    port = Port(name=f"{owner}/{name}", causality="output", type=type_, variability="event", names=names, clock="wall")
+    port = Port(
+        name=f"{owner}/{name}", causality="output", type=type_, variability="event", names=names, clock="wall"
+    )
     return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)
 
 
@@ -154,7 +181,9 @@ def _service(owner: str, name: str, type_: str) -> Row:
     return Row(f"/{owner}/{name}", type_, "serve", owner=owner)
 
 
-def _talk(owner: str, events: Mapping[str, str], commands: Mapping[str, str], joints: tuple[str, ...] = ()) -> Iterator[Row]:
+def _talk(
+    owner: str, events: Mapping[str, str], commands: Mapping[str, str], joints: tuple[str, ...] = ()
+) -> Iterator[Row]:
     """Yield rows of events and of commands, those with joint positions to `joints`."""
     yield from (_event(owner, name, type_) for name, type_ in events.items())
     yield from (_command(owner, name, type_, joints) for name, type_ in commands.items())
@@ -184,17 +213,29 @@ def _shown(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: str) -> It
         yield _state(arm, f"trajectory_j/{ratio}", _FLOAT)
     yield from (_service(arm, name, type_) for name, type_ in _SERVICES.items())
     if isinstance(mounted, MountedPsm) and (mounted.tool.jaw is not None or mounted.tool.hand is not None):
-        gripper, driven = ("jaw", mounted.tool.jaw_joints) if mounted.tool.hand is None else ("hand", mounted.tool.hand.joints)
+        gripper, driven = (
+            ("jaw", mounted.tool.jaw_joints)
+            if mounted.tool.hand is None
+            else ("hand", mounted.tool.hand.joints)
+        )
         grasping = tuple(joint.name for joint in driven)
         yield from _joint_states(arm, f"{gripper}/", grasping)
-        yield from _talk(arm, {}, {f"{gripper}/{name}": type_ for name, type_ in _GRIPPER_COMMANDS.items()}, grasping)
+        yield from _talk(
+            arm, {}, {f"{gripper}/{name}": type_ for name, type_ in _GRIPPER_COMMANDS.items()}, grasping
+        )
 
 
-_SERVICES = {"forward_kinematics": _FORWARD, "local/forward_kinematics": _FORWARD, "inverse_kinematics": _INVERSE}
+_SERVICES = {
+    "forward_kinematics": _FORWARD,
+    "local/forward_kinematics": _FORWARD,
+    "inverse_kinematics": _INVERSE,
+}
 
 
 def _setup_joints(arm: CartArm, reference: str) -> Iterator[Row]:
-    """Yield the rows of the setup joints that carry `arm`: all four sets are there, as programs ask for all of them, fed or not."""
+    """Yield the rows of the setup joints that carry `arm`: all four sets are there, as programs ask for all
+    of them, fed or not.
+    """
     owner, names = f"SUJ/{arm}", tuple(f"SUJ_{arm}_J{index}" for index in range(len(JOINT_NAMES)))
     yield from _talk(owner, _SUJ_EVENTS, _SUJ_COMMANDS, names)
     yield _state(owner, "measured_js", _JOINT_STATE, names=names)
@@ -204,13 +245,24 @@ def _setup_joints(arm: CartArm, reference: str) -> Iterator[Row]:
 
 def _camera(camera: str) -> Iterator[Row]:
     for eye in ("left", "right"):
-        yield from (_event(camera, f"{eye}/{name}", type_, latched=False) for name, type_ in _PICTURES.items())
+        yield from (
+            _event(camera, f"{eye}/{name}", type_, latched=False) for name, type_ in _PICTURES.items()
+        )
         yield _event(camera, f"{eye}/camera_info", "sensor_msgs/msg/CameraInfo", latched=False)
 
 
 def _heard(owner: str, name: str, type_: str, **more: object) -> Row:
     """Return a row of what a real arm publishes all the time."""
-    port = Port.model_validate({"name": f"{owner}/{name}", "causality": "output", "type": type_, "clock": "wall", "max_age_ns": _REAL_MAX_AGE_NS} | more)
+    port = Port.model_validate(
+        {
+            "name": f"{owner}/{name}",
+            "causality": "output",
+            "type": type_,
+            "clock": "wall",
+            "max_age_ns": _REAL_MAX_AGE_NS,
+        }
+        | more
+    )
     return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)
 
 
@@ -219,7 +271,9 @@ _REAL_MAX_AGE_NS = 100_000_000
 
 
 def _listened(arm: Real) -> Iterator[Row]:
-    """Yield the rows of a real arm: its states and events come in, commands to it go out; or those of real pedals."""
+    """Yield the rows of a real arm: its states and events come in, commands to it go out; or those of real
+    pedals.
+    """
     if arm == "footpedals":
         yield from _talk(arm, {}, PEDALS.told)
         return
@@ -236,9 +290,16 @@ def _listened(arm: Real) -> Iterator[Row]:
         yield _heard(arm, f"{prefix}measured_cv", _TWIST)
     for kind in ("body", "spatial"):
         yield _heard(arm, f"{kind}/measured_cf", _WRENCH)
-    own_events, own_commands = (_MTM_EVENTS, _MTM_COMMANDS) if is_master else (_PSM_EVENTS, _PSM_COMMANDS) if is_psm else (_ECM_EVENTS, _ECM_COMMANDS)
+    own_events, own_commands = (
+        (_MTM_EVENTS, _MTM_COMMANDS)
+        if is_master
+        else (_PSM_EVENTS, _PSM_COMMANDS)
+        if is_psm
+        else (_ECM_EVENTS, _ECM_COMMANDS)
+    )
     for name, type_ in (_EVENTS | own_events).items():
         yield _command(arm, name, type_)
     jaw = {f"jaw/{name}": type_ for name, type_ in _GRIPPER_COMMANDS.items()} if is_psm else {}
     for name, type_ in (_COMMANDS | own_commands | jaw).items():
-        yield _event(arm, name, type_, latched=False)  # a real arm is told once: who comes late must not be moved by it
+        # a real arm is told once: who comes late must not be moved by it
+        yield _event(arm, name, type_, latched=False)

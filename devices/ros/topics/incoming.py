@@ -1,4 +1,6 @@
-"""What ROS programs say, on its way into the simulation: checked, counted, and refused with a word on the arm's topics."""
+"""What ROS programs say, on its way into the simulation: checked, counted, and refused with a word on the
+arm's topics.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ Tell = Callable[[Row, str, str], None]
 """Says on a topic of the row's arm (`error`: it cannot be; `warning`: not now) why a message was refused."""
 
 _MOST_PER_S = 1500
-"""Messages per second on one topic: the frequency of a real arm's own loop, which reads no more (dVRK docs/pages/development/middleware.rst)."""
+"""Messages per second on one topic: the frequency of a real arm's own loop, which reads no more (dVRK
+docs/pages/development/middleware.rst).
+"""
 _BURST = 150
 """Messages that may come at once: of a tenth of a second."""
 
@@ -33,9 +37,22 @@ _REMEMBERED = 8
 class Incoming:
     """One subscribed row."""
 
-    def __init__(self, row: Row, commander: Commander | None, count: Count, hand_on: Callable[[Row, Message], None], tell: Tell) -> None:
+    def __init__(
+        self,
+        row: Row,
+        commander: Commander | None,
+        count: Count,
+        hand_on: Callable[[Row, Message], None],
+        tell: Tell,
+    ) -> None:
         """Take the row, who leads its arm (None: nobody asks), and where messages go."""
-        self._row, self._commander, self._count, self._hand_on, self._tell = row, commander, count, hand_on, tell
+        self._row, self._commander, self._count, self._hand_on, self._tell = (
+            row,
+            commander,
+            count,
+            hand_on,
+            tell,
+        )
         self._model = message_type(row.type)
         self._state = row.port if row.port is not None and row.port.variability == "signal" else None
         self._begun_ns = time_ns()
@@ -47,7 +64,10 @@ class Incoming:
         """Hand on a message, or refuse it."""
         self._count.messages += 1
         if not self._has_allowance():
-            self._refuse("warning", f"more than {_MOST_PER_S} messages per second from {client}: those beyond are not heeded")
+            self._refuse(
+                "warning",
+                f"more than {_MOST_PER_S} messages per second from {client}: those beyond are not heeded",
+            )
             return
         try:
             message = decode(self._model, payload)
@@ -73,10 +93,15 @@ class Incoming:
         return self._commander.refusal(client) if self._commander is not None else None
 
     def _latched(self, stamp_ns: int, client: str) -> str | None:
-        """Return why a state command is one that a new connection has brought, though nobody gives it now; otherwise remember it."""
+        """Return why a state command is one that a new connection has brought, though nobody gives it now;
+        otherwise remember it.
+        """
         if stamp_ns < self._begun_ns:
             ago = (time_ns() - stamp_ns) / 1e9
-            return f"given {ago:.1f} s ago by the clock of {client}, before this gateway was there: if it is meant, give it again"
+            return (
+                f"given {ago:.1f} s ago by the clock of {client}, before this gateway was there: if it is"
+                " meant, give it again"
+            )
         if stamp_ns in self._heeded:  # maybe in another session: then the simulation does not know
             return f"heeded before, with the same stamp, {stamp_ns / 1e9:.9f} s: a new one has a new stamp"
         self._heeded.append(stamp_ns)
@@ -84,7 +109,9 @@ class Incoming:
 
     def _has_allowance(self) -> bool:
         now_ns = monotonic_ns()
-        self._allowance = min(self._allowance + (now_ns - self._counted_ns) * 1e-9 * _MOST_PER_S, float(_BURST))
+        self._allowance = min(
+            self._allowance + (now_ns - self._counted_ns) * 1e-9 * _MOST_PER_S, float(_BURST)
+        )
         self._counted_ns = now_ns
         if self._allowance < 1.0:
             return False

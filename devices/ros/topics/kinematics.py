@@ -23,21 +23,31 @@ __all__ = ["kinematics_handler"]
 
 
 def kinematics_handler(row: Row, chain: SerialChain, base: State) -> Handler:
-    """Return what answers the service `row` of an arm with this kinematics; `base`: the pose of its base in its reference."""
+    """Return what answers the service `row` of an arm with this kinematics; `base`: the pose of its base in
+    its reference.
+    """
     queries = KinematicsQueries(chain)
 
     def forward(payload: bytes) -> bytes:
         stands = None if row.name.startswith("local/") else base.value
         if stands is None and not row.name.startswith("local/"):
-            return encode(ForwardKinematicsResponse(message=f"nobody tells {base.port.name} now: is the session running?"))
+            return encode(
+                ForwardKinematicsResponse(
+                    message=f"nobody tells {base.port.name} now: is the session running?"
+                )
+            )
         answer = queries.forward(decode(ForwardKinematicsRequest, payload).jp, stands)
-        return encode(ForwardKinematicsResponse(cp=_pose(answer.value), result=answer.result, message=answer.message))
+        return encode(
+            ForwardKinematicsResponse(cp=_pose(answer.value), result=answer.result, message=answer.message)
+        )
 
     def inverse(payload: bytes) -> bytes:
         request = decode(InverseKinematicsRequest, payload)
         p, q = request.cp.position, request.cp.orientation
         answer = queries.inverse(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]), request.jp)
-        return encode(InverseKinematicsResponse(jp=answer.value, result=answer.result, message=answer.message))
+        return encode(
+            InverseKinematicsResponse(jp=answer.value, result=answer.result, message=answer.message)
+        )
 
     return inverse if row.name == "inverse_kinematics" else forward
 

@@ -20,7 +20,9 @@ from schemas.vectors import Vector, VectorCodec
 __all__ = ["Event", "Outgoing", "Periodic", "Source", "State"]
 
 _SILENT_NS = 1_000_000_000
-"""A state that is older is not published any more: a program is to see that nothing comes, as a CRTK client does after this time (its connection_timeout)."""
+"""A state that is older is not published any more: a program is to see that nothing comes, as a CRTK client
+does after this time (its connection_timeout).
+"""
 
 
 class State:
@@ -106,14 +108,17 @@ class Outgoing:
                 for topic in self._topics:
                     topic.publish(period)
                 period += 1
-                due_ns = max(due_ns + self._period_ns, monotonic_ns() - self._period_ns)  # at most one period is caught up
+                # at most one period is caught up
+                due_ns = max(due_ns + self._period_ns, monotonic_ns() - self._period_ns)
         except Exception as error:  # noqa: BLE001  # it is raised where the device is read
             self._failure = error
 
     def check(self) -> None:
         """Raise DeviceError if the thread has ended by an error."""
         if self._failure is not None:
-            raise DeviceError(f"publishing has failed: {type(self._failure).__name__}: {self._failure}") from self._failure
+            raise DeviceError(
+                f"publishing has failed: {type(self._failure).__name__}: {self._failure}"
+            ) from self._failure
 
     def close(self) -> None:
         """Publish no more."""

@@ -25,13 +25,20 @@ class Row:
     way: Way
     """`publish`: what the simulation tells; `subscribe`: what ROS programs say; `serve`: what they ask."""
     port: Port | None = None
-    """The port behind it: an input if published, an output if subscribed to. None: the gateway itself makes or answers it."""
+    """The port behind it: an input if published, an output if subscribed to.
+
+    None: the gateway itself makes or answers it.
+    """
     latched: bool = False
     """Late joiners get the last message."""
     periodic: bool = False
-    """Published at the gateway's period, the newest value each time; otherwise once for every message, at once."""
+    """Published at the gateway's period, the newest value each time; otherwise once for every message, at
+    once.
+    """
     owner: str = ""
-    """The arm, console part or camera that it belongs to, on whose `warning` and `error` its bad input is told: `PSM1`, `SUJ/PSM1`."""
+    """The arm, console part or camera that it belongs to, on whose `warning` and `error` its bad input is
+    told: `PSM1`, `SUJ/PSM1`.
+    """
 
     is_real: bool = False
     """Whether it is of a real arm or pedal, that is listened to."""

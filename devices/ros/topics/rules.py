@@ -1,4 +1,6 @@
-"""What a message from outside must be before it enters the simulation, beyond being one of its type with finite numbers."""
+"""What a message from outside must be before it enters the simulation, beyond being one of its type with
+finite numbers.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ _QUATERNION_TOLERANCE = 1e-3
 
 
 def check(message: Message, row: Row) -> None:
-    """Raise MessageError if a message has a wrong number of joints (those that the row's port names) or a quaternion that is none."""
+    """Raise MessageError if a message has a wrong number of joints (those that the row's port names) or a
+    quaternion that is none.
+    """
     if isinstance(message, JointState):
         _check_joints(message, row)
     elif isinstance(message, PoseStamped):
@@ -37,7 +41,12 @@ def check(message: Message, row: Row) -> None:
 def _check_joints(message: JointState, row: Row) -> None:
     joints = 0 if row.port is None else len(row.port.names)
     main = "effort" if row.name.endswith("_jf") else "position"
-    sizes = {"name": len(message.name), "position": message.position.size, "velocity": message.velocity.size, "effort": message.effort.size}
+    sizes = {
+        "name": len(message.name),
+        "position": message.position.size,
+        "velocity": message.velocity.size,
+        "effort": message.effort.size,
+    }
     if not sizes[main]:
         raise MessageError(f"no {main} is stated" + (f", expected {joints}" if joints else ""))
     expected = joints or sizes[main]
@@ -49,13 +58,20 @@ def _check_joints(message: JointState, row: Row) -> None:
 def _check_quaternion(q: Quaternion) -> None:
     norm = hypot(q.x, q.y, q.z, q.w)
     if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
-        raise MessageError(f"quaternion (x, y, z, w) has norm {norm:.6g}, expected 1 within {_QUATERNION_TOLERANCE:g}")
+        raise MessageError(
+            f"quaternion (x, y, z, w) has norm {norm:.6g}, expected 1 within {_QUATERNION_TOLERANCE:g}"
+        )
 
 
 def as_signal(message: Message, port: Port) -> Message:
-    """Return what a real arm has told as the signal `port` has it: joints by our names, zeros for what it does not state."""
+    """Return what a real arm has told as the signal `port` has it: joints by our names, zeros for what it
+    does not state.
+    """
     if not isinstance(message, JointState):
         return message
     stated = {field: getattr(message, field) for field in port.fields}
     zeros = np.zeros(len(port.names))
-    return message.model_copy(update={"name": list(port.names)} | {field: value if value.size else zeros for field, value in stated.items()})
+    return message.model_copy(
+        update={"name": list(port.names)}
+        | {field: value if value.size else zeros for field, value in stated.items()}
+    )

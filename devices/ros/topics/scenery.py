@@ -1,4 +1,6 @@
-"""What ROS programs are told of the whole cart at once: /tf, from the cart to each tip and camera, and /joint_states."""
+"""What ROS programs are told of the whole cart at once: /tf, from the cart to each tip and camera, and
+/joint_states.
+"""
 
 from __future__ import annotations
 
@@ -40,21 +42,30 @@ def stride(name: str, period_ns: int) -> int:
 
 
 class _Transforms:
-    """The tree of frames: world or cart, `<arm>_base`, `<arm>` (its tip), and under the endoscope's tip the left camera's optical frame."""
+    """The tree of frames: world or cart, `<arm>_base`, `<arm>` (its tip), and under the endoscope's tip the
+    left camera's optical frame.
+    """
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         """Take what is shown, and the states by the names of their ports."""
         self._edges: list[_Edge] = []
         for name, arm in params.arms.shown.items():
-            self._edges += [_base(name, arm, params, states), (f"{name}_base", name, _newest(states[f"{name}/local/measured_cp"]))]
+            self._edges += [
+                _base(name, arm, params, states),
+                (f"{name}_base", name, _newest(states[f"{name}/local/measured_cp"])),
+            ]
             if isinstance(arm, MountedEcm):
-                self._edges += [(name, f"{camera}_left_optical", _fixed(_left_camera(arm))) for camera in params.cameras]
+                self._edges += [
+                    (name, f"{camera}_left_optical", _fixed(_left_camera(arm))) for camera in params.cameras
+                ]
 
         self._template = _Template(())
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return all transforms that are known now, as a TFMessage; None if there are none."""
-        known = [(parent, child, pose) for parent, child, newest in self._edges if (pose := newest()) is not None]
+        known = [
+            (parent, child, pose) for parent, child, newest in self._edges if (pose := newest()) is not None
+        ]
         if not known:
             return None
         edges = tuple((parent, child) for parent, child, _ in known)
@@ -64,7 +75,9 @@ class _Transforms:
 
 
 class _Template:
-    """The bytes of a TFMessage between given frames, of which only stamps and poses change: 21 us instead of 540 through the models."""
+    """The bytes of a TFMessage between given frames, of which only stamps and poses change: 21 us instead of
+    540 through the models.
+    """
 
     def __init__(self, edges: tuple[tuple[str, str], ...]) -> None:
         """Serialise once, with numbers that occur nowhere else, to find where the stamps and the poses stand."""
@@ -72,7 +85,9 @@ class _Template:
         marks = np.random.default_rng(0).random((len(edges), 7))
         stamps = [Time(sec=10**9 + index, nanosec=10**8 + index) for index in range(len(edges))]
         transforms = [
-            TransformStamped(header=Header(stamp=stamp, frame_id=parent), child_frame_id=child, transform=_transform(pose))
+            TransformStamped(
+                header=Header(stamp=stamp, frame_id=parent), child_frame_id=child, transform=_transform(pose)
+            )
             for (parent, child), stamp, pose in zip(edges, stamps, marks, strict=True)
         ]
         self._bytes = encode(TFMessage(transforms=transforms))
@@ -89,7 +104,9 @@ class _Template:
 
 
 def _base(name: str, arm: MountedArm, params: GatewayParams, states: Mapping[str, State]) -> _Edge:
-    """Return the edge to an arm's base: as the motion controller tells it where it can move, else as the scenario has it."""
+    """Return the edge to an arm's base: as the motion controller tells it where it can move, else as the
+    scenario has it.
+    """
     child = f"{name}_base"
     if params.mounting == "cart":
         return "Cart", child, _newest(states[f"SUJ/{name}/local/measured_cp"])
@@ -124,7 +141,11 @@ class _JointStates:
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         """Take what is shown, and the states by the names of their ports."""
-        found = ((arm, states.get(f"{arm}/{part}measured_js")) for arm in params.arms.shown for part in ("", "jaw/", "hand/"))
+        found = (
+            (arm, states.get(f"{arm}/{part}measured_js"))
+            for arm in params.arms.shown
+            for part in ("", "jaw/", "hand/")
+        )
         self._parts = [(arm, state) for arm, state in found if state is not None]
         self._known: tuple[str, ...] = ()
         self._codec: VectorCodec | None = None
@@ -137,6 +158,13 @@ class _JointStates:
         names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
         if self._codec is None or names != self._known:
             fields = ("position", "velocity", "effort")
-            self._known, self._codec = names, VectorCodec(Port(name="joint_states", causality="input", type=_JOINT_STATE, names=names, fields=fields))
+            self._known, self._codec = (
+                names,
+                VectorCodec(
+                    Port(
+                        name="joint_states", causality="input", type=_JOINT_STATE, names=names, fields=fields
+                    )
+                ),
+            )
         rows = [value.reshape(3, -1) for _, _, value in known]  # position, velocity, effort of each arm
         return self._codec.encode(np.concatenate(rows, axis=1).ravel(), stamp_ns)

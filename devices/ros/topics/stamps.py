@@ -1,4 +1,6 @@
-"""Wall-clock stamps: those of one topic strictly increase, as a CRTK client takes no state that is not newer than the last."""
+"""Wall-clock stamps: those of one topic strictly increase, as a CRTK client takes no state that is not newer
+than the last.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
-"""The topics of the authors' simulator, as the table of a gateway with `profile: paper`; a participant of kind `paper` is behind it.
+"""The topics of the authors' simulator, as the table of a gateway with `profile: paper`; a participant of
+kind `paper` is behind it.
 
-Names and types as in the scripts of their scenes (unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with what their Python client says beside
-(65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names there.
+Names and types as in the scripts of their scenes (unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with what
+their Python client says beside (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names
+there.
 """
 
 from __future__ import annotations
@@ -16,7 +18,12 @@ from schemas.ports import Port
 
 __all__ = ["paper_face"]
 
-_JOINT_STATE, _STRING, _BOOL, _POSE = "sensor_msgs/msg/JointState", "std_msgs/msg/String", "std_msgs/msg/Bool", "geometry_msgs/msg/Pose"
+_JOINT_STATE, _STRING, _BOOL, _POSE = (
+    "sensor_msgs/msg/JointState",
+    "std_msgs/msg/String",
+    "std_msgs/msg/Bool",
+    "geometry_msgs/msg/Pose",
+)
 _DESIRED = ("state_joint_desired", "set_position_joint", "set_position_goal_joint")
 _SETUP_JOINTS = 14
 """Right (5), left (5), camera (4)."""
@@ -53,12 +60,23 @@ def _arm(arm: CartArm, mounted: MountedPsm | MountedEcm) -> Iterator[Row]:
 
 
 def _camera(eye: str) -> Iterator[Row]:
-    for name, type_ in (("image_raw", "sensor_msgs/msg/Image"), ("camera_info", "sensor_msgs/msg/CameraInfo")):
+    for name, type_ in (
+        ("image_raw", "sensor_msgs/msg/Image"),
+        ("camera_info", "sensor_msgs/msg/CameraInfo"),
+    ):
         yield _event("stereo", f"{eye}/{name}", type_)
 
 
 def _state(owner: str, name: str, *, size: int = 1, fields: tuple[str, ...] = ("position",)) -> Row:
-    port = Port.model_validate({"name": f"{owner}/{name}", "causality": "input", "type": _JOINT_STATE, "size": size, "fields": fields})
+    port = Port.model_validate(
+        {
+            "name": f"{owner}/{name}",
+            "causality": "input",
+            "type": _JOINT_STATE,
+            "size": size,
+            "fields": fields,
+        }
+    )
     return Row(f"/{owner}/{name}", _JOINT_STATE, "publish", port, periodic=True, owner=owner)
 
 

@@ -1,4 +1,6 @@
-"""A gateway to ROS 2 over Zenoh: programs with RMW_IMPLEMENTATION=rmw_zenoh_cpp connect to the hub, which is the router that they look for."""
+"""A gateway to ROS 2 over Zenoh: programs with RMW_IMPLEMENTATION=rmw_zenoh_cpp connect to the hub, which is
+the router that they look for.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,12 @@ __all__ = ["ZenohGateway", "ZenohParams"]
 class ZenohParams(GatewayParams):
     """Which part of the dVRK is shown, and to whom."""
 
-    domain: int = Field(default=0, ge=0, le=232, description="ROS_DOMAIN_ID of the programs; 232 is the largest that ROS 2 allows")
+    domain: int = Field(
+        default=0,
+        ge=0,
+        le=232,
+        description="ROS_DOMAIN_ID of the programs; 232 is the largest that ROS 2 allows",
+    )
 
 
 class ZenohGateway(Gateway):
@@ -45,9 +52,14 @@ class ZenohGateway(Gateway):
         self._connect = connect
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
-        """Join the graph of the domain. Raises ConnectError if the hub cannot be reached, DeviceError if there is none."""
+        """Join the graph of the domain.
+
+        Raises ConnectError if the hub cannot be reached, DeviceError if there is none.
+        """
         if self._connect is None:
-            raise DeviceError(f"'{self.name}' shows ROS programs what its hub runs, and has been opened without one")
+            raise DeviceError(
+                f"'{self.name}' shows ROS programs what its hub runs, and has been opened without one"
+            )
         from devices.ros.zenoh.transport import ZenohTransport  # it needs the extra
 
         return ZenohTransport(self._connect, self._domain)

@@ -19,7 +19,10 @@ def gid_of(token: str) -> bytes:
 
 
 class Graph:
-    """The other programs. A program is a session of Zenoh, and is called like the first node of it; may be used from any thread."""
+    """The other programs.
+
+    A program is a session of Zenoh, and is called like the first node of it; may be used from any thread.
+    """
 
     def __init__(self, own_session: str) -> None:
         """`own_session`: the id of the session whose tokens are not looked at."""
@@ -41,7 +44,9 @@ class Graph:
             self._there[token] = endpoint
             if endpoint.session not in self._names:
                 taken = endpoint.node in self._names.values()
-                self._names[endpoint.session] = f"{endpoint.node} ({endpoint.session})" if taken else endpoint.node
+                self._names[endpoint.session] = (
+                    f"{endpoint.node} ({endpoint.session})" if taken else endpoint.node
+                )
 
     def went(self, token: str) -> None:
         """Forget a token."""
@@ -56,14 +61,19 @@ class Graph:
     def sender(self, topic: str, gid: bytes) -> str:
         """Return the name of the program that sent a message on `topic` as the publisher `gid`.
 
-        A publisher whose id is not made of its token, as other clients than rmw_zenoh may have it, is known as the only one left on its topic; where two
-        such share a topic from the beginning, each goes by its id.
+        A publisher whose id is not made of its token, as other clients than rmw_zenoh may have it, is known
+        as the only one left on its topic; where two such share a topic from the beginning, each goes by its
+        id.
         """
         with self._changing:
             token = self._senders.get(gid)
             if token is None:
                 named = set(self._senders.values())
-                nameless = [t for t, e in self._there.items() if e.kind == "MP" and e.topic == topic and t not in named]
+                nameless = [
+                    t
+                    for t, e in self._there.items()
+                    if e.kind == "MP" and e.topic == topic and t not in named
+                ]
                 by_hash = next((t for t in nameless if gid_of(t) == gid), None)
                 token = by_hash if by_hash is not None else nameless[0] if len(nameless) == 1 else None
                 if token is None:
@@ -74,5 +84,7 @@ class Graph:
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs that have to do with any of `topics`."""
         with self._changing:
-            sessions = dict.fromkeys(endpoint.session for endpoint in self._there.values() if endpoint.topic in topics)
+            sessions = dict.fromkeys(
+                endpoint.session for endpoint in self._there.values() if endpoint.topic in topics
+            )
             return tuple(Client(self._names[session], session) for session in sessions)

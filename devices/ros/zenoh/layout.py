@@ -1,7 +1,9 @@
-"""How ROS 2 lies on Zenoh: keys of topics and services, tokens of the graph, and what goes along with every message, as rmw_zenoh has them in Jazzy.
+"""How ROS 2 lies on Zenoh: keys of topics and services, tokens of the graph, and what goes along with every
+message, as rmw_zenoh has them in Jazzy.
 
-Source: ros2/rmw_zenoh, docs/design.md, and for what that leaves open rmw_zenoh_cpp/src/detail/liveliness_utils.cpp (commit 3411fdec), attachment_helpers.cpp
-and rmw_publisher_data.cpp (commit 3e19ec73).
+Source: ros2/rmw_zenoh, docs/design.md, and for what that leaves open
+rmw_zenoh_cpp/src/detail/liveliness_utils.cpp (commit 3411fdec), attachment_helpers.cpp and
+rmw_publisher_data.cpp (commit 3e19ec73).
 """
 
 from __future__ import annotations
@@ -44,7 +46,9 @@ def type_hash(type_: str) -> str:
     """Return the hash (REP-2016) of a message or a service."""
     if "/srv/" not in type_:
         return rihs01(type_)
-    return service_hash(type_, *(msg_text(message_type(f"{type_}_{part}")) for part in ("Request", "Response")))
+    return service_hash(
+        type_, *(msg_text(message_type(f"{type_}_{part}")) for part in ("Request", "Response"))
+    )
 
 
 def _dds_name(type_: str) -> str:
@@ -77,7 +81,17 @@ class Endpoint:
     def token(self, domain: int) -> str:
         """Return the key of the liveliness token."""
         namespace, _, name = self.node.rpartition("/")
-        parts = ["@ros2_lv", str(domain), self.session, "0", str(self.number), self.kind, "%", _mangled(namespace), name]
+        parts = [
+            "@ros2_lv",
+            str(domain),
+            self.session,
+            "0",
+            str(self.number),
+            self.kind,
+            "%",
+            _mangled(namespace),
+            name,
+        ]
         if self.kind != "NN":
             parts += [_mangled(self.topic), _dds_name(self.type), self.hash, self.quality]
         return "/".join(parts)
@@ -86,10 +100,25 @@ class Endpoint:
     def of(cls, token: str) -> Endpoint | None:
         """Return what a token tells; None if it is none that we know how to read."""
         parts = token.split("/")
-        if len(parts) not in (9, 13) or parts[5] not in ("NN", "MP", "MS", "SS", "SC") or not parts[4].isdecimal():
+        if (
+            len(parts) not in (9, 13)
+            or parts[5] not in ("NN", "MP", "MS", "SS", "SC")
+            or not parts[4].isdecimal()
+        ):
             return None
-        topic, type_, hash_, quality = (parts[9].replace("%", "/"), *parts[10:]) if len(parts) > 9 else ("", "", "", "")
-        return cls(parts[2], int(parts[4]), parts[5], f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}", topic, type_, hash_, quality)
+        topic, type_, hash_, quality = (
+            (parts[9].replace("%", "/"), *parts[10:]) if len(parts) > 9 else ("", "", "", "")
+        )
+        return cls(
+            parts[2],
+            int(parts[4]),
+            parts[5],
+            f"{parts[7].replace('%', '/').rstrip('/')}/{parts[8]}",
+            topic,
+            type_,
+            hash_,
+            quality,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +139,9 @@ class Attachment:
     def unpack(cls, data: bytes) -> Attachment:
         """Raises MessageError if the bytes are none."""
         if len(data) != _ATTACHMENT.size or data[16] != _GID_BYTES:
-            raise MessageError(f"{len(data)} bytes are no attachment of ROS 2 (allowed: sequence number, stamp and 16 bytes of id, {_ATTACHMENT.size} in all)")
+            raise MessageError(
+                f"{len(data)} bytes are no attachment of ROS 2 (allowed: sequence number, stamp and 16 bytes"
+                f" of id, {_ATTACHMENT.size} in all)"
+            )
         sequence, stamp_ns, _, gid = _ATTACHMENT.unpack(data)
         return cls(sequence, stamp_ns, gid)

@@ -11,21 +11,31 @@ from schemas.codec import typestore
 __all__ = ["service_hash"]
 
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
-_EVENT_INFO_TEXT = "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\nint64 sequence_number"
+_EVENT_INFO_TEXT = (
+    "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\nint64 sequence_number"
+)
 """As ROS 2 Jazzy hashes it: a `char` of a .msg file is a uint8 in the type description."""
 
 
 def service_hash(name: str, request: str, response: str) -> str:
-    """Return `RIHS01_...` of the service `name` (`std_srvs/srv/Trigger`) with these parts, given as .msg text.
+    """Return `RIHS01_...` of the service `name` (`std_srvs/srv/Trigger`) with these parts, given as .msg
+    text.
 
-    A service is described as a type of three fields: request, response, and an event that holds at most one of each (rosidl_parser's definition of
-    a service; `tests/devices/ros` holds the result against the type description that std_srvs of Jazzy ships).
+    A service is described as a type of three fields: request, response, and an event that holds at most one
+    of each (rosidl_parser's definition of a service; `tests/devices/ros` holds the result against the type
+    description that std_srvs of Jazzy ships).
     """
     store = get_typestore(Stores.EMPTY)
     store.fielddefs.update(typestore().fielddefs)
     event = f"{_EVENT_INFO} info\n{name}_Request[<=1] request\n{name}_Response[<=1] response"
     whole = f"{name}_Request request_message\n{name}_Response response_message\n{name}_Event event_message"
-    parts = {_EVENT_INFO: _EVENT_INFO_TEXT, f"{name}_Request": request, f"{name}_Response": response, f"{name}_Event": event, name: whole}
+    parts = {
+        _EVENT_INFO: _EVENT_INFO_TEXT,
+        f"{name}_Request": request,
+        f"{name}_Response": response,
+        f"{name}_Event": event,
+        name: whole,
+    }
     for part, text in parts.items():
         (definition,) = get_types_from_msg(text, part).values()
         store.fielddefs[part] = _renamed(definition)
@@ -33,7 +43,9 @@ def service_hash(name: str, request: str, response: str) -> str:
 
 
 def _renamed(definition: Any) -> Any:
-    """Return a definition of rosbags with the types of a service called as ROS calls them: rosbags puts a `msg` into their names."""
+    """Return a definition of rosbags with the types of a service called as ROS calls them: rosbags puts a
+    `msg` into their names.
+    """
     if isinstance(definition, str):
         return definition.replace("/srv/msg/", "/srv/")
     if isinstance(definition, list | tuple):

@@ -21,16 +21,19 @@ __all__ = ["ZenohTransport"]
 log = logging.getLogger(__name__)
 
 _HEARTBEAT_S = 0.5
-"""How often a latched publisher repeats the number of its last message, from which a subscriber knows that it missed one: rmw_zenoh's period. Where that
-tells it once, and waits for every reader, we tell it all the time: a program that has stopped reading must hold up nobody."""
+"""How often a latched publisher repeats the number of its last message, from which a subscriber knows that it
+missed one: rmw_zenoh's period. Where that tells it once, and waits for every reader, we tell it all the time:
+a program that has stopped reading must hold up nobody.
+"""
 
 
 class ZenohTransport(Transport):
     """Publishes, listens and answers under rmw_zenoh's keys, as one node.
 
-    Nothing that is published waits for a reader: what a program does not take is dropped for it, and of a latched topic it asks for the last message again.
-    States and events queue apart, and pictures have a session of their own: where one program does not take them, the router tries for 50 ms before it drops
-    the rest of a picture, and meanwhile reads nothing else of that session.
+    Nothing that is published waits for a reader: what a program does not take is dropped for it, and of a
+    latched topic it asks for the last message again. States and events queue apart, and pictures have a
+    session of their own: where one program does not take them, the router tries for 50 ms before it drops the
+    rest of a picture, and meanwhile reads nothing else of that session.
     """
 
     def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
@@ -39,16 +42,27 @@ class ZenohTransport(Transport):
         self._domain, self._id = domain, str(self._session.zid())
         self._graph = Graph(self._id)
         self._topics: set[str] = set()
-        self._entities: list[ext.AdvancedPublisher | zenoh.Publisher | zenoh.Subscriber[None] | zenoh.Queryable[None] | zenoh.LivelinessToken] = []
+        self._entities: list[
+            ext.AdvancedPublisher
+            | zenoh.Publisher
+            | zenoh.Subscriber[None]
+            | zenoh.Queryable[None]
+            | zenoh.LivelinessToken
+        ] = []
         self._number = 0
         self._closed = False
-        watch = Callback(self._came_or_went, indirect=False)  # in the thread that also brings messages: no message comes before its sender
+        # in the thread that also brings messages: no message comes before its sender
+        watch = Callback(self._came_or_went, indirect=False)
         liveliness = self._session.liveliness()
         self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
         self._entities.append(liveliness.declare_token(Endpoint(self._id, 0, "NN", NODE).token(domain)))
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
-        address, cdr, drop = key(self._domain, row.topic, row.type), zenoh.Encoding.APPLICATION_CDR, zenoh.CongestionControl.DROP
+        address, cdr, drop = (
+            key(self._domain, row.topic, row.type),
+            zenoh.Encoding.APPLICATION_CDR,
+            zenoh.CongestionControl.DROP,
+        )
         urgency = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH
         if row.latched:
             last, numbered = ext.CacheConfig(max_samples=1), ext.MissDetectionConfig(heartbeat=_HEARTBEAT_S)
@@ -64,7 +78,9 @@ class ZenohTransport(Transport):
             )
         else:
             session = self._pictures if row.is_picture else self._session
-            publisher = session.declare_publisher(address, encoding=cdr, congestion_control=drop, priority=urgency)
+            publisher = session.declare_publisher(
+                address, encoding=cdr, congestion_control=drop, priority=urgency
+            )
         self._entities.append(publisher)
         gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
         sequence = 0
@@ -81,13 +97,19 @@ class ZenohTransport(Transport):
 
         def heard(sample: zenoh.Sample) -> None:
             try:
-                attached = Attachment.unpack(b"" if sample.attachment is None else sample.attachment.to_bytes())
+                attached = Attachment.unpack(
+                    b"" if sample.attachment is None else sample.attachment.to_bytes()
+                )
             except MessageError as error:
                 log.warning("%s: a message is not heeded: %s", topic, error)
                 return
             take(sample.payload.to_bytes(), self._graph.sender(topic, attached.gid))
 
-        self._entities.append(self._session.declare_subscriber(key(self._domain, topic, row.type), Callback(heard, indirect=False)))
+        self._entities.append(
+            self._session.declare_subscriber(
+                key(self._domain, topic, row.type), Callback(heard, indirect=False)
+            )
+        )
         self._announce("MS", row, VOLATILE)
 
     def serve(self, row: Row, handle: Handler) -> None:  # noqa: D102
@@ -105,7 +127,9 @@ class ZenohTransport(Transport):
                 back = Attachment(attached.sequence, time_ns(), attached.gid).pack()
                 query.reply(address, response, encoding=zenoh.Encoding.APPLICATION_CDR, attachment=back)
 
-        self._entities.append(self._session.declare_queryable(address, Callback(asked, indirect=True), complete=True))
+        self._entities.append(
+            self._session.declare_queryable(address, Callback(asked, indirect=True), complete=True)
+        )
         self._announce("SS", row, VOLATILE)
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
@@ -123,9 +147,13 @@ class ZenohTransport(Transport):
         """Tell the graph of a publisher, subscriber or server; return its token."""
         self._number += 1
         self._topics.add(row.topic)
-        token = Endpoint(self._id, self._number, kind, NODE, row.topic, row.type, type_hash(row.type), quality).token(self._domain)
+        token = Endpoint(
+            self._id, self._number, kind, NODE, row.topic, row.type, type_hash(row.type), quality
+        ).token(self._domain)
         self._entities.append(self._session.liveliness().declare_token(token))
         return token
 
     def _came_or_went(self, sample: zenoh.Sample) -> None:
-        (self._graph.went if sample.kind == zenoh.SampleKind.DELETE else self._graph.came)(str(sample.key_expr))
+        (self._graph.went if sample.kind == zenoh.SampleKind.DELETE else self._graph.came)(
+            str(sample.key_expr)
+        )

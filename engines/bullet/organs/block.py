@@ -13,7 +13,9 @@ __all__ = ["block_shape"]
 def block_shape(size: tuple[float, float, float]) -> Shape:
     """Return a block of edge lengths `size` (m)."""
     return Shape(
-        description="a block of the given size along the axes of its frame; the origin is in the middle of its top",
+        description=(
+            "a block of the given size along the axes of its frame; the origin is in the middle of its top"
+        ),
         mesh=lambda nodes: block(np.array(size), nodes),
         surfaces={side: lambda nodes, side=side: on_side(nodes, side, 0.0) for side in SIDES},
         anchors=("bottom",),

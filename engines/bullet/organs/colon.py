@@ -27,7 +27,12 @@ _TAENIAE = 3
 _BULGE = 0.14
 """By this share the haustra stand out, and the folds between them stand in. By eye."""
 
-_LAYOUTS = [(around, along, layers) for layers in (1, 2, 3) for around in range(12, 61, 6) for along in range(2 * _HAUSTRA, 25 * _HAUSTRA, _HAUSTRA)]
+_LAYOUTS = [
+    (around, along, layers)
+    for layers in (1, 2, 3)
+    for around in range(12, 61, 6)
+    for along in range(2 * _HAUSTRA, 25 * _HAUSTRA, _HAUSTRA)
+]
 """Numbers of cells that put nodes on the taeniae and the folds."""
 
 
@@ -45,14 +50,21 @@ def _unfitness(cells: tuple[int, int, int], nodes: int) -> float:
 
 @lru_cache(maxsize=16)
 def _tube(around: int, along: int, layers: int) -> TetMesh:
-    i, j, k = (index.ravel() for index in np.meshgrid(np.arange(along + 1), np.arange(around), np.arange(layers + 1), indexing="ij"))
+    i, j, k = (
+        index.ravel()
+        for index in np.meshgrid(
+            np.arange(along + 1), np.arange(around), np.arange(layers + 1), indexing="ij"
+        )
+    )
     x, angle = _LENGTH_M * (i / along - 0.5), 2.0 * np.pi * j / around
     between_folds = np.abs(np.sin(np.pi * _HAUSTRA * i / along))
     between_taeniae = np.abs(np.sin(0.5 * _TAENIAE * angle))
     outer = _RADIUS_M * (1.0 + _BULGE * between_taeniae * (2.0 * between_folds - 1.0))
     radius = outer - _WALL_M * (1.0 - k / layers)
     points = np.stack([x, -radius * np.sin(angle), -radius * np.cos(angle)], axis=1)
-    return TetMesh(np.round(points, ROUNDING_DIGITS), tetrahedra_of_cells((along, around, layers), closed=True))
+    return TetMesh(
+        np.round(points, ROUNDING_DIGITS), tetrahedra_of_cells((along, around, layers), closed=True)
+    )
 
 
 _MESENTERY_RAD = 0.3
@@ -68,8 +80,9 @@ def _on_mesentery(nodes: Vector) -> NDArray[np.bool_]:
 
 COLON = Shape(
     description=(
-        "a length of colon: a tube of 120 mm, about 45 mm wide, with four haustra between three taeniae and a wall of 5 mm, that of a collapsed "
-        "segment (CT Colonography Atlas, Springer 2013, Normal Colon); it lies along x around the origin, its mesentery at -z"
+        "a length of colon: a tube of 120 mm, about 45 mm wide, with four haustra between three taeniae and a"
+        " wall of 5 mm, that of a collapsed segment (CT Colonography Atlas, Springer 2013, Normal Colon); it"
+        " lies along x around the origin, its mesentery at -z"
     ),
     mesh=_mesh,
     surfaces={

@@ -10,10 +10,14 @@ from schemas.vectors import Vector
 __all__ = ["KIDNEY_WITH_ADRENAL"]
 
 _HALF_KIDNEY_M = np.array([0.055, 0.030, 0.020])
-"""Half of length, breadth and thickness: about 11 cm, 5 to 7.5 cm, more than 2.5 cm (Gray 1918); 4 cm give a mass inside Gray's 125 to 170 g."""
+"""Half of length, breadth and thickness: about 11 cm, 5 to 7.5 cm, more than 2.5 cm (Gray 1918); 4 cm give a
+mass inside Gray's 125 to 170 g.
+"""
 
 _HALF_GLAND_M = np.array([0.019, 0.018, 0.005])
-"""Half of height, breadth and thickness: 35 to 73 mm, 15 to 40 mm and 3 to 18 mm are found (Bergman et al.), 30 to 50 mm are usual (Gray 1918)."""
+"""Half of height, breadth and thickness: 35 to 73 mm, 15 to 40 mm and 3 to 18 mm are found (Bergman et al.),
+30 to 50 mm are usual (Gray 1918).
+"""
 
 _OVERLAP_M = 0.010
 """How far the gland reaches down over the pole, on which it sits like a cap."""
@@ -22,7 +26,9 @@ _THICK_KIDNEY_M, _THICK_GLAND_M = 0.026, 0.016
 """Half of the thicknesses in the body that is meshed."""
 
 _TAPER = 0.5
-"""The gland is a pyramid with round edges: its breadth at the apex is less, at the base more than the mean by this share. By eye."""
+"""The gland is a pyramid with round edges: its breadth at the apex is less, at the base more than the mean by
+this share. By eye.
+"""
 
 _BLEND_M = 0.003
 """Depth over which kidney and gland run into each other. By eye."""
@@ -38,8 +44,14 @@ def _field(points: Vector) -> Vector:
     """Positive inside a straight kidney with a gland as thick as itself."""
     hilum = np.array([0.0, _HALF_KIDNEY_M[1], 0.0])
     notch = _HILUM_M * np.exp(-((points - hilum) ** 2).sum(axis=1) / _HILUM_RADIUS_M**2)
-    kidney = _THICK_KIDNEY_M * (1.0 - np.linalg.norm(points / [*_HALF_KIDNEY_M[:2], _THICK_KIDNEY_M], axis=1)) - notch
-    gland = (points - [_HALF_KIDNEY_M[0] - _OVERLAP_M + _HALF_GLAND_M[0], 0.0, 0.0]) / [*_HALF_GLAND_M[:2], _THICK_GLAND_M]
+    kidney = (
+        _THICK_KIDNEY_M * (1.0 - np.linalg.norm(points / [*_HALF_KIDNEY_M[:2], _THICK_KIDNEY_M], axis=1))
+        - notch
+    )
+    gland = (points - [_HALF_KIDNEY_M[0] - _OVERLAP_M + _HALF_GLAND_M[0], 0.0, 0.0]) / [
+        *_HALF_GLAND_M[:2],
+        _THICK_GLAND_M,
+    ]
     gland[:, 1] /= 1.0 - _TAPER * np.clip(gland[:, 0], -1.0, 1.0)
     return smooth_union(kidney, _THICK_GLAND_M * (1.0 - np.linalg.norm(gland, axis=1)), _BLEND_M)
 
@@ -56,12 +68,15 @@ def _formed(points: Vector) -> Vector:
 
 KIDNEY_WITH_ADRENAL = Shape(
     description=(
-        "a left kidney, 110 x 60 x 40 mm (Gray, Anatomy of the Human Body, 20th edition, 1918), with its adrenal gland, 38 x 36 x 10 mm (Bergman et al., "
-        "Encyclopedia of Human Anatomic Variation IV), on the upper pole; it lies on its back around the origin: +x is cranial, +y medial, +z anterior"
+        "a left kidney, 110 x 60 x 40 mm (Gray, Anatomy of the Human Body, 20th edition, 1918), with its"
+        " adrenal gland, 38 x 36 x 10 mm (Bergman et al., Encyclopedia of Human Anatomic Variation IV), on"
+        " the upper pole; it lies on its back around the origin: +x is cranial, +y medial, +z anterior"
     ),
     mesh=stuffed(_field, _formed, low=(-0.055, -0.030, -0.026), high=(0.085, 0.030, 0.026)),
     surfaces={
-        "posterior": lambda nodes: (nodes[:, 2] < -0.5 * _HALF_KIDNEY_M[2]) & (nodes[:, 0] < _HALF_KIDNEY_M[0]),
+        "posterior": (
+            lambda nodes: (nodes[:, 2] < -0.5 * _HALF_KIDNEY_M[2]) & (nodes[:, 0] < _HALF_KIDNEY_M[0])
+        ),
         "gland": lambda nodes: nodes[:, 0] > _HALF_KIDNEY_M[0] + _BLEND_M,
     },
     anchors=("posterior",),

@@ -11,8 +11,11 @@ from schemas.vectors import Vector
 __all__ = ["LIVER_LOBE"]
 
 _HALF_M = np.array([0.050, 0.060, 0.021])
-"""Half of length from the diaphragm to the free edge, of breadth and of the thickness at the diaphragm. By eye, to the volume of 0.2 kg: Gray (1918)
-has livers of 1.4 to 1.6 kg with right lobes six times as large as the left."""
+"""Half of length from the diaphragm to the free edge, of breadth and of the thickness at the diaphragm.
+
+By eye, to the volume of 0.2 kg: Gray (1918) has livers of 1.4 to 1.6 kg with right lobes six times as large
+as the left.
+"""
 
 _THICK_M = 0.030
 """Half of the thickness everywhere in the body that is meshed."""
@@ -62,8 +65,9 @@ def _on_diaphragm(nodes: Vector) -> NDArray[np.bool_]:
 
 LIVER_LOBE = Shape(
     description=(
-        "the left lobe of a liver, 100 mm from the diaphragm to its free edge, 125 mm broad, 42 mm thick and 14 mm at the edge, 0.2 kg: a seventh of a liver "
-        "(Gray, Anatomy of the Human Body, 20th edition, 1918). It hangs under the diaphragm, its middle at the origin: +x is towards the edge, +z anterior"
+        "the left lobe of a liver, 100 mm from the diaphragm to its free edge, 125 mm broad, 42 mm thick and"
+        " 14 mm at the edge, 0.2 kg: a seventh of a liver (Gray, Anatomy of the Human Body, 20th edition,"
+        " 1918). It hangs under the diaphragm, its middle at the origin: +x is towards the edge, +z anterior"
     ),
     mesh=stuffed(_field, _formed, low=(-0.050, -0.066, -0.030), high=(0.050, 0.066, 0.030)),
     surfaces={

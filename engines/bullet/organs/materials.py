@@ -1,7 +1,8 @@
 """Materials of organs by name, each with its source and the loading under which it was measured.
 
-Values for one tissue differ a thousandfold between indentation and tension to failure: which to take depends on what the scenario does.
-Tissue is nearly incompressible; a Poisson ratio of 0.4 stands for that in all presets, as linear tetrahedra lock near 0.5.
+Values for one tissue differ a thousandfold between indentation and tension to failure: which to take depends
+on what the scenario does. Tissue is nearly incompressible; a Poisson ratio of 0.4 stands for that in all
+presets, as linear tetrahedra lock near 0.5.
 """
 
 from __future__ import annotations
@@ -27,9 +28,27 @@ def _between(low: float, high: float, unit: str, reason: str) -> AfterValidator:
     return AfterValidator(check)
 
 
-TissueModulus = Annotated[Pressure, _between(100.0, 1e7, " Pa", "the softest tissue (brain) has some 100 Pa, the stiffest organs' walls and capsules some MPa")]
-TissuePoissonRatio = Annotated[float, _between(0.01, 0.495, "", "tissue is nearly incompressible (0.5), which this model cannot be; 0.3 to 0.49 are usual")]
-TissueDensity = Annotated[Density, _between(200.0, 2000.0, " kg/m^3", "inflated lung has some 250 kg/m^3, bone 1900 kg/m^3")]
+TissueModulus = Annotated[
+    Pressure,
+    _between(
+        100.0,
+        1e7,
+        " Pa",
+        "the softest tissue (brain) has some 100 Pa, the stiffest organs' walls and capsules some MPa",
+    ),
+]
+TissuePoissonRatio = Annotated[
+    float,
+    _between(
+        0.01,
+        0.495,
+        "",
+        "tissue is nearly incompressible (0.5), which this model cannot be; 0.3 to 0.49 are usual",
+    ),
+]
+TissueDensity = Annotated[
+    Density, _between(200.0, 2000.0, " kg/m^3", "inflated lung has some 250 kg/m^3, bone 1900 kg/m^3")
+]
 
 
 class Preset(BaseModel):
@@ -47,11 +66,16 @@ class Preset(BaseModel):
 @cache
 def presets() -> dict[str, Preset]:
     """Return all presets by name."""
-    return TypeAdapter(dict[str, Preset]).validate_json((Path(__file__).parent / "materials.json").read_bytes())
+    return TypeAdapter(dict[str, Preset]).validate_json(
+        (Path(__file__).parent / "materials.json").read_bytes()
+    )
 
 
 def preset(name: str) -> Preset:
     """Return one preset. Raises ValueError where there is none of this name."""
     if name not in presets():
-        raise ValueError(f"no material '{name}'.{did_you_mean(name, presets())} Or give young_modulus, poisson_ratio and density")
+        raise ValueError(
+            f"no material '{name}'.{did_you_mean(name, presets())} Or give young_modulus, poisson_ratio and"
+            " density"
+        )
     return presets()[name]

@@ -17,20 +17,28 @@ from schemas.vectors import Vector
 __all__ = ["ROUNDING_DIGITS", "SIDES", "Shape", "Surface", "on_side", "smooth_union", "stuffed"]
 
 Surface = Callable[[Vector], NDArray[np.bool_]]
-"""Of nodes on the surface at rest, shape (n, 3), m, in the organ's own frame: which of them belong to a named part, shape (n,)."""
+"""Of nodes on the surface at rest, shape (n, 3), m, in the organ's own frame: which of them belong to a named
+part, shape (n,).
+"""
 
 ROUNDING_DIGITS = 6
-"""Nodes are rounded to a micrometre: sine and root differ in their last bit between processors, of which smoothing makes 1e-13 m; meshes must not differ."""
+"""Nodes are rounded to a micrometre: sine and root differ in their last bit between processors, of which
+smoothing makes 1e-13 m; meshes must not differ.
+"""
 
 _COUNT_TOLERANCE = 0.02
 _SEARCHES = 8
-"""The spacing is sought that gives the wanted number of nodes to this share, in at most so many attempts; then the nearest is taken."""
+"""The spacing is sought that gives the wanted number of nodes to this share, in at most so many attempts;
+then the nearest is taken.
+"""
 
 _SIDE_SHARE = 0.05
 """A side takes what lies within this share of the organ's extent from its end."""
 
 SIDES = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1), "bottom": (2, -1), "top": (2, 1)}
-"""Axis and sign of the surfaces that every organ has: where it ends towards -x, +x, -y, +y, -z and +z of its own frame."""
+"""Axis and sign of the surfaces that every organ has: where it ends towards -x, +x, -y, +y, -z and +z of its
+own frame.
+"""
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,10 @@ class Shape:
     """Preset that is taken where the scenario says nothing."""
 
     def surface(self, name: str, nodes: Vector) -> NDArray[np.bool_]:
-        """Return which nodes of the surface, shape (n, 3), belong to the part of it called `name`. Raises ValueError if there is none."""
+        """Return which nodes of the surface, shape (n, 3), belong to the part of it called `name`.
+
+        Raises ValueError if there is none.
+        """
         if name in self.surfaces:
             return self.surfaces[name](nodes)
         if name not in SIDES:
@@ -63,16 +74,24 @@ class Shape:
 
 
 def on_side(nodes: Vector, side: str, share: float) -> NDArray[np.bool_]:
-    """Return which nodes, shape (n, 3), lie within a `share` of their extent from their end on one of `SIDES`, shape (n,)."""
+    """Return which nodes, shape (n, 3), lie within a `share` of their extent from their end on one of
+    `SIDES`, shape (n,).
+    """
     axis, sign = SIDES[side]
     along = sign * nodes[:, axis]
     return along >= along.max() - share * np.ptp(along)
 
 
-def stuffed(field: Field, formed: Callable[[Vector], Vector], low: tuple[float, float, float], high: tuple[float, float, float]) -> Callable[[int], TetMesh]:
+def stuffed(
+    field: Field,
+    formed: Callable[[Vector], Vector],
+    low: tuple[float, float, float],
+    high: tuple[float, float, float],
+) -> Callable[[int], TetMesh]:
     """Return the function that meshes a body with a number of nodes.
 
-    The lattice cannot hold what is thinner than itself, so a body that is thick everywhere is meshed and then given its form.
+    The lattice cannot hold what is thinner than itself, so a body that is thick everywhere is meshed and then
+    given its form.
 
     Args:
         field: of the thick body.
@@ -101,5 +120,7 @@ def stuffed(field: Field, formed: Callable[[Vector], Vector], low: tuple[float, 
 
 
 def smooth_union(one: Vector, other: Vector, blend: float) -> Vector:
-    """Return the field of two bodies that run into each other where their fields differ by less than `blend` (m)."""
+    """Return the field of two bodies that run into each other where their fields differ by less than `blend`
+    (m).
+    """
     return np.maximum(one, other) + np.maximum(blend - np.abs(one - other), 0.0) ** 2 / (4.0 * blend)

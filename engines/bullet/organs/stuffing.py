@@ -1,8 +1,9 @@
 """Tetrahedra that fill a smooth body, by isosurface stuffing.
 
-A body-centred cubic lattice is laid over the body; vertices near its surface are moved onto it, and the tetrahedra that the surface
-still cuts are cut there (Labelle, Shewchuk, Isosurface Stuffing, ACM Trans. Graph. 26, 2007). Then the nodes are moved, those of the
-surface along it, until the worst tetrahedra are better shaped: slivers would make the tissue unstable.
+A body-centred cubic lattice is laid over the body; vertices near its surface are moved onto it, and the
+tetrahedra that the surface still cuts are cut there (Labelle, Shewchuk, Isosurface Stuffing, ACM Trans.
+Graph. 26, 2007). Then the nodes are moved, those of the surface along it, until the worst tetrahedra are
+better shaped: slivers would make the tissue unstable.
 """
 
 from __future__ import annotations
@@ -17,10 +18,14 @@ from schemas.vectors import Vector
 __all__ = ["Field", "smoothed", "stuff"]
 
 Field = Callable[[Vector], Vector]
-"""Of points, shape (n, 3), m: positive inside the body, negative outside, about the depth (m) near the surface."""
+"""Of points, shape (n, 3), m: positive inside the body, negative outside, about the depth (m) near the
+surface.
+"""
 
 _SNAP_LONG, _SNAP_SHORT = 0.24999, 0.41189
-"""A lattice vertex moves onto the surface that cuts an edge nearer to it than this share of the edge (Labelle and Shewchuk, table 2)."""
+"""A lattice vertex moves onto the surface that cuts an edge nearer to it than this share of the edge (Labelle
+and Shewchuk, table 2).
+"""
 
 _BISECTIONS = 20
 _SMOOTHINGS = 40
@@ -44,12 +49,16 @@ def stuff(field: Field, low: Vector, high: Vector, spacing: float) -> TetMesh:
     points, tetrahedra = _lattice(low, high, spacing)
     values = field(points)
     tetrahedra = tetrahedra[(values[tetrahedra] > 0.0).any(axis=1)]
-    points, signs, edges, cuts = _snapped(field, points, np.sign(values).astype(np.int64), tetrahedra, spacing)
+    points, signs, edges, cuts = _snapped(
+        field, points, np.sign(values).astype(np.int64), tetrahedra, spacing
+    )
     return compact(*_cut(points, signs, tetrahedra, edges, cuts))
 
 
 def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices]:
-    """Return vertices and tetrahedra of a lattice whose cubes' corners and centres cover a box, symmetric about its middle."""
+    """Return vertices and tetrahedra of a lattice whose cubes' corners and centres cover a box, symmetric
+    about its middle.
+    """
     cubes = np.ceil((high - low) / spacing).astype(np.int64) + 2
     shape = 2 * cubes + 1  # places at half the spacing; corners of cubes are at even, centres at odd ones
     strides = np.array([shape[1] * shape[2], shape[2], 1])
@@ -58,7 +67,8 @@ def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices
     centres = _grid(np.ones(3, np.int64), shape - 1, 2)
     parts: list[Indices] = []
     for axis in range(3):
-        step, one, other = np.roll(np.eye(3, dtype=np.int64), axis, axis=1)  # towards the next centre, and along the square between
+        # towards the next centre, and along the square between
+        step, one, other = np.roll(np.eye(3, dtype=np.int64), axis, axis=1)
         pairs = centres[(centres + 2 * step < shape - 1).all(axis=1)]
         around = [one + other, one - other, -one - other, other - one]
         for first, second in zip(around, around[1:] + around[:1], strict=True):
@@ -73,8 +83,12 @@ def _grid(start: Indices, stop: Indices, step: int) -> Indices:
     return np.stack(np.meshgrid(i, j, k, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _snapped(field: Field, points: Vector, signs: Indices, tetrahedra: Indices, spacing: float) -> tuple[Vector, Indices, Indices, Vector]:
-    """Move vertices onto a near surface; return points, signs (0 on the surface), and the edges (e, 2) still cut, with the cuts (e, 3)."""
+def _snapped(
+    field: Field, points: Vector, signs: Indices, tetrahedra: Indices, spacing: float
+) -> tuple[Vector, Indices, Indices, Vector]:
+    """Move vertices onto a near surface; return points, signs (0 on the surface), and the edges (e, 2) still
+    cut, with the cuts (e, 3).
+    """
     pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
     edges = np.unique(np.sort(tetrahedra[:, pairs].reshape(-1, 2), axis=1), axis=0)
     edges = edges[signs[edges[:, 0]] * signs[edges[:, 1]] < 0]
@@ -111,8 +125,10 @@ _STENCILS: dict[tuple[int, int], list[str]] = {
     (1, 1): ["abPR"],
     (1, 0): ["aPQR"],
 }
-"""What is kept of a tetrahedron by its numbers of vertices inside and on the surface. Its vertices a to d are sorted, those inside first;
-capital letters are cuts, named in `_CUTS`. A square face is halved from its inner vertex of the lowest number, on both sides alike."""
+"""What is kept of a tetrahedron by its numbers of vertices inside and on the surface. Its vertices a to d are
+sorted, those inside first; capital letters are cuts, named in `_CUTS`. A square face is halved from its inner
+vertex of the lowest number, on both sides alike.
+"""
 
 _CUTS: dict[tuple[int, int], dict[str, str]] = {
     (3, 0): {"P": "ad", "Q": "bd", "R": "cd"},
@@ -124,7 +140,9 @@ _CUTS: dict[tuple[int, int], dict[str, str]] = {
 }
 
 
-def _cut(points: Vector, signs: Indices, tetrahedra: Indices, edges: Indices, cuts: Vector) -> tuple[Vector, Indices]:
+def _cut(
+    points: Vector, signs: Indices, tetrahedra: Indices, edges: Indices, cuts: Vector
+) -> tuple[Vector, Indices]:
     """Return points and the tetrahedra of what is inside."""
     count = len(points)
     keys = edges[:, 0] * count + edges[:, 1]  # ascending, as the edges are sorted
@@ -146,7 +164,9 @@ def _cut(points: Vector, signs: Indices, tetrahedra: Indices, edges: Indices, cu
 
 
 def smoothed(mesh: TetMesh, field: Field, spacing: float) -> TetMesh:
-    """Return a mesh with better shaped tetrahedra: its nodes move down the slope of their distortion, those of the surface along that of `field`."""
+    """Return a mesh with better shaped tetrahedra: its nodes move down the slope of their distortion, those
+    of the surface along that of `field`.
+    """
     nodes, surface = mesh.nodes.copy(), np.unique(mesh.triangles)
     step = 0.02 * spacing
     nodes[surface] = _onto_surface(field, nodes[surface])
@@ -171,7 +191,8 @@ _REGULAR = np.linalg.inv(np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 
 
 
 def _distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
-    """Return the sum over all tetrahedra of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron, and its slope by the nodes; inf where one is inverted.
+    """Return the sum over all tetrahedra of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron, and
+    its slope by the nodes; inf where one is inverted.
 
     The inverse of the mean ratio: Knupp, Algebraic Mesh Quality Metrics, SIAM J. Sci. Comput. 23 (2001).
     """
@@ -183,7 +204,9 @@ def _distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
     square = np.einsum("mij,mij->m", deformation, deformation)
     ratio = square / (3.0 * np.cbrt(determinant) ** 2)
     inverse = np.linalg.inv(deformation).transpose(0, 2, 1)
-    by_deformation = (4.0 * ratio**4)[:, None, None] * (2.0 * deformation / square[:, None, None] - 2.0 / 3.0 * inverse)
+    by_deformation = (4.0 * ratio**4)[:, None, None] * (
+        2.0 * deformation / square[:, None, None] - 2.0 / 3.0 * inverse
+    )
     by_edges = by_deformation @ _REGULAR.T
     slope = np.zeros_like(nodes)
     for i in range(3):

@@ -31,7 +31,8 @@ _LARGEST_FILE = 64_000_000
 
 
 def read_vtk(path: Path) -> tuple[Vector, Indices]:
-    """Return nodes, shape (n, 3), in the file's unit, and tetrahedra, shape (m, 4), as they stand in the file.
+    """Return nodes, shape (n, 3), in the file's unit, and tetrahedra, shape (m, 4), as they stand in the
+    file.
 
     Raises ValueError, naming the file, where it holds no tetrahedral mesh.
     """
@@ -69,19 +70,31 @@ class _Reader:
             if keyword == "DATASET" and words[1:] != ["UNSTRUCTURED_GRID"]:
                 raise ValueError(f"holds a dataset '{' '.join(words[1:])}', not UNSTRUCTURED_GRID")
             if keyword == "POINTS":
-                nodes = self._numbers(3 * self._count(words, 1), words[2].lower() if len(words) > 2 else "").reshape(-1, 3)
+                nodes = self._numbers(
+                    3 * self._count(words, 1), words[2].lower() if len(words) > 2 else ""
+                ).reshape(-1, 3)
             elif keyword == "CELLS":
                 cells = self._cells(words)
             elif keyword == "CELL_TYPES":
                 types = self._integers(self._count(words, 1), "int")
         if nodes is None or cells is None or types is None:
-            missing = [name for name, part in (("POINTS", nodes), ("CELLS", cells), ("CELL_TYPES", types)) if part is None]
+            missing = [
+                name
+                for name, part in (("POINTS", nodes), ("CELLS", cells), ("CELL_TYPES", types))
+                if part is None
+            ]
             raise ValueError(f"has no {', '.join(missing)}")
         others, counts = np.unique(types[types != _TETRA], return_counts=True)
         if len(others) or len(types) != len(cells) or any(len(cell) != 4 for cell in cells):
-            found = ", ".join(f"{count} of type {kind}" for kind, count in zip(others.tolist(), counts.tolist(), strict=True))
+            found = ", ".join(
+                f"{count} of type {kind}"
+                for kind, count in zip(others.tolist(), counts.tolist(), strict=True)
+            )
             others_found = f"there are {found}" if found else "there are some with other numbers of nodes"
-            raise ValueError(f"all cells must be tetrahedra (VTK type {_TETRA}, four nodes each), but {others_found}: export the volume alone")
+            raise ValueError(
+                f"all cells must be tetrahedra (VTK type {_TETRA}, four nodes each), but {others_found}:"
+                " export the volume alone"
+            )
         return nodes, np.array(cells, np.int64).reshape(-1, 4)
 
     def _cells(self, words: list[str]) -> list[Indices]:
@@ -103,7 +116,9 @@ class _Reader:
         return line.decode("ascii", "replace").strip()
 
     def _kind(self, keyword: str) -> str:
-        """Return the type of the numbers that follow the next line, which begins with `keyword`; blank lines may stand before it."""
+        """Return the type of the numbers that follow the next line, which begins with `keyword`; blank lines
+        may stand before it.
+        """
         while self._at < len(self._content):
             words = self._line().split()
             if len(words) == 2 and words[0] == keyword:

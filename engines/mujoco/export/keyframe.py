@@ -1,4 +1,6 @@
-"""The keyframe of an exported model: whoever loads it need not begin with instruments drawn back and servos that pull them there."""
+"""The keyframe of an exported model: whoever loads it need not begin with instruments drawn back and servos
+that pull them there.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ START = "start"
 
 
 def add_start(spec: mujoco.MjSpec, scene: SceneParams) -> None:
-    """Add the keyframe `START` to the model of `scene`: joints where the scene starts, and servos told to hold them there."""
+    """Add the keyframe `START` to the model of `scene`: joints where the scene starts, and servos told to
+    hold them there.
+    """
     model = spec.compile()
     data = mujoco.MjData(model)
     place(model, data, scene.arms)

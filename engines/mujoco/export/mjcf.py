@@ -1,6 +1,7 @@
 """The model as MJCF.
 
-MuJoCo writes numbers with six digits. All that carries a name gets its full numbers back here, so that the model reads back as it was.
+MuJoCo writes numbers with six digits. All that carries a name gets its full numbers back here, so that the
+model reads back as it was.
 """
 
 from __future__ import annotations
@@ -31,7 +32,14 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
     for mesh in root.findall("asset/mesh"):
         del mesh.attrib["vertex"], mesh.attrib["face"]
         mesh.set("file", file_of(mesh.attrib["name"]))
-    by_tag = {"body": spec.body, "joint": spec.joint, "site": spec.site, "geom": spec.geom, "general": spec.actuator, "key": spec.key}
+    by_tag = {
+        "body": spec.body,
+        "joint": spec.joint,
+        "site": spec.site,
+        "geom": spec.geom,
+        "general": spec.actuator,
+        "key": spec.key,
+    }
     for element in root.iter():
         if element.tag in by_tag and (name := element.get("name")):
             _restore(element, by_tag[element.tag](name), {})
@@ -41,7 +49,9 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
 
 
 def _restore(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
-    """Give the numbers of `element` all the digits that they have in `source`, where some are called otherwise."""
+    """Give the numbers of `element` all the digits that they have in `source`, where some are called
+    otherwise.
+    """
     for attribute, text in element.attrib.items():
         value: Any = getattr(source, names.get(attribute, attribute), None)
         if not isinstance(value, float | np.ndarray):

@@ -1,10 +1,12 @@
 """The model as URDF.
 
-A link is called `<arm>_<link>_link`, its joint `<arm>_<link>`. The bars of the linkage mimic the pitch or the insertion. The two fingers mimic a
-joint `<arm>_jaw`, which moves a link without shape: its position is the angle between them; likewise the pads of a roller
-a joint `<arm>_roller`. What can be moved about freely and the world's own shapes are left out, a URDF being one robot.
+A link is called `<arm>_<link>_link`, its joint `<arm>_<link>`. The bars of the linkage mimic the pitch or the
+insertion. The two fingers mimic a joint `<arm>_jaw`, which moves a link without shape: its position is the
+angle between them; likewise the pads of a roller a joint `<arm>_roller`. What can be moved about freely and
+the world's own shapes are left out, a URDF being one robot.
 
-Links that stand for a frame alone have all but no mass: PyBullet takes one without inertia for 1 kg, and MuJoCo refuses it where it moves.
+Links that stand for a frame alone have all but no mass: PyBullet takes one without inertia for 1 kg, and
+MuJoCo refuses it where it moves.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ __all__ = ["urdf"]
 _KINDS = {mujoco.mjtJoint.mjJNT_HINGE: "revolute", mujoco.mjtJoint.mjJNT_SLIDE: "prismatic"}
 _WORLD = "world"
 _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-9
-"""kg, kg m^2, of a link that stands for a frame: less than a fifth of the lightest link, the wrist yaw with 6.6e-6 kg."""
+"""kg, kg m^2, of a link that stands for a frame: less than a fifth of the lightest link, the wrist yaw with
+6.6e-6 kg.
+"""
 _AT_ORIGIN, _UPRIGHT = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -35,7 +39,8 @@ def urdf(spec: mujoco.MjSpec) -> Element:
     """Return the root element `robot` of the model's URDF, whose meshes are files in `FOLDER`."""
     model = spec.compile()
     robot = Element("robot", name=spec.modelname)
-    SubElement(SubElement(robot, "mujoco"), "compiler", strippath="false", discardvisual="false")  # what MuJoCo needs to read it as it is
+    # what MuJoCo needs to read it as it is
+    SubElement(SubElement(robot, "mujoco"), "compiler", strippath="false", discardvisual="false")
     SubElement(robot, "link", name=_WORLD)
     for body in spec.bodies[1:]:
         if any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints):
@@ -64,11 +69,15 @@ def _add_link(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: 
         if shape.tag == "visual":
             surface = spec.material(geom.material)
             rgba = geom.rgba if surface is None else surface.rgba
-            material = SubElement(shape, "material", name="_".join(f"{round(255 * channel)}" for channel in rgba))
+            material = SubElement(
+                shape, "material", name="_".join(f"{round(255 * channel)}" for channel in rgba)
+            )
             SubElement(material, "color", rgba=numbers(rgba))
 
 
-def _add_inertial(link: Element, mass: float, moments: Vector, pos: Vector = _AT_ORIGIN, quat: Vector = _UPRIGHT) -> None:
+def _add_inertial(
+    link: Element, mass: float, moments: Vector, pos: Vector = _AT_ORIGIN, quat: Vector = _UPRIGHT
+) -> None:
     inertial = SubElement(link, "inertial")
     _add_origin(inertial, pos, quat)
     SubElement(inertial, "mass", value=repr(mass))
@@ -85,7 +94,11 @@ def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
     pos, quat = geom.pos, geom.quat
     if kind != mujoco.mjtGeom.mjGEOM_MESH and not np.isnan(geom.fromto[0]):
         start, end = geom.fromto[:3], geom.fromto[3:]
-        pos, quat, size = (start + end) / 2, _turn_z_to(end - start), np.array([size[0], np.linalg.norm(end - start) / 2, 0.0])
+        pos, quat, size = (
+            (start + end) / 2,
+            _turn_z_to(end - start),
+            np.array([size[0], np.linalg.norm(end - start) / 2, 0.0]),
+        )
     _add_origin(shape, pos, quat)
     geometry = SubElement(shape, "geometry")
     match kind:
@@ -95,7 +108,8 @@ def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
             SubElement(geometry, "box", size=numbers(2.0 * size))
         case mujoco.mjtGeom.mjGEOM_SPHERE:
             SubElement(geometry, "sphere", radius=repr(float(size[0])))
-        case mujoco.mjtGeom.mjGEOM_CAPSULE | mujoco.mjtGeom.mjGEOM_CYLINDER:  # URDF knows no capsule: its cylinder, without the caps
+        # URDF knows no capsule: its cylinder, without the caps
+        case mujoco.mjtGeom.mjGEOM_CAPSULE | mujoco.mjtGeom.mjGEOM_CYLINDER:
             SubElement(geometry, "cylinder", radius=repr(float(size[0])), length=repr(2.0 * float(size[1])))
         case _:
             raise ScenarioError(f"a shape of kind {kind} has no form in URDF")
@@ -115,8 +129,16 @@ def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body:
     leader, ratio = _leader(spec, moving.name)
     if leader:
         SubElement(joint, "mimic", joint=_joint(leader), multiplier=repr(ratio), offset="0")
-    _add_limit(joint, spec, moving.range, leader or moving.name, ratio if joint.get("type") == "prismatic" and leader.endswith(ROLLER) else 1.0)
-    SubElement(joint, "dynamics", damping=repr(float(moving.damping[0])), friction=repr(float(moving.frictionloss)))
+    _add_limit(
+        joint,
+        spec,
+        moving.range,
+        leader or moving.name,
+        ratio if joint.get("type") == "prismatic" and leader.endswith(ROLLER) else 1.0,
+    )
+    SubElement(
+        joint, "dynamics", damping=repr(float(moving.damping[0])), friction=repr(float(moving.frictionloss))
+    )
 
 
 def _leader(spec: mujoco.MjSpec, joint: str) -> tuple[str, float]:
@@ -125,7 +147,10 @@ def _leader(spec: mujoco.MjSpec, joint: str) -> tuple[str, float]:
     if link in FINGERS:
         return f"{arm}/jaw", 0.5
     if link in PADS:
-        return f"{arm}/{ROLLER}", float(spec.joint(joint).range[1] / spec.actuator(f"{arm}/{ROLLER}").ctrlrange[1])  # m for rad
+        # m for rad
+        return f"{arm}/{ROLLER}", float(
+            spec.joint(joint).range[1] / spec.actuator(f"{arm}/{ROLLER}").ctrlrange[1]
+        )
     tie = spec.equality(joint)
     return (tie.name2, float(tie.data[1])) if tie else ("", 0.0)
 
@@ -135,7 +160,14 @@ def _add_limit(joint: Element, spec: mujoco.MjSpec, span: Vector, driven: str, w
     servo = spec.actuator(f"{driven.rpartition('/')[0]}/{FINGERS[0]}" if driven.endswith("/jaw") else driven)
     servo = servo or spec.actuator(driven.rpartition("_")[0])  # that of the finger, for a phalanx
     lower, upper = (repr(float(end)) for end in span)
-    SubElement(joint, "limit", lower=lower, upper=upper, effort=repr(float(servo.forcerange[1]) / way), velocity=repr(float(servo.velrange[1]) * way))
+    SubElement(
+        joint,
+        "limit",
+        lower=lower,
+        upper=upper,
+        effort=repr(float(servo.forcerange[1]) / way),
+        velocity=repr(float(servo.velrange[1]) * way),
+    )
 
 
 def _add_leader(robot: Element, spec: mujoco.MjSpec, follower: mujoco.MjsBody, name: str) -> None:
@@ -166,7 +198,12 @@ def _add_origin(element: Element, pos: Vector, quat: Vector) -> None:
     across = hypot(r[0, 0], r[1, 0])
     upright = across < 1e-9  # then only the difference of roll and yaw counts
     roll = atan2(-r[1, 2], r[1, 1]) if upright else atan2(r[2, 1], r[2, 2])
-    SubElement(element, "origin", xyz=numbers(pos), rpy=numbers([roll, atan2(-r[2, 0], across), 0.0 if upright else atan2(r[1, 0], r[0, 0])]))
+    SubElement(
+        element,
+        "origin",
+        xyz=numbers(pos),
+        rpy=numbers([roll, atan2(-r[2, 0], across), 0.0 if upright else atan2(r[1, 0], r[0, 0])]),
+    )
 
 
 def _turn_z_to(axis: Vector) -> Vector:

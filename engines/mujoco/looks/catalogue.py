@@ -21,8 +21,10 @@ def parts(what: str) -> Looks:
     """Return the meshes of `what` by body, drawn with every joint at 0.
 
     Args:
-        what: `psm` and `ecm` (in the arm's base frame `<arm>_base`; the PSM without instrument, the ECM with endoscope),
-            `instrument/<name or number>` (in the PSM's base frame), `cart` and `suj/<arm>` (in the cart's frame).
+        what: `psm` and `ecm` (in the arm's base frame `<arm>_base`; the PSM without instrument, the ECM with
+        endoscope),
+            `instrument/<name or number>` (in the PSM's base frame), `cart` and `suj/<arm>` (in the cart's
+            frame).
 
     Raises:
         MotionError: no such instrument, or nothing of this name.
@@ -57,4 +59,6 @@ def collision(what: str) -> Collisions:
 
 
 def _nothing(what: str) -> MotionError:
-    return MotionError(f"no look of '{what}': there are psm, ecm, cart, suj/<arm> and instrument/<name or number>")
+    return MotionError(
+        f"no look of '{what}': there are psm, ecm, cart, suj/<arm> and instrument/<name or number>"
+    )

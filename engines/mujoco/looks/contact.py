@@ -1,4 +1,6 @@
-"""What collides: convex hulls of the covers of arms, setup joints and cart, capsules for shafts, boxes for fingers."""
+"""What collides: convex hulls of the covers of arms, setup joints and cart, capsules for shafts, boxes for
+fingers.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,10 @@ _BULK = ("column", "housing", "deck")
 
 def cart() -> Collisions:
     """Return what collides of the cart."""
-    return {body: tuple(_hull(p.name, (p,)) for p in shown if p.name in _BULK) for body, shown in cart_look.parts().items()}
+    return {
+        body: tuple(_hull(p.name, (p,)) for p in shown if p.name in _BULK)
+        for body, shown in cart_look.parts().items()
+    }
 
 
 def setup_joint(arm: CartArm) -> Collisions:
@@ -41,7 +46,9 @@ def psm() -> Collisions:
 
 def ecm() -> Collisions:
     """Return what collides of an ECM with its endoscope."""
-    hulls: dict[str, tuple[Part | Primitive, ...]] = {body: (_hull(body, shown),) for body, shown in ecm_look.parts().items()}
+    hulls: dict[str, tuple[Part | Primitive, ...]] = {
+        body: (_hull(body, shown),) for body, shown in ecm_look.parts().items()
+    }
     shaft = next(p for p in ecm_look.parts()["roll"] if p.name == "endoscope_shaft").vertices[:, 2]
     hulls["roll"] += (_upright("shaft", _ECM_SHAFT_RADIUS, float(shaft.min()), float(shaft.max())),)
     return hulls
@@ -54,7 +61,11 @@ def instrument(tool: Instrument) -> Collisions:
     if tool.hand is not None:
         housing, shaft = looks["insertion"], looks["roll"][0].vertices[:, 2]
         tube = _upright("shaft", SHAFT_RADIUS, float(shaft.min()), float(shaft.max()))
-        return {"insertion": (_hull("housing", housing),), "roll": (tube,), **musha.capsules(tool.hand, frames[3])}
+        return {
+            "insertion": (_hull("housing", housing),),
+            "roll": (tube,),
+            **musha.capsules(tool.hand, frames[3]),
+        }
     pitch, yaw = frames[4][2, 3], frames[-2][2, 3]
     collisions: dict[str, tuple[Part | Primitive, ...]] = {
         "insertion": (_hull("housing", looks["insertion"]),),

@@ -1,8 +1,8 @@
 """Fingers of instruments: what shape each kind has, its mesh, and the box that grasps.
 
-A finger is drawn with x the way the left one opens, y the wrist yaw axis, z to the tip, origin in the axis. Its pad is flat and lies
-in the plane x = 0, so that the pads of two fingers meet when the jaw is at 0; a curved one (Maryland) curves along y, within
-that plane. Metres.
+A finger is drawn with x the way the left one opens, y the wrist yaw axis, z to the tip, origin in the axis.
+Its pad is flat and lies in the plane x = 0, so that the pads of two fingers meet when the jaw is at 0; a
+curved one (Maryland) curves along y, within that plane. Metres.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from schemas.vectors import Vector
 __all__ = ["Shape", "finger", "grip", "shape"]
 
 _HUB_RADIUS, _HUB_WIDTH = 0.0025, 0.00195
-"""Of the eye about the wrist yaw axis: a hub lies on either side of y = 0 (bounds of the jaw meshes in med-air/SurRoL)."""
+"""Of the eye about the wrist yaw axis: a hub lies on either side of y = 0 (bounds of the jaw meshes in
+med-air/SurRoL).
+"""
 _ROOT = 0.0030
 """Distance from the axis at which the pad's plane is free of the other finger's hub."""
 
@@ -55,7 +57,9 @@ _KINDS = {
     "MARYLAND": _DISSECTOR,
     "SCISSORS": _DISSECTOR,
 }
-"""By a word in the instrument's name; widths within those of the jaw meshes in unina-icaros/dvrk-vrep (4.8 mm, 3.0 mm for both), forms ours."""
+"""By a word in the instrument's name; widths within those of the jaw meshes in unina-icaros/dvrk-vrep (4.8
+mm, 3.0 mm for both), forms ours.
+"""
 
 
 def shape(tool: Instrument, jaw: Jaw) -> Shape:
@@ -65,34 +69,72 @@ def shape(tool: Instrument, jaw: Jaw) -> Shape:
 
 
 def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
-    """Return the meshes of the finger on the side +1 (left) or -1 (right), drawn in the frame `pose`, shape (4, 4)."""
+    """Return the meshes of the finger on the side +1 (left) or -1 (right), drawn in the frame `pose`, shape
+    (4, 4).
+    """
     length, back = form.length, form.thickness
     front, tip = form.recess, form.tip_thickness
-    profile = [(_ROOT, front), (length, front), (length, 0.6 * tip), (length - 0.0006, tip), (0.45 * length, back), (_ROOT, back)]
-    blade = plate("y", outline(profile), -0.01, 0.01) ^ plate("x", outline(_top_view(form, _ROOT / length), 0.0004), -0.01, 0.01)
+    profile = [
+        (_ROOT, front),
+        (length, front),
+        (length, 0.6 * tip),
+        (length - 0.0006, tip),
+        (0.45 * length, back),
+        (_ROOT, back),
+    ]
+    blade = plate("y", outline(profile), -0.01, 0.01) ^ plate(
+        "x", outline(_top_view(form, _ROOT / length), 0.0004), -0.01, 0.01
+    )
     low, high = sorted((-side * _HUB_WIDTH, 0.0))
     hub = rod((0.0, low, 0.0), (0.0, high, 0.0), _HUB_RADIUS)
     arm = block((0.0, low, 0.0), (back, high, _ROOT + 0.0012))
     pad = plate("x", outline(_top_view(form, 0.42, 0.97, share=0.8)), 0.0, 0.0002)
     if form.window:
         half, low_end, high_end = 0.45 * form.width, 0.50 * length, 0.86 * length
-        hole = plate("x", outline([(-half, low_end), (half, low_end), (half, high_end), (-half, high_end)], 0.0004), -0.01, 0.01)
+        hole = plate(
+            "x",
+            outline([(-half, low_end), (half, low_end), (half, high_end), (-half, high_end)], 0.0004),
+            -0.01,
+            0.01,
+        )
         blade, pad = blade - hole, pad - hole
-    finished = [(name, union(hub, arm, blade - pad), STEEL)] + ([] if form.recess else [(f"{name}_pad", pad, DARK)])
-    solids = [(label, solid if side > 0 else solid.mirror((1.0, 0.0, 0.0)), material) for label, solid, material in finished]
-    return tuple(part(label, placed(solid, pose[:3, :3], pose[:3, 3]), material) for label, solid, material in solids)
+    finished = [(name, union(hub, arm, blade - pad), STEEL)] + (
+        [] if form.recess else [(f"{name}_pad", pad, DARK)]
+    )
+    solids = [
+        (label, solid if side > 0 else solid.mirror((1.0, 0.0, 0.0)), material)
+        for label, solid, material in finished
+    ]
+    return tuple(
+        part(label, placed(solid, pose[:3, :3], pose[:3, 3]), material) for label, solid, material in solids
+    )
 
 
 def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
-    """Return the box of a finger for contact: its pad's face is exactly the pad's plane, or stands back from it."""
-    centre = np.array([side * (form.tip_thickness + form.recess) / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0])
+    """Return the box of a finger for contact: its pad's face is exactly the pad's plane, or stands back from
+    it.
+    """
+    centre = np.array(
+        [side * (form.tip_thickness + form.recess) / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0]
+    )
     box = pose.copy()
     box[:3, 3] += pose[:3, :3] @ centre
-    return Primitive(name, "box", ((form.tip_thickness - form.recess) / 2.0, (form.width + form.tip_width) / 2.0, (form.length - _ROOT) / 2.0), box)
+    return Primitive(
+        name,
+        "box",
+        (
+            (form.tip_thickness - form.recess) / 2.0,
+            (form.width + form.tip_width) / 2.0,
+            (form.length - _ROOT) / 2.0,
+        ),
+        box,
+    )
 
 
 def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -> list[tuple[float, float]]:
-    """Return the outline (y, z) of the pad's face between two fractions of the length, counter-clockwise, and over a share of its width."""
+    """Return the outline (y, z) of the pad's face between two fractions of the length, counter-clockwise, and
+    over a share of its width.
+    """
     root = _ROOT / form.length
     right, left = list[tuple[float, float]](), list[tuple[float, float]]()
     for s in np.linspace(start, end, 5 if form.curve else 2).tolist():

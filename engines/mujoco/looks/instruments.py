@@ -1,8 +1,10 @@
-"""Look of the PSM's instruments, in the PSM's base frame with every joint at 0: housing, shaft, wrist and fingers.
+"""Look of the PSM's instruments, in the PSM's base frame with every joint at 0: housing, shaft, wrist and
+fingers.
 
-The housing belongs to the body `insertion`, the shaft to `roll`; each wrist link and finger to the body of its name. Sources: shaft,
-wrist and jaw lengths from `robots.dvrk.instruments`; diameters and boxes of wrist and housing from unina-icaros/dvrk-vrep and the
-CAD meshes in med-air/SurRoL; forms of the fingers by the kind of instrument, ours.
+The housing belongs to the body `insertion`, the shaft to `roll`; each wrist link and finger to the body of
+its name. Sources: shaft, wrist and jaw lengths from `robots.dvrk.instruments`; diameters and boxes of wrist
+and housing from unina-icaros/dvrk-vrep and the CAD meshes in med-air/SurRoL; forms of the fingers by the kind
+of instrument, ours.
 """
 
 from __future__ import annotations
@@ -54,7 +56,9 @@ def _with_shaft(hand: Looks, end: Vector) -> Looks:
 
 
 def finger_frame(tool: Instrument) -> Vector:
-    """Return the frame that fingers are drawn in, shape (4, 4): x the way the left one opens, y the wrist yaw axis, z to the tip."""
+    """Return the frame that fingers are drawn in, shape (4, 4): x the way the left one opens, y the wrist yaw
+    axis, z to the tip.
+    """
     frame = psm.chain(tool).frames(np.zeros(3 + len(tool.joints)))[-2]
     pose = np.eye(4)
     pose[:3, 1], pose[:3, 2], pose[:3, 3] = frame[:3, 2], (0.0, 0.0, -1.0), frame[:3, 3]
@@ -64,7 +68,9 @@ def finger_frame(tool: Instrument) -> Vector:
 
 def _housing() -> tuple[Part, ...]:
     """Housing before the sterile adapter, with the two levers that release it."""
-    face = outline([(0.430, -0.034), (0.5010, -0.030), (0.5010, 0.030), (0.430, 0.034), (0.418, 0.027), (0.418, -0.027)])
+    face = outline(
+        [(0.430, -0.034), (0.5010, -0.030), (0.5010, 0.030), (0.430, 0.034), (0.418, 0.027), (0.418, -0.027)]
+    )
     shell = plate("y", face, -0.0150, 0.0158, 0.005)
     neck = rod((0.0, 0.0, _HOUSING_END), (0.0, 0.0, 0.425), 0.0085, 0.0145)
     levers = [block((x - 0.0025, -0.0080, 0.448), (x + 0.0025, 0.0060, 0.482)) for x in (-0.0335, 0.0335)]
@@ -76,8 +82,15 @@ def _shaft(pitch: Vector) -> tuple[Part, ...]:
     height = pitch[2, 3]
     tube = rod((0.0, 0.0, height + 0.0091), (0.0, 0.0, _HOUSING_END + 0.001), SHAFT_RADIUS, segments=12)
     core = rod((0.0, 0.0, height - 0.0019), (0.0, 0.0, height + 0.0091), SHAFT_RADIUS - 4e-5, segments=12)
-    slot = placed(block((-0.01, -0.01, -0.01), (0.01, 0.01, 0.0028)) ^ block((-0.0021, -1.0, -1.0), (0.0021, 1.0, 1.0)), _drawing(pitch), pitch[:3, 3])
-    flats = [block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0)) for side in (-1.0, 1.0)]
+    slot = placed(
+        block((-0.01, -0.01, -0.01), (0.01, 0.01, 0.0028)) ^ block((-0.0021, -1.0, -1.0), (0.0021, 1.0, 1.0)),
+        _drawing(pitch),
+        pitch[:3, 3],
+    )
+    flats = [
+        block((-0.01, side * 0.0066 - 0.004, -0.0030), (0.01, side * 0.0066 + 0.004, 0.0))
+        for side in (-1.0, 1.0)
+    ]
     ears = core - slot - placed(union(*flats), _drawing(pitch), pitch[:3, 3])
     return part("shaft", tube, BLACK), part("clevis", ears, STEEL)
 
@@ -88,10 +101,16 @@ def _drawing(pitch: Vector) -> Vector:
 
 
 def _wrist_link(name: str, frame: Vector, below: Vector) -> Part:
-    """Link from its joint, z of `frame`, to the next one, z of `below`: a hub in the clevis above, ears about what comes below."""
+    """Link from its joint, z of `frame`, to the next one, z of `below`: a hub in the clevis above, ears about
+    what comes below.
+    """
     length = float(np.linalg.norm(below[:3, 3] - frame[:3, 3]))
     if length < 1e-6:  # two crossed joints of a snake wrist
-        return part(name, rod((0.0, 0.0, -0.0015), (0.0, 0.0, 0.0015), 0.0019).transform(_affine(_drawing(frame), frame)), STEEL)
+        return part(
+            name,
+            rod((0.0, 0.0, -0.0015), (0.0, 0.0, 0.0015), 0.0019).transform(_affine(_drawing(frame), frame)),
+            STEEL,
+        )
     hub = rod((-0.0020, 0.0, 0.0), (0.0020, 0.0, 0.0), min(0.0024, 0.6 * length))
     body = rod((0.0, 0.0, -length - 0.0015), (0.0, 0.0, -0.2 * length), WRIST_RADIUS)
     waist = block((-0.0020, -0.0022, -0.6 * length), (0.0020, 0.0022, 0.0))
@@ -110,7 +129,9 @@ def _pin(name: str, frame: Vector) -> Part:
 
 
 def _electrode(pose: Vector) -> Part:
-    """What cuts by current in place of jaws: a stem with a hooked end, drawn in the frame `pose`, shape (4, 4)."""
+    """What cuts by current in place of jaws: a stem with a hooked end, drawn in the frame `pose`, shape (4,
+    4).
+    """
     stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
     hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _ELECTRODE_LENGTH))
     return part("electrode", placed(union(stem, hook), pose[:3, :3], pose[:3, 3]), STEEL)

@@ -1,7 +1,8 @@
-"""Look of a hand at the end of a PSM's shaft, in the PSM's base frame with every joint at 0: palm and phalanges, and the capsules that collide.
+"""Look of a hand at the end of a PSM's shaft, in the PSM's base frame with every joint at 0: palm and
+phalanges, and the capsules that collide.
 
-A phalanx is drawn in the frame of its link: x along it, y to the side that closes, z along the joint's axis. Forms are ours, within the
-radius of the phalanges and, for the palm, of the trocar.
+A phalanx is drawn in the frame of its link: x along it, y to the side that closes, z along the joint's axis.
+Forms are ours, within the radius of the phalanges and, for the palm, of the trocar.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from schemas.vectors import Vector
 __all__ = ["capsules", "parts"]
 
 _HUB, _EAR = 0.0016, 0.0020
-"""Half widths along a joint's axis: of the hub, and from where to where of the ears at its sides, m; an ear ends at the radius of the finger's corners."""
+"""Half widths along a joint's axis: of the hub, and from where to where of the ears at its sides, m; an ear
+ends at the radius of the finger's corners.
+"""
 _EAR_END = 0.0023
 _SEGMENTS = 10
 
@@ -38,7 +41,8 @@ def capsules(hand: Hand, shaft: Vector) -> dict[str, tuple[Primitive, ...]]:
     for link in hand.links:
         frame, half = shaft @ link.pose, link.phalanx.length / 2.0
         pose = np.eye(4)
-        pose[:3, 0], pose[:3, 1], pose[:3, 2] = frame[:3, 1], frame[:3, 2], frame[:3, 0]  # a capsule lies along z
+        # a capsule lies along z
+        pose[:3, 0], pose[:3, 1], pose[:3, 2] = frame[:3, 1], frame[:3, 2], frame[:3, 0]
         pose[:3, 3] = frame[:3, 3] + half * frame[:3, 0]
         shapes[link.name] = (Primitive(link.name, "capsule", (hand.radius, half), pose),)
     return shapes
@@ -47,7 +51,9 @@ def capsules(hand: Hand, shaft: Vector) -> dict[str, tuple[Primitive, ...]]:
 def _palm(hand: Hand, shaft: Vector) -> Part:
     """A disc that is wider than the shaft, with a pair of ears for each finger."""
     radius, top = TROCAR_RADIUS - 1e-4, hand.palm - hand.radius
-    body = turned([(0.0, -0.004), (SHAFT_RADIUS, -0.004), (radius, 0.0), (radius, top), (0.0, top)], segments=14)
+    body = turned(
+        [(0.0, -0.004), (SHAFT_RADIUS, -0.004), (radius, 0.0), (radius, top), (0.0, top)], segments=14
+    )
     first = [link for link in hand.links if link.parent == "roll"]
     ears = [placed(_ears(0.0, top - hand.palm), link.pose[:3, :3], link.pose[:3, 3]) for link in first]
     return part("palm", placed(union(body, *ears), shaft[:3, :3], shaft[:3, 3]), STEEL)
@@ -60,7 +66,9 @@ def _ears(end: float, start: float) -> Manifold:
 
 
 def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
-    """Return a hub in the joint, a barrel, a pad on its closing side, and ears about the next joint or a round fingertip."""
+    """Return a hub in the joint, a barrel, a pad on its closing side, and ears about the next joint or a
+    round fingertip.
+    """
     length, radius, is_last = link.phalanx.length, hand.radius, link.phalanx is hand.phalanges[-1]
     gap = 0.0020
     end = length if is_last else length - gap
@@ -68,7 +76,9 @@ def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
     neck = block((0.0, -0.0012, -_HUB), (gap, 0.0012, _HUB))
     profile = [(0.0, gap - 0.0002), (0.85 * radius, gap - 0.0002), (radius, gap + 0.0008)]
     if is_last:
-        profile += [(radius * np.cos(a), end + radius * np.sin(a)) for a in np.radians([0.0, 30.0, 60.0]).tolist()] + [(0.0, end + radius)]
+        profile += [
+            (radius * np.cos(a), end + radius * np.sin(a)) for a in np.radians([0.0, 30.0, 60.0]).tolist()
+        ] + [(0.0, end + radius)]
     else:
         profile += [(radius, end - 0.0006), (0.85 * radius, end), (0.0, end)]
     barrel = turned(profile, axis=(1.0, 0.0, 0.0), segments=_SEGMENTS)
@@ -77,4 +87,6 @@ def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
     if not is_last:
         solids.append(_ears(length, end - 0.0004))
     finished = ((link.name, union(*solids), STEEL), (f"{link.name}_pad", pad, DARK if not is_last else BLACK))
-    return tuple(part(name, placed(solid, pose[:3, :3], pose[:3, 3]), material) for name, solid, material in finished)
+    return tuple(
+        part(name, placed(solid, pose[:3, :3], pose[:3, 3]), material) for name, solid, material in finished
+    )

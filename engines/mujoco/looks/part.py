@@ -1,7 +1,8 @@
 """What a look is made of: coloured triangle meshes for the eye, primitives for contact. Metres.
 
-Coordinates are those of the frame that the look is drawn in, with every joint at 0: the arm's base frame `<arm>_base` (origin in
-the remote centre of motion, insertion along -z) for arms and instruments, the cart's frame for the cart and its setup joints.
+Coordinates are those of the frame that the look is drawn in, with every joint at 0: the arm's base frame
+`<arm>_base` (origin in the remote centre of motion, insertion along -z) for arms and instruments, the cart's
+frame for the cart and its setup joints.
 """
 
 from __future__ import annotations
@@ -15,7 +16,20 @@ from numpy.typing import NDArray
 
 from schemas.vectors import Vector
 
-__all__ = ["BLACK", "BLUE", "DARK", "GREY", "IVORY", "SLATE", "STEEL", "Collisions", "Looks", "Material", "Part", "Primitive"]
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "DARK",
+    "GREY",
+    "IVORY",
+    "SLATE",
+    "STEEL",
+    "Collisions",
+    "Looks",
+    "Material",
+    "Part",
+    "Primitive",
+]
 
 
 @dataclass(frozen=True)
@@ -29,7 +43,9 @@ class Material:
 
 
 IVORY = Material("ivory", (0.898, 0.890, 0.855, 1.0))
-"""Of the covers: the white of the arms in jhu-dvrk/dvrk_model (0.898, 0.918, 0.929), yellowed as the plastic is."""
+"""Of the covers: the white of the arms in jhu-dvrk/dvrk_model (0.898, 0.918, 0.929), yellowed as the plastic
+is.
+"""
 GREY = Material("grey", (0.647, 0.620, 0.588, 1.0))
 """Of castings and bearings: light grey of the same model."""
 DARK = Material("dark", (0.251, 0.251, 0.251, 1.0))
@@ -42,7 +58,10 @@ STEEL = Material("steel", (0.76, 0.77, 0.80, 1.0), specular=0.8, shininess=0.7)
 
 @dataclass(frozen=True)
 class Part:
-    """A closed surface in one material. A vertex on a sharp edge stands once for each smooth face that it bounds."""
+    """A closed surface in one material.
+
+    A vertex on a sharp edge stands once for each smooth face that it bounds.
+    """
 
     name: str
     """Unique within its look."""
@@ -55,7 +74,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Primitive:
-    """A convex shape for contact: a box with half extents `size`, or a capsule of radius size[0] and half length size[1] along its z axis."""
+    """A convex shape for contact: a box with half extents `size`, or a capsule of radius size[0] and half
+    length size[1] along its z axis.
+    """
 
     name: str
     """Unique within its look."""

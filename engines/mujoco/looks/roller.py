@@ -1,4 +1,6 @@
-"""The pads of a roller: what they look like, and their boxes for contact, drawn like fingers (`engines.mujoco.looks.fingers`) at the middle of their way."""
+"""The pads of a roller: what they look like, and their boxes for contact, drawn like fingers
+(`engines.mujoco.looks.fingers`) at the middle of their way.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,13 @@ __all__ = ["boxes", "parts"]
 
 def parts(roller: Roller, pose: Vector) -> dict[str, tuple[Part, ...]]:
     """Return the meshes of the pads by body, drawn in the frame `pose`, shape (4, 4)."""
-    solids = {name: block(tuple((centre - half).tolist()), tuple((centre + half).tolist())) for name, centre, half in _pads(roller)}
-    return {name: (part(name, placed(solid, pose[:3, :3], pose[:3, 3]), DARK),) for name, solid in solids.items()}
+    solids = {
+        name: block(tuple((centre - half).tolist()), tuple((centre + half).tolist()))
+        for name, centre, half in _pads(roller)
+    }
+    return {
+        name: (part(name, placed(solid, pose[:3, :3], pose[:3, 3]), DARK),) for name, solid in solids.items()
+    }
 
 
 def boxes(roller: Roller, pose: Vector) -> Iterator[tuple[str, Primitive]]:
@@ -32,4 +39,8 @@ def _pads(roller: Roller) -> Iterator[tuple[str, Vector, Vector]]:
     """Yield name, centre and half extents (m) of each pad."""
     along, across, thickness = roller.size
     for name, side in zip(PADS, (1, -1), strict=True):
-        yield name, np.array([side * thickness / 2.0, 0.0, roller.distance]), np.array([thickness, across, along]) / 2.0
+        yield (
+            name,
+            np.array([side * thickness / 2.0, 0.0, roller.distance]),
+            np.array([thickness, across, along]) / 2.0,
+        )

@@ -1,6 +1,8 @@
-"""Look of the setup joints that carry an arm, each link drawn in its joint's DH frame (z up but for the tilt) and carried to the cart's.
+"""Look of the setup joints that carry an arm, each link drawn in its joint's DH frame (z up but for the tilt)
+and carried to the cart's.
 
-Outer dimensions: bounding boxes of the CAD meshes in jhu-dvrk/dvrk_model (SUJ, Classic); axes: `robots.dvrk.setup_joints`.
+Outer dimensions: bounding boxes of the CAD meshes in jhu-dvrk/dvrk_model (SUJ, Classic); axes:
+`robots.dvrk.setup_joints`.
 """
 
 from __future__ import annotations
@@ -42,7 +44,10 @@ def parts(arm: CartArm) -> Looks:
         "mount": ((rod((0.0, 0.0, -0.014), (0.0, 0.0, 0.0), 0.050), DARK),),
     }
     return {
-        joint: tuple(part(f"{joint}_{i}", placed(solid, frame[:3, :3], frame[:3, 3]), material) for i, (solid, material) in enumerate(drawn[joint]))
+        joint: tuple(
+            part(f"{joint}_{i}", placed(solid, frame[:3, :3], frame[:3, 3]), material)
+            for i, (solid, material) in enumerate(drawn[joint])
+        )
         for joint, frame in zip(JOINT_NAMES, frames[:-1], strict=True)
     }
 
@@ -64,13 +69,18 @@ def _shoulder(length: float, top: float) -> tuple[tuple[Manifold, Material], ...
 
 
 def _elbow(length: float, *, upside_down: bool) -> tuple[tuple[Manifold, Material], ...]:
-    """Forearm from the elbow to the wrist, whose brake is in a cap on the far side of what hangs there; PSM3's forearm is turned over."""
+    """Forearm from the elbow to the wrist, whose brake is in a cap on the far side of what hangs there;
+    PSM3's forearm is turned over.
+    """
     low, high = _FOREARM
     beam = plate("z", taper(((0.0, 0.0), _ELBOW), ((length, 0.0), _WRIST)), low + 0.004, high)
     cap = turned([(0.0, high - 0.01), (0.044, high - 0.01), (0.044, 0.154), (0.032, 0.1677), (0.0, 0.1677)])
-    bearings = [(rod((0.0, 0.0, low), (0.0, 0.0, low + 0.010), 0.054))]
+    bearings = [rod((0.0, 0.0, low), (0.0, 0.0, low + 0.010), 0.054)]
     if upside_down:
-        return (union(beam, cap.mirror((0.0, 0.0, 1.0)).translate((length, 0.0, 0.0))), IVORY), (bearings[0], DARK)
+        return (union(beam, cap.mirror((0.0, 0.0, 1.0)).translate((length, 0.0, 0.0))), IVORY), (
+            bearings[0],
+            DARK,
+        )
     bearings.append(rod((length, 0.0, low), (length, 0.0, low + 0.010), 0.049))
     return (union(beam, cap.translate((length, 0.0, 0.0))), IVORY), (union(*bearings), DARK)
 
@@ -79,7 +89,11 @@ def _wrist(*, above: bool) -> tuple[tuple[Manifold, Material], ...]:
     """Bearing of the tilt axis, which runs along -y, under the forearm or, for PSM3, on a post above it."""
     low, high = (-0.1999, 0.0478) if above else (-0.0477, 0.0731)
     post = rod((0.0, 0.0, low), (0.0, 0.0, high if not above else 0.0), _WRIST - 0.002)
-    tube = turned([(0.0, 0.0), (0.036, 0.0), (0.0475, 0.012), (0.0475, 0.212), (0.0, 0.212)], (0.0, 0.162, 0.0), (0.0, -1.0, 0.0))
+    tube = turned(
+        [(0.0, 0.0), (0.036, 0.0), (0.0475, 0.012), (0.0475, 0.212), (0.0, 0.212)],
+        (0.0, 0.162, 0.0),
+        (0.0, -1.0, 0.0),
+    )
     return (union(post, tube), IVORY), (rod((0.0, -0.050, 0.0), (0.0, -0.061, 0.0), 0.042), DARK)
 
 
@@ -93,13 +107,32 @@ def _ecm_wrist() -> tuple[tuple[Manifold, Material], ...]:
     start, end = mount - 0.080 * normal, mount - 0.012 * normal
     pad = rod((start[0], start[1], start[2]), (end[0], end[1], end[2]), 0.050)
     foot = plate("z", circle((0.0, 0.0), 0.050), 0.02, 0.16)
-    return (union(post, Manifold.batch_hull([foot, pad])), IVORY), (rod((0.0, 0.0, 0.275), (0.0, 0.0, 0.2888), 0.055), DARK)
+    return (union(post, Manifold.batch_hull([foot, pad])), IVORY), (
+        rod((0.0, 0.0, 0.275), (0.0, 0.0, 0.2888), 0.055),
+        DARK,
+    )
 
 
 def _tilt() -> tuple[tuple[Manifold, Material], ...]:
-    """Bracket from the tilt axis, -z, down (-y) and forward under the manipulator, to the mount's axis, in which the frame has its origin."""
+    """Bracket from the tilt axis, -z, down (-y) and forward under the manipulator, to the mount's axis, in
+    which the frame has its origin.
+    """
     hub = rod((0.0, 0.0, -0.348), (0.0, 0.0, -0.296), 0.048)
-    upright = plate("x", outline([(-0.21, -0.344), (0.0, -0.344), (0.0, -0.296), (-0.16, -0.296), (-0.2289, -0.23), (-0.2289, -0.32)]), -0.048, 0.048)
+    upright = plate(
+        "x",
+        outline(
+            [
+                (-0.21, -0.344),
+                (0.0, -0.344),
+                (0.0, -0.296),
+                (-0.16, -0.296),
+                (-0.2289, -0.23),
+                (-0.2289, -0.32),
+            ]
+        ),
+        -0.048,
+        0.048,
+    )
     foot = plate("y", taper(((-0.26, 0.0), 0.045), ((0.0, 0.0), 0.0444)), -0.2289, -0.175)
     post = rod((0.0, -0.18, 0.0), (0.0, -0.1169, 0.0), 0.0430)
     return (union(hub, upright, foot), IVORY), (post, GREY)

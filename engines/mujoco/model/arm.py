@@ -24,31 +24,49 @@ __all__ = ["add"]
 _HIDDEN = 4
 """A group that MuJoCo's viewer does not show unless asked."""
 _TIE = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
-"""Of the ties of the linkage: a time constant of twice the default sub-step, the shortest that MuJoCo takes, and all but rigid."""
+"""Of the ties of the linkage: a time constant of twice the default sub-step, the shortest that MuJoCo takes,
+and all but rigid.
+"""
 _POSE = ((mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"), (mujoco.mjtSensor.mjSENS_FRAMEQUAT, "quaternion"))
 _TWIST = ((mujoco.mjtSensor.mjSENS_FRAMELINVEL, "linear"), (mujoco.mjtSensor.mjSENS_FRAMEANGVEL, "angular"))
-_JOINT = ((mujoco.mjtSensor.mjSENS_JOINTPOS, "position"), (mujoco.mjtSensor.mjSENS_JOINTVEL, "velocity"), (mujoco.mjtSensor.mjSENS_JOINTACTFRC, "effort"))
-_MOTOR = ((mujoco.mjtSensor.mjSENS_ACTUATORPOS, "position"), (mujoco.mjtSensor.mjSENS_ACTUATORVEL, "velocity"), (mujoco.mjtSensor.mjSENS_ACTUATORFRC, "effort"))
+_JOINT = (
+    (mujoco.mjtSensor.mjSENS_JOINTPOS, "position"),
+    (mujoco.mjtSensor.mjSENS_JOINTVEL, "velocity"),
+    (mujoco.mjtSensor.mjSENS_JOINTACTFRC, "effort"),
+)
+_MOTOR = (
+    (mujoco.mjtSensor.mjSENS_ACTUATORPOS, "position"),
+    (mujoco.mjtSensor.mjSENS_ACTUATORVEL, "velocity"),
+    (mujoco.mjtSensor.mjSENS_ACTUATORFRC, "effort"),
+)
 
 
 def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose: Vector) -> Bodies:
-    """Add the arm called `name`, its base frame at `base_pose`, shape (4, 4), in the world; return its bodies by link."""
+    """Add the arm called `name`, its base frame at `base_pose`, shape (4, 4), in the world; return its bodies
+    by link.
+    """
     base = spec.worldbody.add_body(name=f"{name}/{BASE}", **transform.placed(base_pose))
     base.add_site(name=f"{name}/base", group=_HIDDEN)
     bodies = {BASE: (base, np.eye(4))}
     for link in links(name, params):
         above, above_pose = bodies[link.parent]
-        body = above.add_body(name=f"{name}/{link.name}", gravcomp=1.0, **transform.placed(inverse_pose(above_pose) @ link.pose))
+        body = above.add_body(
+            name=f"{name}/{link.name}", gravcomp=1.0, **transform.placed(inverse_pose(above_pose) @ link.pose)
+        )
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)
     _add_drives(spec, name, params)
     _set_inertias(bodies, params)
     chain = params.chain
-    bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip))
+    bodies[chain.joints[-1].name][0].add_site(
+        name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip)
+    )
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
     if isinstance(params, PsmParams):
         if (hand := params.tool.hand) is not None:
-            _add_sensors_of(spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [motor.name for motor in hand.joints])
+            _add_sensors_of(
+                spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [motor.name for motor in hand.joints]
+            )
             _add_joint_sensors(spec, name, [link.name for link in hand.links])
         if params.tool.roller is not None:
             _add_sensors_of(spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [ROLLER])
@@ -59,10 +77,22 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
 def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) -> None:
     name = f"{arm}/{link.name}"
     kind = mujoco.mjtJoint.mjJNT_HINGE if link.kind == "revolute" else mujoco.mjtJoint.mjJNT_SLIDE
-    body.add_joint(name=name, type=kind, axis=[0.0, 0.0, 1.0], limited=link.follow is None, range=[link.lower, link.upper])
+    body.add_joint(
+        name=name,
+        type=kind,
+        axis=[0.0, 0.0, 1.0],
+        limited=link.follow is None,
+        range=[link.lower, link.upper],
+    )
     if link.follow is not None:
-        tie = {"name1": name, "name2": f"{arm}/{link.follow.joint}", "data": [0.0, link.follow.ratio, *[0.0] * 10]}
-        spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, **tie, **_TIE)
+        tie = {
+            "name1": name,
+            "name2": f"{arm}/{link.follow.joint}",
+            "data": [0.0, link.follow.ratio, *[0.0] * 10],
+        }
+        spec.add_equality(
+            name=name, type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, **tie, **_TIE
+        )
 
 
 def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
@@ -79,15 +109,25 @@ def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) ->
     if roller is not None:
         rollers.add_drive(spec, arm, roller, driven[ROLLER])
     for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
-        tendon = spec.add_tendon(name=f"{arm}/disc_{i}", damping=[disc.viscous_friction, 0.0, 0.0], frictionloss=disc.coulomb_friction)
+        tendon = spec.add_tendon(
+            name=f"{arm}/disc_{i}",
+            damping=[disc.viscous_friction, 0.0, 0.0],
+            frictionloss=disc.coulomb_friction,
+        )
         for name, share in disc.shares.items():
             tendon.wrap_joint(f"{arm}/{name}", share)
 
 
 def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
-    """Add friction, elasticity and rotor inertia of a joint, and a servo with the inputs position, velocity and feed-forward effort."""
+    """Add friction, elasticity and rotor inertia of a joint, and a servo with the inputs position, velocity
+    and feed-forward effort.
+    """
     joint = spec.joint(name)
-    joint.damping, joint.frictionloss, joint.armature = [drive.viscous_friction, 0.0, 0.0], drive.coulomb_friction, drive.armature
+    joint.damping, joint.frictionloss, joint.armature = (
+        [drive.viscous_friction, 0.0, 0.0],
+        drive.coulomb_friction,
+        drive.armature,
+    )
     if drive.elasticity:
         joint.stiffness, joint.springref = [drive.elasticity, 0.0, 0.0], -drive.offset / drive.elasticity
     lower, upper = joint.range
@@ -103,7 +143,11 @@ def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
         forcerange=[-drive.effort, drive.effort],
     )
     inputs = mujoco.mjtCtrlInput
-    actuator.set_to_pid(kp=drive.stiffness, kv=drive.damping, ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF))
+    actuator.set_to_pid(
+        kp=drive.stiffness,
+        kv=drive.damping,
+        ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF),
+    )
 
 
 def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
@@ -115,14 +159,29 @@ def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
         tensor = turn.T @ given.tensor @ turn
         body.mass, body.explicitinertial = given.mass, True
         body.ipos = (turn.T @ (given.centre - pose[:3, 3])).tolist()
-        body.fullinertia = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+        body.fullinertia = [
+            tensor[0, 0],
+            tensor[1, 1],
+            tensor[2, 2],
+            tensor[0, 1],
+            tensor[0, 2],
+            tensor[1, 2],
+        ]
 
 
 def _add_spheres(spec: mujoco.MjSpec, arm: str, spheres: tuple[ContactSphere, ...], bodies: Bodies) -> None:
     """Mark the contact spheres by sites, and let MuJoCo lay out their positions and velocities in the world."""
     for sphere in spheres:
-        bodies[sphere.link][0].add_site(name=sphere_site(arm, sphere.name), pos=sphere.position, size=[sphere.radius, 0.0, 0.0], group=_HIDDEN)
-    for kind, what in ((mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"), (mujoco.mjtSensor.mjSENS_FRAMELINVEL, "velocity")):
+        bodies[sphere.link][0].add_site(
+            name=sphere_site(arm, sphere.name),
+            pos=sphere.position,
+            size=[sphere.radius, 0.0, 0.0],
+            group=_HIDDEN,
+        )
+    for kind, what in (
+        (mujoco.mjtSensor.mjSENS_FRAMEPOS, "position"),
+        (mujoco.mjtSensor.mjSENS_FRAMELINVEL, "velocity"),
+    ):
         for sphere in spheres:
             site = sphere_site(arm, sphere.name)
             spec.add_sensor(name=f"{site}/{what}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
@@ -133,7 +192,14 @@ def _add_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str], has_jaw: bool
     _add_joint_sensors(spec, arm, joints)
     site = mujoco.mjtObj.mjOBJ_SITE
     for kind, what in _POSE:
-        spec.add_sensor(name=f"{arm}/cp/{what}", type=kind, objtype=site, objname=f"{arm}/tip", reftype=site, refname=f"{arm}/base")
+        spec.add_sensor(
+            name=f"{arm}/cp/{what}",
+            type=kind,
+            objtype=site,
+            objname=f"{arm}/tip",
+            reftype=site,
+            refname=f"{arm}/base",
+        )
     for kind, what in (*_POSE, *_TWIST):
         spec.add_sensor(name=f"{arm}/tip/{what}", type=kind, objtype=site, objname=f"{arm}/tip")
     if has_jaw:
@@ -144,7 +210,13 @@ def _add_joint_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str]) -> None
     _add_sensors_of(spec, arm, _JOINT, mujoco.mjtObj.mjOBJ_JOINT, joints)
 
 
-def _add_sensors_of(spec: mujoco.MjSpec, arm: str, kinds: tuple[tuple[mujoco.mjtSensor, str], ...], what: mujoco.mjtObj, names: list[str]) -> None:
+def _add_sensors_of(
+    spec: mujoco.MjSpec,
+    arm: str,
+    kinds: tuple[tuple[mujoco.mjtSensor, str], ...],
+    what: mujoco.mjtObj,
+    names: list[str],
+) -> None:
     """Let MuJoCo lay out positions, then velocities, then efforts of joints or motors."""
     for kind, label in kinds:
         for name in names:

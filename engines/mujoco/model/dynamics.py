@@ -1,7 +1,8 @@
-"""The equations of motion of one arm, in its independent joints: M(q) a + gravity(q) + elastic(q) + friction(v) = effort.
+"""The equations of motion of one arm, in its independent joints: M(q) a + gravity(q) + elastic(q) +
+friction(v) = effort.
 
-The linkage, and the fingers held closed, move with the joints that lead them: with v = G u, from the velocities u of the
-independent joints to those of all, the inertia is G' M G and a load G' f.
+The linkage, and the fingers held closed, move with the joints that lead them: with v = G u, from the
+velocities u of the independent joints to those of all, the inertia is G' M G and a load G' f.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ class JointDynamics:
     gravity: Vector
     """Effort that holds the arm against gravity, its base upright, shape (n,)."""
     viscous_friction: Vector
-    """Effort per velocity of a joint that moves alone, shape (n,); the discs of an instrument couple wrist and jaw, see `friction`."""
+    """Effort per velocity of a joint that moves alone, shape (n,); the discs of an instrument couple wrist
+    and jaw, see `friction`.
+    """
     coulomb_friction: Vector
     """Effort of a joint that moves alone, shape (n,)."""
     friction: Vector
@@ -44,7 +47,8 @@ class JointDynamics:
 
 
 def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
-    """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m) and velocities `dq` (rad/s, m/s).
+    """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m) and
+    velocities `dq` (rad/s, m/s).
 
     Args:
         arm: PSM1, PSM2, PSM3 or ECM.
@@ -67,11 +71,19 @@ def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -
     mujoco.mj_forward(model, data)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
-    driven, wrist = (drives.psm(params.tool), drives.discs(params.tool)) if isinstance(params, PsmParams) else (drives.ECM, ())
+    driven, wrist = (
+        (drives.psm(params.tool), drives.discs(params.tool))
+        if isinstance(params, PsmParams)
+        else (drives.ECM, ())
+    )
     at_rest = dict.fromkeys(driven, 0.0)
     moving = drives.friction(driven, {**at_rest, **dict(zip(joints, dq, strict=True))}, wrist)
     alone = [
-        [getattr(driven[name], kind) + sum(getattr(disc, kind) * abs(disc.shares.get(name, 0.0)) ** power for disc in wrist) for name in joints]
+        [
+            getattr(driven[name], kind)
+            + sum(getattr(disc, kind) * abs(disc.shares.get(name, 0.0)) ** power for disc in wrist)
+            for name in joints
+        ]
         for kind, power in (("viscous_friction", 2), ("coulomb_friction", 1))
     ]
     return JointDynamics(

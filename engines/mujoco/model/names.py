@@ -1,11 +1,15 @@
-"""What the parts of an arm are called in the model: bodies and joints `<arm>/<link>`, sites `<arm>/base` and `<arm>/tip`."""
+"""What the parts of an arm are called in the model: bodies and joints `<arm>/<link>`, sites `<arm>/base` and
+`<arm>/tip`.
+"""
 
 from __future__ import annotations
 
 __all__ = ["CONTACT", "FINGERS", "finger", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
 
 FINGERS = ("jaw_left", "jaw_right")
-"""Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right one towards -y."""
+"""Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right
+one towards -y.
+"""
 
 CONTACT = "contact"
 """Of an arm: the bond at its contact spheres, and what the names of their sites begin with."""
@@ -34,9 +38,10 @@ def finger(arm: str, side: str) -> str:
 def first_sensor(arm: str) -> str:
     """Return the name of the first of the arm's sensors.
 
-    They lie in this order: positions, velocities and efforts of the n joints; tip in the base frame (position 3, quaternion w, x,
-    y, z); tip in the world (the same, then linear and angular velocity); where there is a jaw, positions, velocities and
-    efforts of the two fingers, left before right, and then of a roller; or of the fingers of a hand and then of its phalanges; positions of all contact
-    spheres in the world, then their velocities.
+    They lie in this order: positions, velocities and efforts of the n joints; tip in the base frame (position
+    3, quaternion w, x, y, z); tip in the world (the same, then linear and angular velocity); where there is a
+    jaw, positions, velocities and efforts of the two fingers, left before right, and then of a roller; or of
+    the fingers of a hand and then of its phalanges; positions of all contact spheres in the world, then their
+    velocities.
     """
     return f"{arm}/position/yaw"

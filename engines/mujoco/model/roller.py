@@ -1,4 +1,6 @@
-"""What rolls a needle in a jaw: two pads that slide along the fingers, one forwards while the other goes back, by one motor."""
+"""What rolls a needle in a jaw: two pads that slide along the fingers, one forwards while the other goes
+back, by one motor.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,9 @@ _TIE = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
 def add_drive(spec: mujoco.MjSpec, arm: str, roller: Roller, drive: Drive) -> None:
     """Tie the pads to each other and give them their motor, called `<arm>/roller`.
 
-    It pulls a tendon whose length is the angle by which a wire of `roller.wire_radius` rolls (rad), so its force is a torque on that wire (N m). What
-    the rotor weighs is shared by the pads: they are light, and MuJoCo's contacts give way in proportion to the inverse of the masses they touch.
+    It pulls a tendon whose length is the angle by which a wire of `roller.wire_radius` rolls (rad), so its
+    force is a torque on that wire (N m). What the rotor weighs is shared by the pads: they are light, and
+    MuJoCo's contacts give way in proportion to the inverse of the masses they touch.
     """
     share = 0.5 / roller.wire_radius  # rad of the wire by m of either pad
     tendon = spec.add_tendon(name=f"{arm}/{ROLLER}")
@@ -27,7 +30,13 @@ def add_drive(spec: mujoco.MjSpec, arm: str, roller: Roller, drive: Drive) -> No
         tendon.wrap_joint(joint.name, share)
     left, right = (f"{arm}/{pad}" for pad in PADS)
     spec.add_equality(
-        name=f"{arm}/pads", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=left, name2=right, data=[0.0, 1.0, *[0.0] * 10], **_TIE
+        name=f"{arm}/pads",
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        name1=left,
+        name2=right,
+        data=[0.0, 1.0, *[0.0] * 10],
+        **_TIE,
     )
     actuator = spec.add_actuator(
         name=tendon.name,
@@ -41,4 +50,8 @@ def add_drive(spec: mujoco.MjSpec, arm: str, roller: Roller, drive: Drive) -> No
         forcerange=[-drive.effort, drive.effort],
     )
     inputs = mujoco.mjtCtrlInput
-    actuator.set_to_pid(kp=drive.stiffness, kv=drive.damping, ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF))
+    actuator.set_to_pid(
+        kp=drive.stiffness,
+        kv=drive.damping,
+        ctrlspec=int(inputs.mjINPUT_POS | inputs.mjINPUT_VEL | inputs.mjINPUT_FF),
+    )

@@ -32,7 +32,9 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     result.modelname = scene.model
     result.compiler.degree = False
     result.option.timestep = _TIMESTEP
-    _set_options(result.option, grasping=bool(scene.objects) or any(has_hand(arm) for arm in scene.arms.values()))
+    _set_options(
+        result.option, grasping=bool(scene.objects) or any(has_hand(arm) for arm in scene.arms.values())
+    )
     result.worldbody.add_light(pos=[0.0, 0.0, 3.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     mounts = setup_joints.add(result, scene) if scene.mounting == "cart" else {}
     for name, params in scene.arms.items():
@@ -46,7 +48,8 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
 
 
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
-    """Choose how the model is stepped; where there are things to hold or a hand, so that friction holds them and light fingers rest at their stops.
+    """Choose how the model is stepped; where there are things to hold or a hand, so that friction holds them
+    and light fingers rest at their stops.
 
     See docs/decisions/0012 and 0018.
     """
@@ -54,7 +57,8 @@ def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
     if grasping:
         option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
-        option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # dearer than what they save here
+        # dearer than what they save here
+        option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
 
 
 def _free_pose(params: MountedArm) -> Vector:

@@ -19,7 +19,9 @@ CART = "cart"
 
 
 def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
-    """Add the cart and the setup joint of every arm in `scene`; return the poses of the arms' base frames in the world, shape (4, 4)."""
+    """Add the cart and the setup joint of every arm in `scene`; return the poses of the arms' base frames in
+    the world, shape (4, 4).
+    """
     cart = spec.worldbody.add_body(name=CART)
     shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=scene.looks)
     mounts: dict[CartArm, Vector] = {}

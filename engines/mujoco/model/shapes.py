@@ -1,9 +1,10 @@
 """What arms, setup joints and cart look like, and what of them collides.
 
-Looks and collision shapes come from `engines.mujoco.looks`, drawn in an arm's base frame (or the cart's) with every joint at 0, and are carried
-to the bodies here. What collides: cart, setup joints and every link of the arms with objects, the latter also with the table; shaft, wrist and
-fingers also with those of the other arms. Covers of two arms pass through each other, as they do in the dVRK's own simulated setup (PSM2 and
-PSM3 stand in one another there), and no arm collides with itself.
+Looks and collision shapes come from `engines.mujoco.looks`, drawn in an arm's base frame (or the cart's) with
+every joint at 0, and are carried to the bodies here. What collides: cart, setup joints and every link of the
+arms with objects, the latter also with the table; shaft, wrist and fingers also with those of the other arms.
+Covers of two arms pass through each other, as they do in the dVRK's own simulated setup (PSM2 and PSM3 stand
+in one another there), and no arm collides with itself.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from schemas.vectors import Vector
 __all__ = ["Bodies", "add", "add_arm"]
 
 Bodies = Mapping[str, tuple[mujoco.MjsBody, Vector]]
-"""Per link: its body, and the body's pose, shape (4, 4), in the frame that the look is drawn in, with every joint at 0."""
+"""Per link: its body, and the body's pose, shape (4, 4), in the frame that the look is drawn in, with every
+joint at 0.
+"""
 
 _SEEN, _COLLIDING = 1, 3
 """Groups of geoms; MuJoCo's viewer hides the latter unless asked."""
@@ -37,18 +40,29 @@ _KINDS = {"box": mujoco.mjtGeom.mjGEOM_BOX, "capsule": mujoco.mjtGeom.mjGEOM_CAP
 _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEEN}
 
 
-def add_arm(spec: mujoco.MjSpec, arm: CartArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool) -> None:
+def add_arm(
+    spec: mujoco.MjSpec, arm: CartArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool
+) -> None:
     """Give an arm and what it holds its collision shapes and, if it is to be `seen`, its looks."""
     whats = ("ecm",) if isinstance(params, EcmParams) else ("psm", f"instrument/{params.tool.name}")
     for what in whats:
         add(spec, what, arm, bodies, seen=seen)
     if isinstance(params, PsmParams) and has_probe(params):
         body, _ = bodies["wrist_yaw"]
-        body.add_geom(name=f"{arm}/probe", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[params.probe_radius, 0.0, 0.0], mass=0.0, group=_SEEN, **_instrument(arm))
+        body.add_geom(
+            name=f"{arm}/probe",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[params.probe_radius, 0.0, 0.0],
+            mass=0.0,
+            group=_SEEN,
+            **_instrument(arm),
+        )
 
 
 def add(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *, seen: bool) -> None:
-    """Give the bodies of `owner` the collision shapes and, if they are to be `seen`, the looks of `what`, a name that `looks.parts` knows."""
+    """Give the bodies of `owner` the collision shapes and, if they are to be `seen`, the looks of `what`, a
+    name that `looks.parts` knows.
+    """
     if seen:
         _add_looks(spec, what, bodies)
     _add_collision(spec, what, owner, bodies, group=_COLLIDING if seen else _SEEN)
@@ -60,9 +74,16 @@ def _add_looks(spec: mujoco.MjSpec, what: str, bodies: Bodies) -> None:
         for part in parts:
             material = part.material
             if spec.material(material.name) is None:
-                spec.add_material(name=material.name, rgba=material.rgba, specular=material.specular, shininess=material.shininess)
+                spec.add_material(
+                    name=material.name,
+                    rgba=material.rgba,
+                    specular=material.specular,
+                    shininess=material.shininess,
+                )
             mesh = _mesh(spec, f"{what}/{part.name}", part, pose)
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, material=material.name, **_UNSEEN_BY_PHYSICS)
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, material=material.name, **_UNSEEN_BY_PHYSICS
+            )
 
 
 def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *, group: int) -> None:
@@ -72,10 +93,18 @@ def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *
             common = {"name": f"{owner}/{shape.name}", "mass": 0.0, "group": group}
             if isinstance(shape, looks.Part):
                 mesh = _mesh(spec, f"{what}/{shape.name}", shape, pose)
-                body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common)
+                body.add_geom(
+                    type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common
+                )
             else:
                 place = transform.placed(inverse_pose(pose) @ shape.pose)
-                body.add_geom(type=_KINDS[shape.kind], size=[*shape.size, 0.0, 0.0][:3], **place, **common, **_instrument(owner))
+                body.add_geom(
+                    type=_KINDS[shape.kind],
+                    size=[*shape.size, 0.0, 0.0][:3],
+                    **place,
+                    **common,
+                    **_instrument(owner),
+                )
 
 
 def _instrument(arm: str) -> dict[str, int]:

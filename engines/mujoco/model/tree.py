@@ -1,7 +1,8 @@
-"""The links of an arm as a tree, with the pose of each in the base frame `<arm>_base` while every joint is at 0.
+"""The links of an arm as a tree, with the pose of each in the base frame `<arm>_base` while every joint is at
+0.
 
-The main chain has the frames of the arm's modified DH table, so that the tip is exact. The bars of the linkage and the
-fingers hang on it; their joint axis is z of their own frame, as everywhere.
+The main chain has the frames of the arm's modified DH table, so that the tip is exact. The bars of the
+linkage and the fingers hang on it; their joint axis is z of their own frame, as everywhere.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ class Link:
 def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
     """Return all moving links of `arm`, parents before children.
 
-    They are its joints, then the linkage, then the fingers of a jaw with the pads of a roller, or the phalanges of a hand.
+    They are its joints, then the linkage, then the fingers of a jaw with the pads of a roller, or the
+    phalanges of a hand.
     """
     chain = params.chain
     poses = chain.frames(np.zeros(len(chain.joints)))
@@ -64,7 +66,15 @@ def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
         pose = leader.pose.copy()
         pose[:3, 3] = passive.pivot
         lower, upper = sorted((passive.ratio * leader.lower, passive.ratio * leader.upper))
-        tree[passive.name] = Link(passive.name, passive.parent, leader.kind, pose, lower, upper, Follow(passive.follows, passive.ratio))
+        tree[passive.name] = Link(
+            passive.name,
+            passive.parent,
+            leader.kind,
+            pose,
+            lower,
+            upper,
+            Follow(passive.follows, passive.ratio),
+        )
     if isinstance(params, PsmParams) and (jaw := params.tool.jaw) is not None:
         wrist = tree[chain.joints[-1].name]
         for name, turn in zip(FINGERS, (np.eye(4), _HALF_TURN), strict=True):
@@ -73,7 +83,9 @@ def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
     if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
         shaft = tree[chain.joints[-1].name].pose
         for bone in hand.links:
-            tree[bone.name] = Link(bone.name, bone.parent, "revolute", shaft @ bone.pose, bone.phalanx.lower, bone.phalanx.upper)
+            tree[bone.name] = Link(
+                bone.name, bone.parent, "revolute", shaft @ bone.pose, bone.phalanx.lower, bone.phalanx.upper
+            )
     return tuple(tree.values())
 
 

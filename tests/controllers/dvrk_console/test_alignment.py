@@ -1,4 +1,6 @@
-"""A master with motors that turns where it is told: aligned by the console, it passes the gate of the teleoperation, and leads in the camera's axes."""
+"""A master with motors that turns where it is told: aligned by the console, it passes the gate of the
+teleoperation, and leads in the camera's axes.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,10 @@ from tests.devices.ros.ideal_robot import IdealRobot, motion
 
 pytest.importorskip("ruckig")
 
-ARMS = {"PSM1": {"instrument": "400006", "start": [0.3, 0.2, 0.14, 0.4, 0.3, -0.2]}, "ECM": {"start": [0.1, -0.2, 0.06, 0.2]}}
+ARMS = {
+    "PSM1": {"instrument": "400006", "start": [0.3, 0.2, 0.14, 0.4, 0.3, -0.2]},
+    "ECM": {"start": [0.1, -0.2, 0.06, 0.2]},
+}
 WAY = np.array([-0.03, 0.01, 0.02])
 """Of the hand in the display's frame from 0.5 s to 0.7 s, m."""
 POSE, JOY = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/Joy"
@@ -34,11 +39,24 @@ class MasterWithMotors(Stepped):
     @property
     def ports(self):
         fields = ("position", "velocity", "effort")
-        events = {"MTMR/operating_state": "crtk_msgs/msg/OperatingState", "console/teleop/enable": "std_msgs/msg/Bool", "pedals/operatorpresent": JOY}
+        events = {
+            "MTMR/operating_state": "crtk_msgs/msg/OperatingState",
+            "console/teleop/enable": "std_msgs/msg/Bool",
+            "pedals/operatorpresent": JOY,
+        }
         return (
             Port(name="MTMR/measured_cp", causality="output", type=POSE),
-            Port(name="MTMR/gripper/measured_js", causality="output", type="sensor_msgs/msg/JointState", names=("gripper",), fields=fields),
-            *(Port(name=name, causality="output", type=type_, variability="event") for name, type_ in events.items()),
+            Port(
+                name="MTMR/gripper/measured_js",
+                causality="output",
+                type="sensor_msgs/msg/JointState",
+                names=("gripper",),
+                fields=fields,
+            ),
+            *(
+                Port(name=name, causality="output", type=type_, variability="event")
+                for name, type_ in events.items()
+            ),
             Port(name="MTMR/move_cp", causality="input", type=POSE, variability="event"),
             Port(name="tip", causality="input", type=POSE, frame="ECM"),
             Port(name="following", causality="input", type="std_msgs/msg/Bool", variability="event"),
@@ -51,7 +69,9 @@ class MasterWithMotors(Stepped):
 
     def told(self, t_ns, **events):
         gripper = np.array([0.5 + 0.5 * np.sin(t_ns * 1e-8), 0.0, 0.0])  # somebody squeezes it
-        silent = dict.fromkeys(("MTMR/operating_state", "console/teleop/enable", "pedals/operatorpresent"), ())
+        silent = dict.fromkeys(
+            ("MTMR/operating_state", "console/teleop/enable", "pedals/operatorpresent"), ()
+        )
         return {"MTMR/measured_cp": self.pose, "MTMR/gripper/measured_js": gripper, **silent, **events}
 
     def step(self, t, h, inputs):
@@ -64,7 +84,11 @@ class MasterWithMotors(Stepped):
         if t:
             return self.told(t)
         present, ready = Joy(buttons=np.array([1], np.int32)), OperatingState(state="ENABLED", is_homed=True)
-        first = {"MTMR/operating_state": (ready,), "console/teleop/enable": (BoolMessage(data=True),), "pedals/operatorpresent": (present,)}
+        first = {
+            "MTMR/operating_state": (ready,),
+            "console/teleop/enable": (BoolMessage(data=True),),
+            "pedals/operatorpresent": (present,),
+        }
         return self.told(t, **first)
 
     def state_hash(self):
@@ -81,20 +105,44 @@ def play(*, motors):
     master.motors = motors
     participants = {
         "master": master,
-        "console": Console("console", ConsoleParams.model_validate({"arms": ["PSM1", "ECM"], "teleoperations": ["MTMR_PSM1"]})),
+        "console": Console(
+            "console",
+            ConsoleParams.model_validate({"arms": ["PSM1", "ECM"], "teleoperations": ["MTMR_PSM1"]}),
+        ),
         "right": Teleoperation("right", TeleoperationParams.model_validate(hand)),
         "motion": controller,
         "robot": IdealRobot(controller),
     }
     connections = [
         *("master.* -> console.*", "master.MTMR/measured_cp -> right.master", "console.* -> master.*"),
-        *("console.MTMR_PSM1/following -> master.following", "motion.PSM1/measured_cp -> master.tip", "motion.* -> console.*", "console.* -> motion.*"),
-        *("console.teleop/MTMR_PSM1/* -> right.*", "right.* -> console.teleop/MTMR_PSM1/*", "right.PSM1/* -> motion.PSM1/*"),
-        *("motion.PSM1/operating_state -> right.operating_state", "motion.PSM1/setpoint_js -> right.measured_js"),
-        *("motion.PSM1/jaw/setpoint_js -> right.jaw/measured_js", "motion.SUJ/PSM1/measured_cp -> right.base_in_view"),
+        *(
+            "console.MTMR_PSM1/following -> master.following",
+            "motion.PSM1/measured_cp -> master.tip",
+            "motion.* -> console.*",
+            "console.* -> motion.*",
+        ),
+        *(
+            "console.teleop/MTMR_PSM1/* -> right.*",
+            "right.* -> console.teleop/MTMR_PSM1/*",
+            "right.PSM1/* -> motion.PSM1/*",
+        ),
+        *(
+            "motion.PSM1/operating_state -> right.operating_state",
+            "motion.PSM1/setpoint_js -> right.measured_js",
+        ),
+        *(
+            "motion.PSM1/jaw/setpoint_js -> right.jaw/measured_js",
+            "motion.SUJ/PSM1/measured_cp -> right.base_in_view",
+        ),
         *("motion.drive/* -> robot.*", "robot.* -> motion.sense/*"),
     ]
-    scenario = {"name": "aligned", "step": "2 ms", "duration": "800 ms", "order": list(participants), "connections": connections}
+    scenario = {
+        "name": "aligned",
+        "step": "2 ms",
+        "duration": "800 ms",
+        "order": list(participants),
+        "connections": connections,
+    }
     assert run_in_process(scenario, participants).state == "done"
     return master
 

@@ -1,4 +1,6 @@
-"""The console stepped by hand: pedals, programs, arms, masters and teleoperations are events and vectors that a test puts in."""
+"""The console stepped by hand: pedals, programs, arms, masters and teleoperations are events and vectors that
+a test puts in.
+"""
 
 from pathlib import Path
 
@@ -25,16 +27,27 @@ DOWN, UP, TAP = (Joy(buttons=np.array([button], np.int32)) for button in (1, 0, 
 
 class Rig:
     def __init__(self, **params):
-        self.console = Console("console", ConsoleParams.model_validate({"arms": ["PSM1", "PSM2", "PSM3", "ECM"], "teleoperations": PAIRS, **params}))
+        self.console = Console(
+            "console",
+            ConsoleParams.model_validate(
+                {"arms": ["PSM1", "PSM2", "PSM3", "ECM"], "teleoperations": PAIRS, **params}
+            ),
+        )
         self.console.configure(Setup(H, Path()))
-        self.values = {p.name: np.array(p.start) for p in self.console.ports if p.causality == "input" and p.variability == "signal"}
+        self.values = {
+            p.name: np.array(p.start)
+            for p in self.console.ports
+            if p.causality == "input" and p.variability == "signal"
+        }
         self.inputs, self.t, self.heard = Inputs(self.values), 0, {}
         self.outputs = {}
 
     def step(self, events=(), count=1):
         """Step with events by port; `heard` is what was said since."""
         self.heard = {}
-        self.inputs._events = {port: value if isinstance(value, tuple) else (value,) for port, value in dict(events).items()}
+        self.inputs._events = {
+            port: value if isinstance(value, tuple) else (value,) for port, value in dict(events).items()
+        }
         for _ in range(count):
             self.outputs = self.console.step(self.t, H, self.inputs)
             self.t += H
@@ -45,17 +58,27 @@ class Rig:
         return self
 
     def said(self, port):
-        return [getattr(message, "data", getattr(message, "string", message)) for message in self.heard.get(port, ())]
+        return [
+            getattr(message, "data", getattr(message, "string", message))
+            for message in self.heard.get(port, ())
+        ]
 
     def buttons(self, port):
         return [message.buttons.tolist() for message in self.heard.get(port, ())]
 
     def ready(self, *names):
-        return self.step({f"{name}/operating_state": READY for name in names or ("PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR")})
+        return self.step(
+            {
+                f"{name}/operating_state": READY
+                for name in names or ("PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR")
+            }
+        )
 
     def led(self, pair="MTMR_PSM1"):
         """Until `pair` is led."""
-        self.ready().step({"console/teleop/enable": BoolMessage(data=True), "console/emulate_operator_present": DOWN})
+        self.ready().step(
+            {"console/teleop/enable": BoolMessage(data=True), "console/emulate_operator_present": DOWN}
+        )
         return self.step({f"teleop/{pair}/state": StringMessage(data="ENABLED")})
 
 
@@ -64,7 +87,11 @@ def test_every_topic_of_the_console_in_the_table_is_there_with_its_type():
     heard = {p.name: (p.type, p.variability) for p in Rig().console.ports if p.causality == "input"}
     no_sound = {"system/beep", "system/string_to_speech"}
     for row in face(GatewayParams.model_validate({"teleoperations": PAIRS, "cameras": []})):
-        if row.port is not None and row.owner in {"console", "system", "footpedals", *PAIRS} and row.port.name not in no_sound:
+        if (
+            row.port is not None
+            and row.owner in {"console", "system", "footpedals", *PAIRS}
+            and row.port.name not in no_sound
+        ):
             ours = told if row.way == "publish" else heard
             assert ours[row.port.name] == (row.type, row.port.variability), row.topic
 
@@ -81,7 +108,9 @@ def test_at_the_start_it_says_how_everything_is():
     assert rig.step().heard == {}
 
 
-@pytest.mark.parametrize(("order", "command"), [("power_on", "enable"), ("power_off", "disable"), ("home", "home")])
+@pytest.mark.parametrize(
+    ("order", "command"), [("power_on", "enable"), ("power_off", "disable"), ("home", "home")]
+)
 def test_the_system_orders_all_arms(order, command):
     rig = Rig(enabled=True)
     rig.step()
@@ -130,7 +159,12 @@ def test_an_arm_that_tells_how_it_is_only_later_is_homed_then():
 def test_the_clutch_frees_the_hand_and_keeps_the_masters_orientation():
     rig = Rig().led()
     rig.step({"pedals/clutch": DOWN})
-    assert rig.buttons("teleop/MTMR_PSM1/buttons") == rig.buttons("footpedals/clutch") == rig.buttons("console/clutch") == [[1]]
+    assert (
+        rig.buttons("teleop/MTMR_PSM1/buttons")
+        == rig.buttons("footpedals/clutch")
+        == rig.buttons("console/clutch")
+        == [[1]]
+    )
     assert rig.said("MTMR_PSM1/following") == [False]
     assert "MTMR_PSM1/current_state" not in rig.heard
     assert "MTMR/lock_orientation" in rig.heard
@@ -170,7 +204,9 @@ def test_a_surgeon_who_looks_up_holds_everything():
 def test_an_arm_that_is_not_ready_any_more_is_not_led_until_somebody_asks():
     rig = Rig().led()
     rig.step({"PSM1/operating_state": OperatingState(state="FAULT", is_homed=True)})
-    assert rig.said("MTMR_PSM1/warning") == ["MTMR_PSM1: PSM1 not ENABLED and homed any more; send state_command enable"]
+    assert rig.said("MTMR_PSM1/warning") == [
+        "MTMR_PSM1: PSM1 not ENABLED and homed any more; send state_command enable"
+    ]
     assert rig.said("MTMR_PSM1/current_state") == ["DISABLED"]
     rig.ready()
     assert "MTMR_PSM1/current_state" not in rig.heard
@@ -183,11 +219,20 @@ def test_a_master_leads_one_arm_and_takes_none_from_another():
     rig.step()
     rig.step({"console/teleop/select": StringMessage(data="MTMR_PSM3")})
     assert rig.said("console/teleop/selected") == ["MTML_PSM2", "MTMR_PSM3"]
-    rig.step({"console/teleop/select": StringMessage(data="MTMR_PSM1")}).step({"console/teleop/select": StringMessage(data="MTML_PSM1")})
-    assert rig.said("console/warning") == ["'MTML_PSM1' is not selected: PSM1 is led in 'MTMR_PSM1', unselect that first"]
-    rig.step({"console/teleop/unselect": StringMessage(data="MTMR_PSM1")}).step({"console/teleop/select": StringMessage(data="MTML_PSM1")})
+    rig.step({"console/teleop/select": StringMessage(data="MTMR_PSM1")}).step(
+        {"console/teleop/select": StringMessage(data="MTML_PSM1")}
+    )
+    assert rig.said("console/warning") == [
+        "'MTML_PSM1' is not selected: PSM1 is led in 'MTMR_PSM1', unselect that first"
+    ]
+    rig.step({"console/teleop/unselect": StringMessage(data="MTMR_PSM1")}).step(
+        {"console/teleop/select": StringMessage(data="MTML_PSM1")}
+    )
     assert rig.said("console/teleop/selected") == ["MTML_PSM1"]
-    assert "Did you mean 'MTML_PSM2'" in rig.step({"console/teleop/select": StringMessage(data="MTML-PSM2")}).said("console/warning")[0]
+    assert (
+        "Did you mean 'MTML_PSM2'"
+        in rig.step({"console/teleop/select": StringMessage(data="MTML-PSM2")}).said("console/warning")[0]
+    )
 
 
 def test_scale_and_locks_reach_those_who_lead():
@@ -196,15 +241,26 @@ def test_scale_and_locks_reach_those_who_lead():
     rig.step({"console/teleop/set_scale": Float64Message(data=0.5)})
     assert rig.outputs["teleop/MTMR_PSM1/scale"].tolist() == [0.5]
     assert rig.said("console/teleop/scale") == rig.said("MTML_PSM2/scale") == [0.5]
-    rig.step({"MTML_PSM2/set_scale": Float64Message(data=0.1), "MTMR_PSM1/set_scale": Float64Message(data=2.0)})
+    rig.step(
+        {"MTML_PSM2/set_scale": Float64Message(data=0.1), "MTMR_PSM1/set_scale": Float64Message(data=2.0)}
+    )
     assert (rig.outputs["teleop/MTML_PSM2/scale"][0], rig.outputs["teleop/MTMR_PSM1/scale"][0]) == (0.1, 0.5)
-    assert rig.said("MTMR_PSM1/warning") == ["MTMR_PSM1: scale 2 is refused, allowed are over 0 to 1; it stays 0.5"]
-    rig.step({"MTMR_PSM1/lock_rotation": BoolMessage(data=True), "MTMR_PSM1/set_align_MTM": BoolMessage(data=False)})
+    assert rig.said("MTMR_PSM1/warning") == [
+        "MTMR_PSM1: scale 2 is refused, allowed are over 0 to 1; it stays 0.5"
+    ]
+    rig.step(
+        {
+            "MTMR_PSM1/lock_rotation": BoolMessage(data=True),
+            "MTMR_PSM1/set_align_MTM": BoolMessage(data=False),
+        }
+    )
     assert rig.said("MTMR_PSM1/rotation_locked") == rig.said("teleop/MTMR_PSM1/lock_rotation") == [True]
     assert rig.said("MTMR_PSM1/align_mtm") == [False]
 
 
-@pytest.mark.parametrize(("degrees", "gripper"), [(60.0, 1.0), (30.0, 0.5), (0.0, 0.0), (-5.0, 0.0), (80.0, 1.0)])
+@pytest.mark.parametrize(
+    ("degrees", "gripper"), [(60.0, 1.0), (30.0, 0.5), (0.0, 0.0), (-5.0, 0.0), (80.0, 1.0)]
+)
 def test_a_gripper_opens_the_jaw(degrees, gripper):
     rig = Rig()
     rig.values["MTMR/gripper/measured_js"][0] = np.radians(degrees)
@@ -230,6 +286,14 @@ def test_a_teleoperation_of_an_arm_that_is_not_there_is_refused():
 
 
 def test_it_is_a_participant_whose_state_can_be_saved():
-    check_engine(lambda: Console("console", ConsoleParams.model_validate({"arms": ["PSM1"], "teleoperations": ["MTMR_PSM1"], "enabled": True})), period_ns=H)
+    check_engine(
+        lambda: Console(
+            "console",
+            ConsoleParams.model_validate(
+                {"arms": ["PSM1"], "teleoperations": ["MTMR_PSM1"], "enabled": True}
+            ),
+        ),
+        period_ns=H,
+    )
     with pytest.raises(StateError, match="participant 'console': a saved state of 1 bytes"):
         Rig().console.restore(b"0")

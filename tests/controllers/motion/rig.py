@@ -1,4 +1,6 @@
-"""A motion controller stepped by hand, with a robot that is always exactly where it is told to be, or where a test puts it."""
+"""A motion controller stepped by hand, with a robot that is always exactly where it is told to be, or where a
+test puts it.
+"""
 
 from pathlib import Path
 
@@ -32,7 +34,12 @@ CART = {**PSM1, "PSM2": {"instrument": "400006"}, "PSM3": {"instrument": "400006
 
 class Rig:
     def __init__(self, arms=PSM1, initial_state="homed", **params):
-        self.motion = MotionController("motion", MotionParams.model_validate({"mounting": "cart", "arms": arms, "initial_state": initial_state, **params}))
+        self.motion = MotionController(
+            "motion",
+            MotionParams.model_validate(
+                {"mounting": "cart", "arms": arms, "initial_state": initial_state, **params}
+            ),
+        )
         self.outputs = dict(self.motion.configure(Setup(H, Path())))
         self.sensed = {}
         for port in self.motion.ports:
@@ -53,7 +60,9 @@ class Rig:
         events = {}
         for name, order in orders.items():
             port = name.replace("__", "/")
-            events[port if port.startswith(("PSM", "ECM", "SUJ")) else f"PSM1/{port}"] = order if isinstance(order, tuple) else (order,)
+            events[port if port.startswith(("PSM", "ECM", "SUJ")) else f"PSM1/{port}"] = (
+                order if isinstance(order, tuple) else (order,)
+            )
         self.heard = {}
         for _ in range(count):
             self.inputs._events = events
@@ -105,17 +114,23 @@ def cp(pose, frame=""):
     x, y, z, *q = (float(value) for value in pose)
     orientation = Quaternion.model_construct(**dict(zip("xyzw", q, strict=True)))
     return PoseStamped.model_construct(
-        header=Header(frame_id=frame), pose=Pose.model_construct(position=Point.model_construct(x=x, y=y, z=z), orientation=orientation)
+        header=Header(frame_id=frame),
+        pose=Pose.model_construct(position=Point.model_construct(x=x, y=y, z=z), orientation=orientation),
     )
 
 
 def two_vectors(values):
-    return (Vector3.model_construct(**dict(zip("xyz", map(float, part), strict=True))) for part in (values[:3], values[3:]))
+    return (
+        Vector3.model_construct(**dict(zip("xyz", map(float, part), strict=True)))
+        for part in (values[:3], values[3:])
+    )
 
 
 def cf(*values, frame=""):
     force, torque = two_vectors(values)
-    return WrenchStamped.model_construct(header=Header(frame_id=frame), wrench=Wrench.model_construct(force=force, torque=torque))
+    return WrenchStamped.model_construct(
+        header=Header(frame_id=frame), wrench=Wrench.model_construct(force=force, torque=torque)
+    )
 
 
 def cs(pose=None, twist=None, wrench=None, frame=""):
@@ -125,21 +140,33 @@ def cs(pose=None, twist=None, wrench=None, frame=""):
         parts |= {"pose": cp(pose).pose, "pose_is_valid": BoolMessage(data=True)}
     if twist is not None:
         linear, angular = two_vectors(twist)
-        parts |= {"twist": Twist.model_construct(linear=linear, angular=angular), "twist_is_valid": BoolMessage(data=True)}
+        parts |= {
+            "twist": Twist.model_construct(linear=linear, angular=angular),
+            "twist_is_valid": BoolMessage(data=True),
+        }
     if wrench is not None:
         parts |= {"wrench": cf(*wrench).wrench, "wrench_is_valid": BoolMessage(data=True)}
     return CartesianState.model_construct(**(CartesianState().__dict__ | parts))
 
 
 def ci(pose, frame="", **gains):
-    """A Cartesian impedance about `pose`: gains by side and name, such as `position_positive={"p": (0, 0, -200)}`."""
+    """A Cartesian impedance about `pose`: gains by side and name, such as `position_positive={"p": (0, 0,
+    -200)}`.
+    """
     goal = cp(pose).pose
     sides = {
-        side: CartesianImpedanceHalfPlaneGains(**{name: Vector3(**dict(zip("xyz", map(float, v), strict=True))) for name, v in row.items()})
+        side: CartesianImpedanceHalfPlaneGains(
+            **{name: Vector3(**dict(zip("xyz", map(float, v), strict=True))) for name, v in row.items()}
+        )
         for side, row in gains.items()
     }
     at = Vector3.model_construct(x=goal.position.x, y=goal.position.y, z=goal.position.z)
-    parts = {"header": Header(frame_id=frame), "force_position": at, "force_orientation": goal.orientation, "torque_orientation": goal.orientation}
+    parts = {
+        "header": Header(frame_id=frame),
+        "force_position": at,
+        "force_orientation": goal.orientation,
+        "torque_orientation": goal.orientation,
+    }
     return CartesianImpedance.model_construct(**(CartesianImpedance().__dict__ | parts | sides))
 
 

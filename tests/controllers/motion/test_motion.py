@@ -74,7 +74,12 @@ def test_home_powers_then_homes():
 
 
 def test_homing_that_is_paused_goes_on_when_it_is_resumed():
-    rig = Rig({"PSM1": {"instrument": "400006", "start": GOAL}}, initial_state="disabled").step().command("home").step(200)
+    rig = (
+        Rig({"PSM1": {"instrument": "400006", "start": GOAL}}, initial_state="disabled")
+        .step()
+        .command("home")
+        .step(200)
+    )
     assert rig.command("pause").states() == [("PAUSED", False, False)]
     rig.step(100)
     before = rig.setpoint
@@ -91,7 +96,9 @@ def test_a_stream_of_joints_may_state_its_velocity():
         for k in range(0, 1000, 10):
             angle, spread = 2 * np.pi * 0.5 * (k + 10) * 1e-3, np.array([1, 1, 0.2, 1, 1, 1])
             goal, velocity = HOME + 0.05 * (1 - np.cos(angle)) * spread, 0.05 * np.pi * np.sin(angle) * spread
-            before = rig.step(9, servo_jp=JointState(position=goal, velocity=velocity if stated else np.zeros(6))).setpoint
+            before = rig.step(
+                9, servo_jp=JointState(position=goal, velocity=velocity if stated else np.zeros(6))
+            ).setpoint
             errors.append(np.abs((rig.step().setpoint - before) / 1e-3 - velocity).max())
         lag[stated] = max(errors[20:])
         assert not rig.said("error")
@@ -242,7 +249,13 @@ def test_free_lets_go_and_the_next_command_starts_where_the_arm_is():
 
 
 def test_move_jr_adds_to_the_goal_under_way():
-    rig = Rig().step().step(50, move_jr=jp(0.1, 0, 0, 0, 0, 0)).step(1, move_jr=jp(0.1, 0, 0, 0, 0, 0)).until_idle()
+    rig = (
+        Rig()
+        .step()
+        .step(50, move_jr=jp(0.1, 0, 0, 0, 0, 0))
+        .step(1, move_jr=jp(0.1, 0, 0, 0, 0, 0))
+        .until_idle()
+    )
     assert np.allclose(rig.setpoint, HOME + np.array([0.2, 0, 0, 0, 0, 0]), atol=1e-12)
 
 
@@ -260,7 +273,9 @@ def test_joints_may_come_in_any_order_if_they_are_named():
 
 
 def construct(part, values):
-    return JointState.model_construct(**{"name": [], "position": np.zeros(0), "effort": np.zeros(0), part: np.array(values)})
+    return JointState.model_construct(
+        **{"name": [], "position": np.zeros(0), "effort": np.zeros(0), part: np.array(values)}
+    )
 
 
 BAD = [
@@ -289,13 +304,20 @@ NAN, TOP_DOWN = float("nan"), (0.70710678, 0.70710678, 0.0, 0.0)
 
 def raw_pose(position, orientation, frame="PSM1_base"):
     x, y, z = position
-    point, quaternion = Point.model_construct(x=x, y=y, z=z), Quaternion.model_construct(**dict(zip("xyzw", orientation, strict=True)))
-    return PoseStamped.model_construct(header=Header(frame_id=frame), pose=Pose.model_construct(position=point, orientation=quaternion))
+    point, quaternion = (
+        Point.model_construct(x=x, y=y, z=z),
+        Quaternion.model_construct(**dict(zip("xyzw", orientation, strict=True))),
+    )
+    return PoseStamped.model_construct(
+        header=Header(frame_id=frame), pose=Pose.model_construct(position=point, orientation=quaternion)
+    )
 
 
 def raw_wrench(x, frame):
     vectors = {"force": Vector3.model_construct(x=x, y=0.0, z=0.0), "torque": Vector3()}
-    return WrenchStamped.model_construct(header=Header(frame_id=frame), wrench=Wrench.model_construct(**vectors))
+    return WrenchStamped.model_construct(
+        header=Header(frame_id=frame), wrench=Wrench.model_construct(**vectors)
+    )
 
 
 EVERY = [
@@ -325,13 +347,33 @@ EVERY = [
     ),
     ("servo_cr", raw_pose((0.0, 0.0, NAN), (0.0, 0.0, 0.0, 1.0)), "every number must be finite"),
     ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)), "norm 0, allowed is 1 within 0.001"),
-    ("servo_cr", raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "PSM2_base"), "frame 'PSM2_base', allowed are PSM1_base"),
-    ("servo_cr", raw_pose((0.0, 0.0, -0.5), (0.0, 0.0, 0.0, 1.0)), "pose cannot be reached: joint insertion at"),
-    ("servo_jp", JointState.model_construct(name=[], position=HOME, velocity=np.array([0.1]), effort=np.zeros(0)), "1 values of velocity, expected 6"),
-    ("servo_jp", JointState.model_construct(name=[], position=HOME, velocity=np.full(6, NAN), effort=np.zeros(0)), "every number must be finite"),
+    (
+        "servo_cr",
+        raw_pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "PSM2_base"),
+        "frame 'PSM2_base', allowed are PSM1_base",
+    ),
+    (
+        "servo_cr",
+        raw_pose((0.0, 0.0, -0.5), (0.0, 0.0, 0.0, 1.0)),
+        "pose cannot be reached: joint insertion at",
+    ),
+    (
+        "servo_jp",
+        JointState.model_construct(name=[], position=HOME, velocity=np.array([0.1]), effort=np.zeros(0)),
+        "1 values of velocity, expected 6",
+    ),
+    (
+        "servo_jp",
+        JointState.model_construct(name=[], position=HOME, velocity=np.full(6, NAN), effort=np.zeros(0)),
+        "every number must be finite",
+    ),
     ("body__servo_cf", cf(1e308, 0, 1e308, 0, -1e308, 0), "allowed are numbers up to 1e+09"),
     ("servo_cs", cs(twist=[1e300] * 6), "allowed are numbers up to 1e+09"),
-    ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], position_positive={"p": (1e300, 0, 0)}), "allowed are numbers up to 1e+09"),
+    (
+        "servo_ci",
+        ci([0.0, 0.0, -0.12, 0, 0, 0, 1], position_positive={"p": (1e300, 0, 0)}),
+        "allowed are numbers up to 1e+09",
+    ),
     ("servo_ci", ci([0.0, NAN, -0.12, 0, 0, 0, 1]), "every number must be finite"),
     ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 0]), "norm 0, allowed is 1 within 0.001"),
     ("servo_ci", ci([0.0, 0.0, -0.12, 0, 0, 0, 1], "world"), "frame 'world', allowed are PSM1_base"),
@@ -343,8 +385,14 @@ EVERY = [
             (cs([0.0, 0.0, -0.5, *TOP_DOWN]), "pose cannot be reached: joint insertion at"),
             (cs(twist=[0.0, NAN, 0.0, 0.0, 0.0, 0.0]), "every number must be finite"),
             (cs(wrench=[0.0] * 6, frame="world"), "frame 'world', allowed are PSM1_base"),
-            (cs([0.0, 0.0, -0.1, *TOP_DOWN], wrench=[0.0] * 6), "a wrench beside a pose or a twist, allowed is one or the other"),
-            (cs(twist=[0.0] * 6, wrench=[0.0] * 6), "a wrench beside a pose or a twist, allowed is one or the other"),
+            (
+                cs([0.0, 0.0, -0.1, *TOP_DOWN], wrench=[0.0] * 6),
+                "a wrench beside a pose or a twist, allowed is one or the other",
+            ),
+            (
+                cs(twist=[0.0] * 6, wrench=[0.0] * 6),
+                "a wrench beside a pose or a twist, allowed is one or the other",
+            ),
         ]
     ),
     *(
@@ -356,7 +404,10 @@ EVERY = [
             (jf(*[99.0] * size), "at 99 N m, allowed are"),
         ]
     ),
-    *((f"{kind}__servo_cf", raw_wrench(NAN, frame), "every number must be finite") for kind, frame in (("body", "PSM1_tip"), ("spatial", "PSM1_base"))),
+    *(
+        (f"{kind}__servo_cf", raw_wrench(NAN, frame), "every number must be finite")
+        for kind, frame in (("body", "PSM1_tip"), ("spatial", "PSM1_base"))
+    ),
     ("spatial__servo_cf", raw_wrench(0.0, "PSM1_tip"), "frame 'PSM1_tip', allowed are PSM1_base"),
     *(
         (command, bad, reason)
@@ -368,7 +419,11 @@ EVERY = [
         ]
     ),
     *(
-        (f"trajectory_j__set_ratio{which}", Float64Message.model_construct(data=bad), "allowed are over 0 to 1")
+        (
+            f"trajectory_j__set_ratio{which}",
+            Float64Message.model_construct(data=bad),
+            "allowed are over 0 to 1",
+        )
         for bad in (NAN, -1.0, 1.1, np.inf)
         for which in ("", "_v", "_a")
     ),
@@ -388,7 +443,9 @@ def test_bad_input_is_refused_with_the_reason_and_changes_nothing(command, bad, 
     assert rig.said("error")[0].startswith(f"PSM1: {command.replace('__', '/')} refused: ")
     assert reason in rig.said("error")[0]
     assert rig.states() == ([("ENABLED", True, False)] if "move" in command else [])
-    for mine, others in zip(rig.motion._arms["PSM1"]._drives.state, twin.motion._arms["PSM1"]._drives.state, strict=True):
+    for mine, others in zip(
+        rig.motion._arms["PSM1"]._drives.state, twin.motion._arms["PSM1"]._drives.state, strict=True
+    ):
         assert (mine == others).all()
 
 
@@ -420,7 +477,9 @@ def test_a_refused_stream_is_told_the_same_once_in_two_seconds():
 )
 def test_ratios_are_told_and_slow_moves(orders, told):
     rig = Rig().step().step(10, **{f"trajectory_j__{name}": ratio(value) for name, value in orders.items()})
-    assert [float(rig.outputs[f"PSM1/trajectory_j/{name}"][0]) for name in ("ratio", "ratio_v", "ratio_a")] == told
+    assert [
+        float(rig.outputs[f"PSM1/trajectory_j/{name}"][0]) for name in ("ratio", "ratio_v", "ratio_a")
+    ] == told
     goal = GOAL + np.array([0.9, 0, 0, 0, 0, 0])
     quick, slow = Rig().step().step(600, move_jp=jp(*goal)), rig.step(600, move_jp=jp(*goal))
     assert slow.setpoint[0] < quick.setpoint[0]
@@ -439,7 +498,9 @@ def test_the_tip_is_seen_from_the_camera_through_the_setup_joints(arm):
     measured = rig.outputs[f"{arm}/measured_cp"]
     assert np.allclose(measured[:3], expected["p"], atol=1e-8)
     assert np.allclose(rotation.matrix(measured[3:]), expected["R"], atol=1e-8)
-    local = arms.chain(arm, "400006" if arm != "ECM" else None).forward(np.array([0, 0, 0.12, 0, 0, 0])[: 4 if arm == "ECM" else 6])
+    local = arms.chain(arm, "400006" if arm != "ECM" else None).forward(
+        np.array([0, 0, 0.12, 0, 0, 0])[: 4 if arm == "ECM" else 6]
+    )
     assert np.allclose(rig.outputs[f"{arm}/local/measured_cp"][:3], local[:3, 3], atol=1e-12)
     base = rig.outputs[f"SUJ/{arm}/measured_cp"]
     assert np.allclose(base[:3] + rotation.matrix(base[3:]) @ local[:3, 3], measured[:3], atol=1e-12)
@@ -450,7 +511,10 @@ def test_the_tip_is_seen_from_the_camera_through_the_setup_joints(arm):
 
 
 def test_with_the_frame_of_the_view_the_tip_is_seen_a_quarter_turned_about_the_line_of_sight():
-    kinematic, view = (Rig({**CART, "ECM": {"tip_frame": frame}}).step(10).outputs["PSM1/measured_cp"] for frame in ("kinematic", "view"))
+    kinematic, view = (
+        Rig({**CART, "ECM": {"tip_frame": frame}}).step(10).outputs["PSM1/measured_cp"]
+        for frame in ("kinematic", "view")
+    )
     x, y, z = kinematic[:3]
     assert np.allclose(view[:3], [-y, x, z], rtol=0.0, atol=1e-12)
 
@@ -531,8 +595,14 @@ def test_restore_returns_to_the_same_bits_in_the_middle_of_a_move():
         ({"PSM1": {"instrument": "400999"}}, "no instrument '400999'. Did you mean"),
         ({"PSM1": {"instrument": "400117"}}, "'400117' has a snake wrist"),
         ({"PSM1": {"start": [3, 0, 0.1, 0, 0, 0]}}, r"joint yaw at 3 rad, allowed are -1\.588 \.\. 1\.588"),
-        ({"PSM1": {"instrument": "420006", "start": [0, 0, 0.1, 0, 1.4, 0]}}, "joint wrist_pitch at 1.4 rad, allowed are"),
-        ({"PSM1": {"instrument": "400006", "jaw": 2.0}}, r"jaw at 2 rad, allowed are -0\.698132 \.\. 1\.39626"),
+        (
+            {"PSM1": {"instrument": "420006", "start": [0, 0, 0.1, 0, 1.4, 0]}},
+            "joint wrist_pitch at 1.4 rad, allowed are",
+        ),
+        (
+            {"PSM1": {"instrument": "400006", "jaw": 2.0}},
+            r"jaw at 2 rad, allowed are -0\.698132 \.\. 1\.39626",
+        ),
         ({"PSM1": {"instrument": "palpation-probe", "jaw": 0.1}}, "has no jaw; leave it out"),
         ({"ECM": {"start": [0, 0, 0.3, 0]}}, r"joint insertion at 0\.3 m, allowed are 0 \.\. 0\.255"),
     ],

@@ -1,4 +1,6 @@
-"""What the motion controller makes of commands to the tip: relative ones, states, wrenches in any axes, base frames, the cannula."""
+"""What the motion controller makes of commands to the tip: relative ones, states, wrenches in any axes, base
+frames, the cannula.
+"""
 
 import numpy as np
 import pytest
@@ -83,7 +85,8 @@ class TestServoCs:
         for _ in range(50):
             rig.step(10, servo_cs=cs(twist=TWIST, frame=named))
         velocity = rig.outputs["PSM1/local/setpoint_cv" if named else "PSM1/setpoint_cv"]
-        assert np.allclose(velocity, TWIST, rtol=0.02, atol=1e-4)  # joint velocities are those of a moment ago
+        # joint velocities are those of a moment ago
+        assert np.allclose(velocity, TWIST, rtol=0.02, atol=1e-4)
         stopped = rig.step(round(1000 * STREAM_GAP) + 100).setpoint
         assert (rig.step(100).setpoint == stopped).all()
         assert not rig.outputs["PSM1/setpoint_cv"].any()
@@ -103,7 +106,10 @@ class TestServoCs:
         start, errors = tip(rig), []
         for k in range(0, 1000, 10):
             angle = 2 * np.pi * 0.5 * (k + 10) * 1e-3
-            goal, speed = start[:3, 3] + [0.0, 0.005 * (1 - np.cos(angle)), 0.0], 0.005 * np.pi * np.sin(angle)
+            goal, speed = (
+                start[:3, 3] + [0.0, 0.005 * (1 - np.cos(angle)), 0.0],
+                0.005 * np.pi * np.sin(angle),
+            )
             rig.step(10, servo_cs=cs([*goal, *rotation.from_matrix(start)], [0.0, speed, 0.0, 0.0, 0.0, 0.0]))
             errors.append(np.linalg.norm(CHAIN.forward(rig.setpoint)[:3, 3] - goal))
         assert max(errors[20:]) < 1e-6
@@ -129,7 +135,9 @@ class TestServoCi:
     """The wrench is read off the joint efforts, about a tip that is displaced and moves."""
 
     def wrench(self, displacement, velocity, **gains):
-        """Return what the gains make of a displacement and a velocity, shape (6,), along the axes of the goal, along which it is given too."""
+        """Return what the gains make of a displacement and a velocity, shape (6,), along the axes of the
+        goal, along which it is given too.
+        """
         rig = at(Q, CART)
         base, chain = view(rig), CHAIN.frames(Q)
         tip = base @ chain[-1]
@@ -138,7 +146,9 @@ class TestServoCi:
         rig.follows = False
         body = CHAIN.jacobian(chain)
         turn = base[:3, :3].T @ axes
-        rig.sensed["sense/PSM1/measured_js"][6:12] = np.linalg.solve(body, [*(turn @ velocity[:3]), *(turn @ velocity[3:])])
+        rig.sensed["sense/PSM1/measured_js"][6:12] = np.linalg.solve(
+            body, [*(turn @ velocity[:3]), *(turn @ velocity[3:])]
+        )
         rig.step(1, servo_ci=ci([*position, *rotation.from_matrix(axes)], **gains))
         assert rig.mode == [2, 1]
         assert not rig.said("error")
@@ -147,24 +157,44 @@ class TestServoCi:
 
     def test_each_side_has_its_own_gains(self):
         gains = {
-            "position_positive": {"p": (-10, -20, -30), "d": (-1, -2, -3), "bias": (0.1, 0.2, 0.3), "deadband": (0.002, 0, 0.02)},
-            "position_negative": {"p": (-40, -50, -60), "d": (-4, -5, -6), "bias": (-0.1, -0.2, -0.3), "deadband": (0, 0.001, -0.003)},
+            "position_positive": {
+                "p": (-10, -20, -30),
+                "d": (-1, -2, -3),
+                "bias": (0.1, 0.2, 0.3),
+                "deadband": (0.002, 0, 0.02),
+            },
+            "position_negative": {
+                "p": (-40, -50, -60),
+                "d": (-4, -5, -6),
+                "bias": (-0.1, -0.2, -0.3),
+                "deadband": (0, 0.001, -0.003),
+            },
         }
         speed = (0.01, 0.01, 0.02, 0, 0, 0)
         up = self.wrench((0.005, 0.004, 0.01, 0, 0, 0), speed, **gains)
         down = self.wrench((-0.005, -0.004, -0.01, 0, 0, 0), speed, **gains)
-        assert np.allclose(up[:3], [-10 * 0.003 - 0.01 + 0.1, -20 * 0.004 - 0.02 + 0.2, 0.0 - 0.06 + 0.3], atol=1e-9)
-        assert np.allclose(down[:3], [40 * 0.005 - 0.04 - 0.1, 50 * 0.003 - 0.05 - 0.2, 60 * 0.007 - 0.12 - 0.3], atol=1e-9)
+        assert np.allclose(
+            up[:3], [-10 * 0.003 - 0.01 + 0.1, -20 * 0.004 - 0.02 + 0.2, 0.0 - 0.06 + 0.3], atol=1e-9
+        )
+        assert np.allclose(
+            down[:3], [40 * 0.005 - 0.04 - 0.1, 50 * 0.003 - 0.05 - 0.2, 60 * 0.007 - 0.12 - 0.3], atol=1e-9
+        )
         assert np.allclose([up[3:], down[3:]], 0.0, atol=1e-9)
 
     def test_a_rotation_is_resisted_about_the_axes_of_its_goal(self):
-        gains = {"orientation_positive": {"p": (-0.2, -0.3, 0), "d": (-0.01, 0, 0)}, "orientation_negative": {"p": (0, -0.1, -0.4)}}
+        gains = {
+            "orientation_positive": {"p": (-0.2, -0.3, 0), "d": (-0.01, 0, 0)},
+            "orientation_negative": {"p": (0, -0.1, -0.4)},
+        }
         torque = self.wrench((0, 0, 0, 0.1, -0.05, -0.02), (0, 0, 0, 0.3, 0.2, 0.1), **gains)
         assert np.allclose(torque, [0, 0, 0, -0.02 - 0.003, 0.005, 0.008], atol=1e-9)
 
     def test_it_lasts_until_another_command(self):
         rig = at(Q)
-        here, gains = rig.outputs["PSM1/measured_cp"], {side: {"p": (-200, -200, -200)} for side in ("position_positive", "position_negative")}
+        here, gains = (
+            rig.outputs["PSM1/measured_cp"],
+            {side: {"p": (-200, -200, -200)} for side in ("position_positive", "position_negative")},
+        )
         rig.step(1, servo_ci=ci(here, **gains))
         rig.follows = False
         rig.sensed["sense/PSM1/measured_js"][2] += 0.01
@@ -194,7 +224,9 @@ class TestAbsoluteOrientation:
         assert np.allclose(rig.step(10).outputs["PSM1/body/measured_cf"], force, atol=1e-9)
         rig.step(10, body__set_cf_orientation_absolute=ON)
         axes = frame(rig.outputs["PSM1/measured_cp"])[:3, :3]
-        assert np.allclose(rig.outputs["PSM1/body/measured_cf"], [*(axes @ force[:3]), *(axes @ force[3:])], atol=1e-9)
+        assert np.allclose(
+            rig.outputs["PSM1/body/measured_cf"], [*(axes @ force[:3]), *(axes @ force[3:])], atol=1e-9
+        )
 
     def test_it_names_the_frame_that_a_wrench_is_in(self):
         rig = at(Q, CART).step(1, body__set_cf_orientation_absolute=ON)
@@ -234,11 +266,18 @@ class TestSetBaseFrame:
         [
             (CART, {}, "", "the setup joints say where the arm stands"),
             (CART, {"reference": "world"}, "", "the setup joints say where the arm stands"),
-            (PSM1, {"mounting": "free"}, "", "`reference: world` of the motion controller leaves its base frame to clients"),
+            (
+                PSM1,
+                {"mounting": "free"},
+                "",
+                "`reference: world` of the motion controller leaves its base frame to clients",
+            ),
             (PSM1, FREE, "table", "frame 'table', allowed are world"),
         ],
     )
-    def test_where_something_else_says_it_or_nobody_can_tell_the_frame_it_is_refused(self, arms, params, named, reason):
+    def test_where_something_else_says_it_or_nobody_can_tell_the_frame_it_is_refused(
+        self, arms, params, named, reason
+    ):
         rig = Rig(arms, **params).step()
         before = rig.motion.save()
         rig.step(1, set_base_frame=cp(self.BASE, named))
@@ -250,11 +289,14 @@ class TestSetBaseFrame:
         assert "norm 0, allowed is 1" in rig.said("error")[0]
 
 
-DEEP, SHALLOW = 0.0156 + 0.0431, 0.0156 + 0.0429  # insertions of a 400006 about where Cartesian control may begin
+# insertions of a 400006 about where Cartesian control may begin
+DEEP, SHALLOW = 0.0156 + 0.0431, 0.0156 + 0.0429
 TIP_COMMANDS = {
     "servo_cp": cp([*CHAIN.forward(HOME)[:3, 3], *rotation.from_matrix(CHAIN.forward(HOME))], "PSM1_base"),
     "servo_cr": cp([0, 0, 0, 0, 0, 0, 1]),
-    "servo_cs": cs([*CHAIN.forward(HOME)[:3, 3], *rotation.from_matrix(CHAIN.forward(HOME))], frame="PSM1_base"),
+    "servo_cs": cs(
+        [*CHAIN.forward(HOME)[:3, 3], *rotation.from_matrix(CHAIN.forward(HOME))], frame="PSM1_base"
+    ),
     "servo_ci": ci([0, 0, -0.1, 0, 0, 0, 1]),
     "body__servo_cf": cf(*[0.0] * 6),
     "spatial__servo_cf": cf(*[0.0] * 6),
@@ -272,7 +314,10 @@ class TestCannula:
         rig = inserted(SHALLOW)
         before, mode = rig.setpoint, rig.mode
         rig.step(20, **{command: TIP_COMMANDS[command]})
-        assert "the end of the instrument's shaft is 0.0429 m past the remote centre, allowed from 0.043 on" in rig.said("warning")[0]
+        assert (
+            "the end of the instrument's shaft is 0.0429 m past the remote centre, allowed from 0.043 on"
+            in rig.said("warning")[0]
+        )
         assert not rig.said("goal_reached")
         assert (rig.setpoint == before).all()
         assert rig.mode == mode
@@ -297,7 +342,10 @@ class TestCannula:
         up = CHAIN.forward(np.array([0.0, 0.0, 0.0156 + 0.0449, 0.0, 0.0, 0.0]))
         before = rig.setpoint
         rig.step(1, move_cp=cp([*up[:3, 3], *rotation.from_matrix(up)], "PSM1_base"))
-        assert "the end of the instrument's shaft would be 0.0449 m past the remote centre, allowed from 0.045 on" in rig.said("error")[0]
+        assert (
+            "the end of the instrument's shaft would be 0.0449 m past the remote centre, allowed from"
+            " 0.045 on" in rig.said("error")[0]
+        )
         assert rig.said("goal_reached") == [False]
         assert (rig.setpoint == before).all()
 
@@ -316,7 +364,10 @@ class TestCannula:
             orders[name] = cp([*goal[:3, 3], *rotation.from_matrix(goal)])
         rig = Rig(ecm, reference="base")
         rig.step().step(1, ECM__servo_cp=orders["deep"])
-        assert "the endoscope's insertion is 0.049 m past the remote centre, allowed from 0.05 on" in rig.said("warning", "ECM")[0]
+        assert (
+            "the endoscope's insertion is 0.049 m past the remote centre, allowed from 0.05 on"
+            in rig.said("warning", "ECM")[0]
+        )
         rig.step(1, ECM__move_jp=jp(0, 0, 0.1, 0)).step(5000)
         assert not rig.step(1, ECM__servo_cp=orders["deep"]).said("warning", "ECM")
         rig.step(1, ECM__servo_cp=orders["shallow"])
@@ -328,11 +379,21 @@ class TestCannula:
     [
         {"servo_cr": cp([0.002, 0, 0, 0, 0, 0, 1])},
         {"servo_cs": cs(twist=TWIST)},
-        {"servo_cs": cs([*CHAIN.forward(Q)[:3, 3], *rotation.from_matrix(CHAIN.forward(Q))], TWIST, frame="PSM1_base")},
+        {
+            "servo_cs": cs(
+                [*CHAIN.forward(Q)[:3, 3], *rotation.from_matrix(CHAIN.forward(Q))], TWIST, frame="PSM1_base"
+            )
+        },
         {"servo_cs": cs(wrench=[0.1, 0.2, 0.3, 0, 0, 0.01])},
-        {"servo_ci": ci([0, 0, -0.1, 0, 0, 0, 1], position_positive={"p": (-9, -9, -9)}), "body__set_cf_orientation_absolute": ON},
+        {
+            "servo_ci": ci([0, 0, -0.1, 0, 0, 0, 1], position_positive={"p": (-9, -9, -9)}),
+            "body__set_cf_orientation_absolute": ON,
+        },
         {"body__servo_cf": cf(0.1, 0.2, 0.3, 0, 0, 0.01), "body__set_cf_orientation_absolute": ON},
-        {"trajectory_j__set_ratio_v": Float64Message(data=0.3), "move_cp": cp([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], "PSM1_base")},
+        {
+            "trajectory_j__set_ratio_v": Float64Message(data=0.3),
+            "move_cp": cp([0.01, 0.0, -0.11, 0.70710678, 0.70710678, 0, 0], "PSM1_base"),
+        },
     ],
 )
 def test_a_checkpoint_in_the_middle_of_a_command_to_the_tip_goes_on_to_the_same_bits(order):
@@ -341,7 +402,9 @@ def test_a_checkpoint_in_the_middle_of_a_command_to_the_tip_goes_on_to_the_same_
     for name, value in rig.sensed.items():
         other.sensed[name][:] = value
     other.t = rig.t
-    assert [other.step().motion.state_hash() for _ in range(200)] == [rig.step().motion.state_hash() for _ in range(200)]
+    assert [other.step().motion.state_hash() for _ in range(200)] == [
+        rig.step().motion.state_hash() for _ in range(200)
+    ]
     assert not rig.said("error")
 
 
@@ -353,4 +416,8 @@ def test_a_twist_moves_the_tip_as_it_says(shares):
     before = CHAIN.forward(rig.setpoint)
     after = CHAIN.forward(rig.step(1).setpoint)
     spin = rotation.log(rotation.from_matrix(after[:3, :3] @ before[:3, :3].T))
-    assert np.allclose(np.concatenate([after[:3, 3] - before[:3, 3], spin]) / 1e-3, twist, atol=0.02 * np.abs(twist).max() + 1e-9)
+    assert np.allclose(
+        np.concatenate([after[:3, 3] - before[:3, 3], spin]) / 1e-3,
+        twist,
+        atol=0.02 * np.abs(twist).max() + 1e-9,
+    )

@@ -1,4 +1,6 @@
-"""What a CRTK client relies on, at the level of ports: busy edges, homing that takes time, latched commands, what is told once."""
+"""What a CRTK client relies on, at the level of ports: busy edges, homing that takes time, latched commands,
+what is told once.
+"""
 
 import numpy as np
 import pytest
@@ -43,7 +45,9 @@ def command(text, stamp=0):
     return StringStamped(header=Header(stamp=Time.from_ns(stamp)), string=text)
 
 
-@pytest.mark.parametrize("order", [{"move_jp": jp(*HOME)}, {"move_jr": jp(*[0.0] * 6)}, {"jaw__move_jp": jp(0.0)}])
+@pytest.mark.parametrize(
+    "order", [{"move_jp": jp(*HOME)}, {"move_jr": jp(*[0.0] * 6)}, {"jaw__move_jp": jp(0.0)}]
+)
 def test_a_hundred_moves_to_where_the_arm_is_are_each_busy_and_then_idle(order):
     client = Client(Rig().step())
     assert {client.wait(**order) for _ in range(100)} == {2}
@@ -64,8 +68,17 @@ def test_a_move_that_takes_another_over_before_it_is_waited_for_leaves_nobody_wa
 
 
 @pytest.mark.parametrize("state", ["homed", "disabled"])
-@pytest.mark.parametrize("order", [{"move_jp": jp(*[9.0] * 6)}, {"move_cp": cp([0, 0, -0.9, 0.70710678, 0.70710678, 0, 0])}, {"jaw__move_jp": jp(9.0)}])
-def test_a_client_that_asks_whether_the_arm_is_busy_since_a_move_that_is_refused_learns_that_it_is_not(order, state):
+@pytest.mark.parametrize(
+    "order",
+    [
+        {"move_jp": jp(*[9.0] * 6)},
+        {"move_cp": cp([0, 0, -0.9, 0.70710678, 0.70710678, 0, 0])},
+        {"jaw__move_jp": jp(9.0)},
+    ],
+)
+def test_a_client_that_asks_whether_the_arm_is_busy_since_a_move_that_is_refused_learns_that_it_is_not(
+    order, state
+):
     rig = Rig(initial_state=state).step()
     since = rig.t
     rig.step(1, **order)
@@ -77,7 +90,9 @@ def test_a_client_that_asks_whether_the_arm_is_busy_since_a_move_that_is_refused
 @pytest.mark.parametrize("start", [HOME, GOAL])
 @pytest.mark.parametrize("power_time", ["0 s", "100 ms"])
 def test_homing_takes_time_even_where_the_arm_is_at_home(start, power_time):
-    rig = Rig({"PSM1": {"instrument": "400006", "start": start}}, initial_state="disabled", power_time=power_time).step()
+    rig = Rig(
+        {"PSM1": {"instrument": "400006", "start": start}}, initial_state="disabled", power_time=power_time
+    ).step()
     assert Client(rig).wait(state_command=command("home")) > 1
     assert rig.states()[-1] == ("ENABLED", True, False)
 
@@ -98,7 +113,10 @@ class TestLatchedCommands:
         Client(rig).wait(state_command=home)
         rig.step(1, state_command=command("disable", 1_700_000_050_000_000_000))
         rig.step(200, state_command=home)
-        assert rig.said("warning") == ["PSM1: state_command 'home' of time 1700000000.123456789 s is refused: it was heeded before; a new one has a new stamp"]
+        assert rig.said("warning") == [
+            "PSM1: state_command 'home' of time 1700000000.123456789 s is refused: it was heeded before; a"
+            " new one has a new stamp"
+        ]
         assert not rig.states()
         assert rig.mode == [0, 0]
 
@@ -111,7 +129,11 @@ class TestLatchedCommands:
             assert rig.states() == [("DISABLED", True, False)]
 
     def test_different_commands_of_the_same_time_are_all_heeded(self):
-        rig = Rig(initial_state="disabled").step().step(1, state_command=(command("enable", 10), command("home", 10)))
+        rig = (
+            Rig(initial_state="disabled")
+            .step()
+            .step(1, state_command=(command("enable", 10), command("home", 10)))
+        )
         assert not rig.said("warning")
         assert rig.until_idle().states() == [("ENABLED", True, False)]
 
@@ -153,16 +175,19 @@ def test_what_an_arm_holds_is_told_once_at_time_0():
     assert rig.said("endoscope_type", "ECM") == ["Classic_SD_UP"]
     rig.step(200, state_command=command("disable"))
     assert not rig.said("tool_type")
-    assert {port.name for port in rig.motion.ports if port.name.endswith("_type") and port.causality == "output"} == {
-        f"PSM{i}/tool_type" for i in (1, 2, 3)
-    } | {"ECM/endoscope_type"}
+    assert {
+        port.name for port in rig.motion.ports if port.name.endswith("_type") and port.causality == "output"
+    } == {f"PSM{i}/tool_type" for i in (1, 2, 3)} | {"ECM/endoscope_type"}
 
 
 @pytest.mark.parametrize(
     ("order", "reason"),
     [
         ({"set_tool_type": StringMessage(data="LARGE_NEEDLE_DRIVER:400006")}, None),
-        ({"set_tool_type": StringMessage(data="CADIERE_FORCEPS:400049[..]")}, "'CADIERE_FORCEPS:400049[..]', the arm holds LARGE_NEEDLE_DRIVER:400006[..]"),
+        (
+            {"set_tool_type": StringMessage(data="CADIERE_FORCEPS:400049[..]")},
+            "'CADIERE_FORCEPS:400049[..]', the arm holds LARGE_NEEDLE_DRIVER:400006[..]",
+        ),
         ({"emulate_tool_present": BoolMessage(data=True)}, None),
         ({"emulate_tool_present": BoolMessage(data=False)}, "nobody is there to take it off"),
         ({"emulate_adapter_present": BoolMessage(data=False)}, "nobody is there to take it off"),
@@ -172,7 +197,9 @@ def test_what_an_arm_holds_is_not_a_client_s_to_change(order, reason):
     rig = Rig(initial_state="disabled").step().step(1, **order)
     if reason is None:
         assert not rig.said("error")
-        assert rig.said("tool_type") == (["LARGE_NEEDLE_DRIVER:400006[..]"] if "set_tool_type" in order else [])
+        assert rig.said("tool_type") == (
+            ["LARGE_NEEDLE_DRIVER:400006[..]"] if "set_tool_type" in order else []
+        )
     else:
         assert reason in rig.said("error")[0]
 
@@ -212,17 +239,28 @@ class TestKnownWeight:
         assert not self.told(rig, "PSM1").any()
         rig.step(1, ECM__use_gravity_compensation=BoolMessage(data=False))
         assert not self.told(rig).any()
-        rig.step(1, ECM__use_gravity_compensation=BoolMessage(data=True), ECM__state_command=command("disable"))
+        rig.step(
+            1, ECM__use_gravity_compensation=BoolMessage(data=True), ECM__state_command=command("disable")
+        )
         assert not self.told(rig).any()
 
 
 @pytest.mark.parametrize("arm", CART)
 def test_the_kinematics_services_agree_with_what_is_told(arm):
-    """With the base frame from `SUJ/<arm>/measured_cp` `forward_kinematics` gives `measured_cp`, and `inverse_kinematics` leads back from `local/`."""
+    """With the base frame from `SUJ/<arm>/measured_cp` `forward_kinematics` gives `measured_cp`, and
+    `inverse_kinematics` leads back from `local/`.
+    """
     rig = Rig(CART).step(10)
-    told = {name: rig.outputs[f"{arm}/{name}"] for name in ("measured_js", "measured_cp", "local/measured_cp")}
-    queries, jp_told = KinematicsQueries(arms.chain(arm)), told["measured_js"][: told["measured_js"].size // 3]
-    assert np.allclose(queries.forward(jp_told, rig.outputs[f"SUJ/{arm}/measured_cp"]).value, told["measured_cp"], atol=1e-12)
+    told = {
+        name: rig.outputs[f"{arm}/{name}"] for name in ("measured_js", "measured_cp", "local/measured_cp")
+    }
+    queries, jp_told = (
+        KinematicsQueries(arms.chain(arm)),
+        told["measured_js"][: told["measured_js"].size // 3],
+    )
+    assert np.allclose(
+        queries.forward(jp_told, rig.outputs[f"SUJ/{arm}/measured_cp"]).value, told["measured_cp"], atol=1e-12
+    )
     assert np.allclose(queries.forward(jp_told).value, told["local/measured_cp"], atol=1e-12)
     assert np.allclose(queries.inverse(told["local/measured_cp"], jp_told + 0.01).value, jp_told, atol=1e-9)
 
@@ -237,6 +275,8 @@ jaw/servo_jp jaw/move_jp jaw/servo_jf set_tool_type emulate_tool_present emulate
 
 @pytest.mark.parametrize(("names", "causality"), [(READ, "output"), (WRITTEN, "input")])
 def test_what_the_real_system_publishes_and_subscribes_to_is_there(names, causality):
-    """What jhu-cisst/cisst-ros bridges of a PSM of sawIntuitiveResearchKit; services, and buttons of the arm itself, aside."""
+    """What jhu-cisst/cisst-ros bridges of a PSM of sawIntuitiveResearchKit; services, and buttons of the arm
+    itself, aside.
+    """
     ports = {port.name: port.causality for port in Rig(PSM1).motion.ports}
     assert {name for name in names.split() if ports.get(f"PSM1/{name}") != causality} == set()

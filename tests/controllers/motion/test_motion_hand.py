@@ -20,7 +20,9 @@ def closings(rig):
 
 def test_the_contract_of_participants_is_kept():
     params = MotionParams.model_validate({"arms": ARM, "initial_state": "homed"})
-    check_engine(lambda: MotionController("motion", params), period_ns=H, inputs={"PSM1/hand/move_jp": (jp(*OPEN),)})
+    check_engine(
+        lambda: MotionController("motion", params), period_ns=H, inputs={"PSM1/hand/move_jp": (jp(*OPEN),)}
+    )
 
 
 def test_a_hand_moves_while_the_arm_does():
@@ -65,7 +67,9 @@ def test_a_pose_of_the_tip_is_reached_as_far_as_four_joints_go():
     rig.step(move_cp=cp([*tip, 0.70710678, 0.70710678, 0.0, 0.0], "PSM1_base"))
     rig.until_idle()
     assert np.allclose(chain.forward(rig.setpoint)[:3, 3], tip, atol=1e-9)
-    assert "four joints leave" in rig.step(move_cp=cp([*tip, 0.0, 0.0, 0.0, 1.0], "PSM1_base")).said("error")[0]
+    assert (
+        "four joints leave" in rig.step(move_cp=cp([*tip, 0.0, 0.0, 0.0, 1.0], "PSM1_base")).said("error")[0]
+    )
 
 
 def test_a_start_that_is_not_that_of_the_arm_is_refused():
@@ -74,9 +78,13 @@ def test_a_start_that_is_not_that_of_the_arm_is_refused():
 
 
 def test_a_routine_names_the_mode():
-    (step,) = RoutineParams.model_validate({"steps": [{"do": "hand", "arm": "PSM1", "mode": "caliper", "closing": 0.4}]}).steps
+    (step,) = RoutineParams.model_validate(
+        {"steps": [{"do": "hand", "arm": "PSM1", "mode": "caliper", "closing": 0.4}]}
+    ).steps
     port, message = step.message()
     assert port == "PSM1/hand/move_jp"
     assert np.allclose(message.position, HAND.command("caliper", 0.4))
     with pytest.raises(ValidationError, match="closing"):
-        RoutineParams.model_validate({"steps": [{"do": "hand", "arm": "PSM1", "mode": "grasp", "closing": 2}]})
+        RoutineParams.model_validate(
+            {"steps": [{"do": "hand", "arm": "PSM1", "mode": "grasp", "closing": 2}]}
+        )

@@ -31,7 +31,11 @@ def start_of(port: Port):
 
 
 ONE = {"PSM1": {"instrument": "400006"}}
-SEVERAL = {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400049"}, "ECM": {"start": [0.2, 0.3, 0.1, 0.1]}}
+SEVERAL = {
+    "PSM1": {"instrument": "400006"},
+    "PSM2": {"instrument": "400049"},
+    "ECM": {"start": [0.2, 0.3, 0.1, 0.1]},
+}
 
 
 class Bench:
@@ -40,15 +44,26 @@ class Bench:
     def __init__(self, arms=ONE, mounting="free"):
         scene = {"arms": arms, "mounting": mounting}
         self.robot = MujocoEngine("robot", MujocoParams.model_validate({**scene, "looks": False}))
-        self.motion = MotionController("motion", MotionParams.model_validate({**scene, "initial_state": "homed"}))
-        self.values = {p: {q.name: start_of(q) for q in p.ports if q.causality == "input" and q.variability == "signal"} for p in (self.robot, self.motion)}
+        self.motion = MotionController(
+            "motion", MotionParams.model_validate({**scene, "initial_state": "homed"})
+        )
+        self.values = {
+            p: {q.name: start_of(q) for q in p.ports if q.causality == "input" and q.variability == "signal"}
+            for p in (self.robot, self.motion)
+        }
         self.sensed = dict(self.robot.configure(Setup(H, Path())))
         self.told = dict(self.motion.configure(Setup(H, Path())))
         self.t, self.complaints = 0, []
 
     def step(self, count=1, **orders):
-        """Step; orders of the first step by port, `__` for `/`; PSM1's unless they name an arm. Return PSM1's positions."""
-        events = {name if name.startswith(("PSM", "ECM")) else f"PSM1/{name}": (order,) for name, order in orders.items()}
+        """Step; orders of the first step by port, `__` for `/`; PSM1's unless they name an arm.
+
+        Return PSM1's positions.
+        """
+        events = {
+            name if name.startswith(("PSM", "ECM")) else f"PSM1/{name}": (order,)
+            for name, order in orders.items()
+        }
         events = {name.replace("__", "/"): order for name, order in events.items()}
         for _ in range(count):
             for name in self.values[self.motion]:
@@ -56,7 +71,12 @@ class Bench:
             inputs = Inputs(self.values[self.motion])
             inputs._events, events = events, {}
             self.told = self.motion.step(self.t, H, inputs)
-            self.complaints += [said.data for name, heard in self.told.items() if name.endswith(("/error", "/warning")) for said in heard]
+            self.complaints += [
+                said.data
+                for name, heard in self.told.items()
+                if name.endswith(("/error", "/warning"))
+                for said in heard
+            ]
             for name in self.values[self.robot]:
                 self.values[self.robot][name] = np.array(self.told[f"drive/{name}"])
             self.sensed = self.robot.step(self.t, H, Inputs(self.values[self.robot]))
@@ -81,7 +101,9 @@ def test_move_jp_ends_within_a_tenth_of_a_millimetre_and_of_a_degree():
     for _ in range(2500):
         measured = bench.step()
     one, other = CHAIN.forward(measured), CHAIN.forward(goal)
-    turn = rotation.log(rotation.product(rotation.from_matrix(one), rotation.conjugate(rotation.from_matrix(other))))
+    turn = rotation.log(
+        rotation.product(rotation.from_matrix(one), rotation.conjugate(rotation.from_matrix(other)))
+    )
     assert not bench.complaints
     assert np.linalg.norm(one[:3, 3] - other[:3, 3]) < 1e-4
     assert np.degrees(np.linalg.norm(turn)) < 0.1
@@ -102,7 +124,11 @@ def test_servo_cp_tracks_a_circle_of_40_mm_at_a_quarter_of_a_hertz_within_a_mill
 
 def test_several_arms_work_at_once():
     bench = Bench(SEVERAL, "cart")
-    goals = {"PSM1": np.array([0.3, -0.2, 0.16, 0.5, 0.3, -0.4]), "PSM2": np.array([-0.3, 0.1, 0.09, -0.5, -0.2, 0.3]), "ECM": np.array([0.1, 0.2, 0.14, -0.2])}
+    goals = {
+        "PSM1": np.array([0.3, -0.2, 0.16, 0.5, 0.3, -0.4]),
+        "PSM2": np.array([-0.3, 0.1, 0.09, -0.5, -0.2, 0.3]),
+        "ECM": np.array([0.1, 0.2, 0.14, -0.2]),
+    }
     bench.step(50)
     bench.step(3000, **{f"{arm}__move_jp": jp(*goal) for arm, goal in goals.items()})
     assert not bench.complaints
@@ -115,8 +141,13 @@ def test_several_arms_work_at_once():
     assert np.allclose(seen, base[:3, :3] @ bench.tip("PSM2") + base[:3, 3], rtol=0.0, atol=1e-4)
 
 
-@pytest.mark.parametrize(("arm", "body", "force", "drift"), [("PSM1", "PSM1/insertion", 6.0, 5e-4), ("ECM", "ECM/roll", 150.0, 1e-9)])
-def test_an_arm_that_is_free_is_held_against_gravity_gives_way_to_a_push_and_stays_where_it_is_held(arm, body, force, drift):
+@pytest.mark.parametrize(
+    ("arm", "body", "force", "drift"),
+    [("PSM1", "PSM1/insertion", 6.0, 5e-4), ("ECM", "ECM/roll", 150.0, 1e-9)],
+)
+def test_an_arm_that_is_free_is_held_against_gravity_gives_way_to_a_push_and_stays_where_it_is_held(
+    arm, body, force, drift
+):
     bench = Bench(SEVERAL, "cart")
     bench.step(100)
     there = bench.tip(arm)
@@ -142,7 +173,10 @@ def test_a_tip_is_held_by_the_springs_of_an_impedance_and_comes_back():
     bench.step(200)
     here = bench.told["PSM1/local/measured_cp"].copy()
     sides = {f"position_{side}": {"p": (-k, -k, -k), "d": (-8, -8, -8)} for side in ("positive", "negative")}
-    sides |= {f"orientation_{side}": {"p": (-0.3, -0.3, -0.3), "d": (-0.005, -0.005, -0.005)} for side in ("positive", "negative")}
+    sides |= {
+        f"orientation_{side}": {"p": (-0.3, -0.3, -0.3), "d": (-0.005, -0.005, -0.005)}
+        for side in ("positive", "negative")
+    }
     bench.step(1000, servo_ci=ci(here, **sides))
     rest = bench.tip("PSM1")
     bench.push("PSM1/wrist_yaw", [4.0, 0.0, 0.0])
@@ -158,7 +192,10 @@ def test_a_tip_is_held_by_the_springs_of_an_impedance_and_comes_back():
 
 def test_an_arm_without_torque_sinks_where_a_free_one_does_not():
     moved = {}
-    for name, order in {"disable": {"state_command": StringStamped(string="disable")}, "free": {"free": EMPTY}}.items():
+    for name, order in {
+        "disable": {"state_command": StringStamped(string="disable")},
+        "free": {"free": EMPTY},
+    }.items():
         bench = Bench()
         bench.step(50)
         there = bench.position("PSM1")
@@ -186,7 +223,10 @@ def test_gravity_compensation_of_the_endoscope_can_be_switched_off_and_on():
     sagged = insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=False))
     assert bench.told["drive/ECM/control_mode"][0] == 3
     assert 5e-4 < sagged - there < 1.5 * ENDOSCOPE_MASS["Classic_SD"] * STANDARD_GRAVITY / 10_000.0
-    assert insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=True)) == pytest.approx(there, abs=2e-4)  # friction lets it back slowly
+    # friction lets it back slowly
+    assert insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=True)) == pytest.approx(
+        there, abs=2e-4
+    )
     there = insertion_after(300, ECM__free=EMPTY)
     assert insertion_after(500, ECM__use_gravity_compensation=BoolMessage(data=False)) - there > 5e-3
     assert not bench.complaints

@@ -61,5 +61,7 @@ def test_wildcards_join_every_arm_both_ways_and_all_reach_their_goals(file):
 def test_an_order_out_of_range_ends_the_session_with_the_reason_and_the_range(file):
     bad = "participants.routine.steps=[{do: move_jp, arm: PSM2, positions: [0, 0, 0.5, 0, 0, 0]}]"
     session = launch(load(file, [bad]), endpoint=free_endpoint(range(1)), one_host=True)
-    with pytest.raises(ParticipantError, match=r"PSM2: move_jp refused: joint insertion at 0\.5 m, allowed are 0 \.\. 0\.24"):
+    with pytest.raises(
+        ParticipantError, match=r"PSM2: move_jp refused: joint insertion at 0\.5 m, allowed are 0 \.\. 0\.24"
+    ):
         session.run()

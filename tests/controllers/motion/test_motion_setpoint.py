@@ -39,7 +39,8 @@ def test_a_move_ends_exactly_at_its_goal_and_keeps_to_the_limits_of_trajectories
     assert (np.abs(v) <= CHAIN.velocity * (1 + 1e-9)).all()
     assert (np.abs(a) <= CHAIN.acceleration * (1 + 1e-6)).all()
     assert (np.abs(np.diff(a, axis=0)) / H <= CHAIN.jerk * (1 + 1e-4)).all()
-    assert np.isclose(np.abs(a).max(axis=0) / CHAIN.acceleration, 1.0, rtol=0.02).any()  # time-optimal: some joint is at its limit
+    # time-optimal: some joint is at its limit
+    assert np.isclose(np.abs(a).max(axis=0) / CHAIN.acceleration, 1.0, rtol=0.02).any()
 
 
 @pytest.mark.parametrize("ratios", [(0.25, 0.25), (0.25, 1.0), (1.0, 0.25)])
@@ -135,14 +136,22 @@ def test_a_move_from_full_speed_towards_a_limit_brakes_first():
     assert (q[-1] == START).all()
 
 
-goals = st.tuples(*[st.floats(0.0, 1.0)] * 6).map(lambda share: CHAIN.lower + np.array(share) * (CHAIN.upper - CHAIN.lower))
-orders = st.lists(st.tuples(st.sampled_from(["follow", "move", "slow", "brake", "wait"]), goals, st.integers(1, 150)), min_size=1, max_size=12)
+goals = st.tuples(*[st.floats(0.0, 1.0)] * 6).map(
+    lambda share: CHAIN.lower + np.array(share) * (CHAIN.upper - CHAIN.lower)
+)
+orders = st.lists(
+    st.tuples(st.sampled_from(["follow", "move", "slow", "brake", "wait"]), goals, st.integers(1, 150)),
+    min_size=1,
+    max_size=12,
+)
 
 
 @settings(max_examples=80, deadline=None)
 @given(goals, orders)
 def test_nothing_ever_jumps(start, orders):
-    """Whatever is asked for, at any moment: range, velocity and acceleration are kept, and position is the velocity's integral."""
+    """Whatever is asked for, at any moment: range, velocity and acceleration are kept, and position is the
+    velocity's integral.
+    """
     made = setpoint(start)
     for order, goal, steps in orders:
         if order == "follow":
@@ -168,7 +177,9 @@ def test_a_saved_state_goes_on_with_the_same_bits(goal, other, steps, order):
     made, again = setpoint(), setpoint()
     made.move(goal, FULL)
     run(made, steps)
-    {"follow": lambda: made.follow(other, H), "move": lambda: made.move(other, FULL), "brake": made.brake}[order]()
+    {"follow": lambda: made.follow(other, H), "move": lambda: made.move(other, FULL), "brake": made.brake}[
+        order
+    ]()
     run(made, 20)
     again.state[:] = made.state
     again.restored()

@@ -15,14 +15,23 @@ H = 1_000_000
 
 
 class Session:
-    """Inputs are vectors to write to; outputs are those of the last step; what was said since the start is kept."""
+    """Inputs are vectors to write to; outputs are those of the last step; what was said since the start is
+    kept.
+    """
 
     def __init__(self, **params):
         self.teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate(params))
         self.params, self.chain = self.teleoperation.params, self.teleoperation.params.chain
         self.outputs = self.teleoperation.configure(Setup(period_ns=H, directory=Path()))
-        values = {port.name: np.array(port.start or ()) for port in self.teleoperation.ports if port.causality == "input"}
-        self.values = values | {"master": np.array([0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0]), "master_twist": np.zeros(6)}
+        values = {
+            port.name: np.array(port.start or ())
+            for port in self.teleoperation.ports
+            if port.causality == "input"
+        }
+        self.values = values | {
+            "master": np.array([0.3, -0.1, 0.2, 0.0, 0.0, 0.0, 1.0]),
+            "master_twist": np.zeros(6),
+        }
         self.values["base_in_view"] = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         self.inputs = Inputs(self.values)
         self.states, self.warnings, self.t = [], [], 0
@@ -33,7 +42,9 @@ class Session:
     scale = property(lambda self: self.values["scale"])
 
     def step(self, *clutch, stale=False, count=1, arm=None):
-        """Step; `clutch`: lists of buttons, each an event of the first step; `arm`: an operating state and whether it is homed."""
+        """Step; `clutch`: lists of buttons, each an event of the first step; `arm`: an operating state and
+        whether it is homed.
+        """
         self.inputs._stale = {"master"} if stale else set()
         self.inputs._events = {"buttons": tuple(Joy(buttons=buttons) for buttons in clutch)}
         if arm is not None:

@@ -12,7 +12,11 @@ from controllers.teleoperation.contact_estimate import ContactEstimate
 DT, SCALE = 0.004, 0.2
 FREE = np.zeros(3)
 numbers = st.floats(-1.0, 1.0)
-directions = st.tuples(numbers, numbers, numbers).filter(lambda v: np.linalg.norm(v) > 1e-3).map(lambda v: np.array(v) / np.linalg.norm(v))
+directions = (
+    st.tuples(numbers, numbers, numbers)
+    .filter(lambda v: np.linalg.norm(v) > 1e-3)
+    .map(lambda v: np.array(v) / np.linalg.norm(v))
+)
 
 
 def estimate():
@@ -31,7 +35,8 @@ def test_a_spring_is_found_where_it_is_and_as_stiff_as_it_is(stiffness, normal):
     surface = press(estimate(), stiffness, normal, [*np.linspace(-0.005, 0.005, 250), *np.full(250, 0.005)])
     assert np.allclose(surface.normal, normal, atol=1e-9)
     depth = surface.depth(-0.005 * normal)
-    assert 0.005 - 0.05 / stiffness - 5e-5 < depth < 0.005 + 0.02 * 0.01  # noticed from 0.05 N on, in means over 20 ms at 10 mm/s
+    # noticed from 0.05 N on, in means over 20 ms at 10 mm/s
+    assert 0.005 - 0.05 / stiffness - 5e-5 < depth < 0.005 + 0.02 * 0.01
     assert surface.stiffness * depth == pytest.approx(stiffness * 0.005, rel=1e-3)
 
 
@@ -43,11 +48,20 @@ def test_a_tip_that_moves_on_is_deeper_at_once():
     assert surface.depth(-0.005 * up) == pytest.approx(before + 0.001, abs=1e-6)
 
 
-moves = st.lists(st.tuples(st.tuples(numbers, numbers, numbers), st.tuples(numbers, numbers, numbers), st.sampled_from([0.001, 0.004, 0.02])), max_size=40)
+moves = st.lists(
+    st.tuples(
+        st.tuples(numbers, numbers, numbers),
+        st.tuples(numbers, numbers, numbers),
+        st.sampled_from([0.001, 0.004, 0.02]),
+    ),
+    max_size=40,
+)
 
 
 @given(moves)
-def test_it_claims_no_more_than_was_measured_but_for_what_fades_in_20_ms_and_the_force_lies_in_the_cone(moves):
+def test_it_claims_no_more_than_was_measured_but_for_what_fades_in_20_ms_and_the_force_lies_in_the_cone(
+    moves,
+):
     """Of force and tip their means over 20 ms count."""
     surface, tip, mean, force = estimate(), np.zeros(3), np.zeros(3), np.zeros(3)
     for i, (move, newest, dt) in enumerate(moves):
@@ -62,7 +76,9 @@ def test_it_claims_no_more_than_was_measured_but_for_what_fades_in_20_ms_and_the
             assert np.linalg.norm(surface.normal) == pytest.approx(1.0)
             assert np.arccos(min(1.0, push / size)) < atan(0.5) + 1e-6
             assert depth > 0.0
-            assert surface.stiffness * depth <= push + max(0.0, before * depth - push) * exp(-dt / 0.02) + 1e-9
+            assert (
+                surface.stiffness * depth <= push + max(0.0, before * depth - push) * exp(-dt / 0.02) + 1e-9
+            )
             assert 0.0 <= surface.friction <= 0.5 + 1e-6
 
 
@@ -102,7 +118,9 @@ def test_what_gives_way_is_a_surface_at_the_tip_and_what_is_left_is_remembered_n
 
 
 def test_the_first_touch_is_felt_softly():
-    """With a hand that comes out of a link late, the tip is deep before anything is known: the force grows over 0.1 s."""
+    """With a hand that comes out of a link late, the tip is deep before anything is known: the force grows
+    over 0.1 s.
+    """
     surface, forces = estimate(), []
     for _ in range(100):
         surface.update(np.array([0.0, 0.0, -0.005]), np.array([0.0, 0.0, 1.0]), SCALE, DT)

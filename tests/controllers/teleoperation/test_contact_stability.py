@@ -1,4 +1,6 @@
-"""A simulated hand that touches through delayed links comes to rest and feels what the tip feels; the study of bench/haptic_stability.py, in short."""
+"""A simulated hand that touches through delayed links comes to rest and feels what the tip feels; the study
+of bench/haptic_stability.py, in short.
+"""
 
 from dataclasses import replace
 
@@ -20,7 +22,10 @@ def test_the_hand_comes_to_rest_at_any_delay(case, delay):
 
 def test_the_obvious_estimate_swings_and_the_study_shows_it():
     """A surface that follows from the newest force and the stiffest plane allowed, at 100 ms."""
-    assert study.figures(study.run(replace(study.CASES["spring, 300 N/m"], delay=0.1), study.Naive()))["swing_m"] > 2e-3
+    assert (
+        study.figures(study.run(replace(study.CASES["spring, 300 N/m"], delay=0.1), study.Naive()))["swing_m"]
+        > 2e-3
+    )
 
 
 @pytest.mark.parametrize("stiffness", [50.0, 200.0, 400.0])

@@ -121,7 +121,11 @@ def test_another_scale_does_not_move_the_tip():
 
 
 moves = st.lists(
-    st.tuples(st.sampled_from(["follow", "press", "release", "both", "silent"]), *[st.floats(-0.2, 0.2)] * 3, *[st.floats(-1.5, 1.5)] * 3),
+    st.tuples(
+        st.sampled_from(["follow", "press", "release", "both", "silent"]),
+        *[st.floats(-0.2, 0.2)] * 3,
+        *[st.floats(-1.5, 1.5)] * 3,
+    ),
     min_size=5,
     max_size=25,
 )
@@ -130,7 +134,9 @@ moves = st.lists(
 @settings(max_examples=60, deadline=None)
 @given(moves, st.sampled_from(["hold", "follow"]))
 def test_the_command_never_jumps(moves, orientation):
-    """Whatever the hand does while it is free, the first step after moves nothing; no step is ever faster than the joints are."""
+    """Whatever the hand does while it is free, the first step after moves nothing; no step is ever faster
+    than the joints are.
+    """
     session = Session(orientation=orientation)
     session.step()
     most = CHAIN.velocity * H * 1e-9 * (1 + 1e-9)
@@ -146,7 +152,9 @@ def test_the_command_never_jumps(moves, orientation):
         assert (session.outputs["servo_jp"] <= CHAIN.upper).all()
         if away or move in ("press", "both", "silent"):
             assert np.linalg.norm(session.tip - tip) < 1e-9
-        away = move in ("press", "silent") or (away and session.teleoperation._engagement.phase is Phase.CLUTCHED)
+        away = move in ("press", "silent") or (
+            away and session.teleoperation._engagement.phase is Phase.CLUTCHED
+        )
 
 
 PARAMS = {
@@ -160,15 +168,32 @@ PARAMS = {
 }
 
 
-BAD_DAYS = ("lead", "lead", "leap", "press", "release", "both", "silent", "scale", "view", "off", "on", "gripper")
+BAD_DAYS = (
+    "lead",
+    "lead",
+    "leap",
+    "press",
+    "release",
+    "both",
+    "silent",
+    "scale",
+    "view",
+    "off",
+    "on",
+    "gripper",
+)
 
 
 @settings(max_examples=80, deadline=None)
 @given(
-    st.sampled_from(["hold", "follow", "velocity", "held", "gate", "camera"]), st.lists(st.sampled_from(BAD_DAYS), min_size=5, max_size=40), st.integers(0, 99)
+    st.sampled_from(["hold", "follow", "velocity", "held", "gate", "camera"]),
+    st.lists(st.sampled_from(BAD_DAYS), min_size=5, max_size=40),
+    st.integers(0, 99),
 )
 def test_whatever_happens_the_arm_holds_or_follows_within_its_limits(mode, days, seed):
-    """Nobody who does not follow moves; whoever takes over moves nothing in that step; nothing is faster or further than the joints are."""
+    """Nobody who does not follow moves; whoever takes over moves nothing in that step; nothing is faster or
+    further than the joints are.
+    """
     session, random, ready = Session(**PARAMS[mode]), np.random.default_rng(seed), True
     chain = session.chain
     session.step()
@@ -180,7 +205,9 @@ def test_whatever_happens_the_arm_holds_or_follows_within_its_limits(mode, days,
         session.scale[0] = random.uniform(-0.1, 1.2) if day == "scale" else session.scale[0]
         if day == "view":
             session.values["base_in_view"][3:] = rotation.exp(random.normal(0.0, 1.0, 3))
-        session.values["gripper"][0] = random.uniform(-0.5, 1.5) if day == "gripper" else session.values["gripper"][0]
+        session.values["gripper"][0] = (
+            random.uniform(-0.5, 1.5) if day == "gripper" else session.values["gripper"][0]
+        )
         events = {"press": [[1, 1]], "release": [[0, 0]], "both": [[1, 0], [0, 1]]}.get(day, [])
         arm = {"off": ("PAUSED", True), "on": ("ENABLED", True)}.get(day)
         ready = ready if arm is None else arm[0] == "ENABLED"
@@ -213,7 +240,10 @@ def wander(session, steps, seed):
 @pytest.mark.parametrize("params", PARAMS.values(), ids=PARAMS.keys())
 def test_restore_returns_to_the_same_bits(params):
     session = wander(Session(**params), 50, seed=1)
-    saved, values = session.teleoperation.save(), {name: value.copy() for name, value in session.values.items()}
+    saved, values = (
+        session.teleoperation.save(),
+        {name: value.copy() for name, value in session.values.items()},
+    )
     expected = wander(session, 50, seed=2).teleoperation.state_hash()
     for again in (session, Session(**params)):
         again.teleoperation.restore(saved)
@@ -240,7 +270,9 @@ def test_a_state_of_another_size_is_refused():
 
 
 def test_the_hand_feels_a_plane_of_the_scenario_where_the_tip_meets_it():
-    """The tip starts 0.1 mm above the plane: at scale 0.2 that is 0.5 mm of the hand, along the master's z that points as the arm's does."""
+    """The tip starts 0.1 mm above the plane: at scale 0.2 that is 0.5 mm of the hand, along the master's z
+    that points as the arm's does.
+    """
     session = Session(**PARAMS["table"], scale=0.2, force={"scale": 2.0})
     session.step()
     (plane,) = session.outputs["contact"].planes
@@ -256,7 +288,9 @@ def test_the_hand_feels_a_plane_of_the_scenario_where_the_tip_meets_it():
 
 
 def test_by_the_velocity_law_the_hand_feels_what_is_ahead_of_the_tip_ahead_of_itself():
-    """The tip points down onto the plane, the hand wherever it likes: the plane is met along the hand's own z."""
+    """The tip points down onto the plane, the hand wherever it likes: the plane is met along the hand's own
+    z.
+    """
     session = Session(**PARAMS["table"], law="velocity", scale=0.2)
     session.hand[3:] = rotation.exp(np.array([0.4, 1.0, -0.2]))
     session.step()
@@ -278,7 +312,7 @@ def test_contact_is_told_at_its_own_period():
 def test_the_arms_controller_is_told_commands_only_while_the_arm_follows():
     session = Session(instrument="400006")
     session.step()
-    ((command,), (jaw,)) = session.outputs["PSM1/servo_jp"], session.outputs["PSM1/jaw/servo_jp"]
+    (command,), (jaw,) = session.outputs["PSM1/servo_jp"], session.outputs["PSM1/jaw/servo_jp"]
     assert np.array_equal(command.position, session.outputs["servo_jp"])
     assert np.array_equal(jaw.position, session.outputs["jaw/servo_jp"])
     assert command.header.stamp.ns == session.t

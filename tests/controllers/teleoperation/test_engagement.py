@@ -39,7 +39,9 @@ def test_a_master_that_falls_silent_is_told_once_and_comes_back():
     assert session.warnings == ["PSM1 holds: its master has been silent for more than 100 ms"]
 
 
-@pytest.mark.parametrize("state", [("DISABLED", False), ("DISABLED", True), ("ENABLED", False), ("PAUSED", True), ("FAULT", True)])
+@pytest.mark.parametrize(
+    "state", [("DISABLED", False), ("DISABLED", True), ("ENABLED", False), ("PAUSED", True), ("FAULT", True)]
+)
 def test_an_arm_that_is_not_ready_is_not_led_and_starts_from_where_it_is_when_it_is(state):
     session = Session()
     session.step()
@@ -146,7 +148,9 @@ def test_the_gate_opens_to_a_hand_that_matches_and_is_seen_to_be_held():
 
 
 def test_a_gripper_that_opens_and_closes_shows_that_somebody_is_there():
-    """From 40 degrees on or, as roll and gripper count together, from 0.8 (40 + 4) = 35.2 degrees without any roll."""
+    """From 40 degrees on or, as roll and gripper count together, from 0.8 (40 + 4) = 35.2 degrees without any
+    roll.
+    """
     session = matched()
     session.values["gripper"][0] = 0.2
     session.step(count=3)
@@ -190,7 +194,10 @@ def test_whoever_waits_is_told_every_two_seconds_what_to_do():
     session.step(count=4_100)
     tilt(session, np.radians(-30.0))
     session.step(count=2_000)
-    turned = "PSM1 waits: the hand is turned 30.0 deg away from the instrument, allowed are 5; turn it as the instrument is"
+    turned = (
+        "PSM1 waits: the hand is turned 30.0 deg away from the instrument, allowed are 5; turn it as the"
+        " instrument is"
+    )
     unseen = "PSM1 waits: nobody seems to hold the master; roll it by 4 deg, or move its gripper by 40"
     assert session.warnings == [turned, turned, unseen]
 

@@ -1,4 +1,6 @@
-"""A hand feels through a whole session what the robot touches: the installed scene of the virtual table, and a table that is there."""
+"""A hand feels through a whole session what the robot touches: the installed scene of the virtual table, and
+a table that is there.
+"""
 
 import json
 
@@ -19,7 +21,10 @@ def run(file):
 
 
 def test_the_virtual_table_pushes_with_200_n_per_m(tmp_path):
-    """It shares the way of 7.5 mm with the grip, which is as stiff. The scene ends early here, before the hand rubs."""
+    """It shares the way of 7.5 mm with the grip, which is as stiff.
+
+    The scene ends early here, before the hand rubs.
+    """
     file = tmp_path / "table.yaml"
     text = installed_scenarios()["table"].read_text()
     file.write_text(text.replace("duration: 10 s", "duration: 3.6 s").replace("after: 9 s", "after: 3.2 s"))
@@ -31,21 +36,38 @@ def test_the_virtual_table_pushes_with_200_n_per_m(tmp_path):
 
 
 def test_a_rigid_table_is_felt_through_a_link_and_the_hand_rests_on_it(tmp_path):
-    """The table is 12.5 mm below the probe, 25 mm of the hand, which presses 5 mm on; of those the grip takes two thirds, being half as stiff as 400 N/m."""
-    path = [{"at": 0, "position": [0, 0, 0]}, {"at": 0.1, "buttons": [0]}, {"at": 1.6, "position": [0, 0, -0.03]}]
+    """The table is 12.5 mm below the probe, 25 mm of the hand, which presses 5 mm on; of those the grip takes
+    two thirds, being half as stiff as 400 N/m.
+    """
+    path = [
+        {"at": 0, "position": [0, 0, 0]},
+        {"at": 0.1, "buttons": [0]},
+        {"at": 1.6, "position": [0, 0, -0.03]},
+    ]
     scenario = {
         "name": "rigid_table",
         "step": "1 ms",
         "window": 4,
         "duration": "3.2 s",
         "participants": {
-            "stylus": {"kind": "simulated-touch", "period": "4 ms", "styluses": {"right": {"path": path}}, "link": {"preset": "100 ms"}},
+            "stylus": {
+                "kind": "simulated-touch",
+                "period": "4 ms",
+                "styluses": {"right": {"path": path}},
+                "link": {"preset": "100 ms"},
+            },
             "teleop": {"kind": "teleoperation", "period": "4 ms", "engage": "held", "scale": 0.5},
             "robot": {
                 "kind": "mujoco",
                 "looks": False,
                 "table": {"position": [0, 0, 0]},
-                "arms": {"PSM1": {"instrument": "palpation-probe", "probe_radius": "5 mm", "position": [0, 0, "131 mm"]}},
+                "arms": {
+                    "PSM1": {
+                        "instrument": "palpation-probe",
+                        "probe_radius": "5 mm",
+                        "position": [0, 0, "131 mm"],
+                    }
+                },
             },
         },
         "order": ["teleop", "robot"],

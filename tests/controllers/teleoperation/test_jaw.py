@@ -82,4 +82,6 @@ def test_what_rolls_a_needle_stays_and_what_has_no_jaw_has_no_port():
     session.step([0, 1], count=50)
     assert session.outputs["jaw/servo_jp"][1] == 0.7
     for name in ("palpation-probe", "MUSHA_HAND"):
-        assert not [port.name for port in Session(instrument=name).teleoperation.ports if port.name.startswith("jaw")]
+        assert not [
+            port.name for port in Session(instrument=name).teleoperation.ports if port.name.startswith("jaw")
+        ]

@@ -10,7 +10,9 @@ DRIVER = "LARGE_NEEDLE_DRIVER_400006"
 
 
 def stray(random, away):
-    """Return how the hand goes and turns in a step: at random, and back towards where the tip started, m and rad."""
+    """Return how the hand goes and turns in a step: at random, and back towards where the tip started, m and
+    rad.
+    """
     return random.normal(0.0, 1e-4, 3) - 0.1 * away, random.normal(0.0, 2e-3, 3)
 
 
@@ -20,9 +22,16 @@ def leap(random):
 
 
 def test_ten_thousand_clutch_cycles_do_not_drift():
-    """The hand strays at random while it leads and leaps at random while it is free; the tip is where the led ways and turns add up to."""
+    """The hand strays at random while it leads and leaps at random while it is free; the tip is where the led
+    ways and turns add up to.
+    """
     random, params = np.random.default_rng(7), TeleoperationParams(instrument=DRIVER)
-    law, chain, scale, to_base = PoseLaw(params.chain, turns=True), params.chain, 0.3, np.array([0.0, 0.0, 0.0, 1.0])
+    law, chain, scale, to_base = (
+        PoseLaw(params.chain, turns=True),
+        params.chain,
+        0.3,
+        np.array([0.0, 0.0, 0.0, 1.0]),
+    )
     command = np.array(params.start)
     frame = home = chain.forward(command)
     there, turned = home[:3, 3].copy(), home[:3, :3].copy()
@@ -57,7 +66,9 @@ def test_no_clutch_makes_the_tip_jump(orientation):
 
 
 def test_the_command_lags_no_more_than_the_joints_must_and_catches_up():
-    """A leap of the hand is followed along a straight way with one joint at its speed limit, and met; the last steps do not overshoot."""
+    """A leap of the hand is followed along a straight way with one joint at its speed limit, and met; the
+    last steps do not overshoot.
+    """
     session = Session(scale=0.2)
     start = session.step()
     session.hand[:3] += [0.05, 0.0, -0.05]
@@ -90,7 +101,11 @@ def test_beyond_the_range_the_arm_waits_where_it_is_nearest_and_comes_back_with_
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_hand_that_rolls_on_past_the_limit_does_not_turn_the_tip_round(sense):
-    """Roll ends at 260 degrees. The hand goes on for 300 more and comes back: the tip stands, then follows once it is less than 90 degrees behind."""
+    """Roll ends at 260 degrees.
+
+    The hand goes on for 300 more and comes back: the tip stands, then follows once it is less than 90 degrees
+    behind.
+    """
     start = [0.0, 0.0, 0.12, sense * 4.0, 0.0, 0.0]
     session = Session(instrument=DRIVER, orientation="follow", start=start)
     session.values["measured_js"][:6] = start
@@ -147,5 +162,7 @@ def test_an_arm_without_a_wrist_goes_the_way_of_the_hand_and_turns_as_well_as_it
         session.turn_hand(turn / 500)
         session.step()
     assert np.allclose(session.tip - start, way, atol=2e-8)
-    rolled = rotation.log(rotation.from_matrix(session.turn @ Session(instrument="MUSHA_HAND").turn.T)) @ ahead
+    rolled = (
+        rotation.log(rotation.from_matrix(session.turn @ Session(instrument="MUSHA_HAND").turn.T)) @ ahead
+    )
     assert rolled == pytest.approx(0.0 if orientation == "hold" else turn @ ahead, abs=0.02)

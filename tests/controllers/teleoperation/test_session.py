@@ -38,7 +38,14 @@ class Hands(Device):
         found = []
         for side in ("right", "left"):
             found.append(Port(name=f"{side}/pose", causality="output", type=POSE, max_age_ns=100_000_000))
-            found.append(Port(name=f"{side}/buttons", causality="output", type="sensor_msgs/msg/Joy", variability="event"))
+            found.append(
+                Port(
+                    name=f"{side}/buttons",
+                    causality="output",
+                    type="sensor_msgs/msg/Joy",
+                    variability="event",
+                )
+            )
         return tuple(found)
 
     def open(self, directory):
@@ -50,7 +57,10 @@ class Hands(Device):
         samples = [Sample(f"{side}/pose", pose) for side in ("right", "left")]
         if t >= 50_000_000 and not self.pressed:
             self.pressed = True
-            samples += [Sample("right/buttons", Joy(buttons=[1, 1])), Sample("left/buttons", Joy(buttons=[1, 0]))]
+            samples += [
+                Sample("right/buttons", Joy(buttons=[1, 1])),
+                Sample("left/buttons", Joy(buttons=[1, 0])),
+            ]
         return samples
 
     def close(self):
@@ -65,9 +75,19 @@ class Watcher(Stepped):
     @property
     def ports(self):
         watched = [Port(name=name, causality="input", type=POSE) for name in ("right", "left")]
-        told = [Port(name=name, causality="input", type="std_msgs/msg/String", variability="event") for name in ("right_state", "left_state")]
-        jaw = Port(name="jaw", causality="input", type="sensor_msgs/msg/JointState", fields=("position", "velocity", "effort"))
-        order = Port(name="order", causality="output", type="crtk_msgs/msg/StringStamped", variability="event")
+        told = [
+            Port(name=name, causality="input", type="std_msgs/msg/String", variability="event")
+            for name in ("right_state", "left_state")
+        ]
+        jaw = Port(
+            name="jaw",
+            causality="input",
+            type="sensor_msgs/msg/JointState",
+            fields=("position", "velocity", "effort"),
+        )
+        order = Port(
+            name="order", causality="output", type="crtk_msgs/msg/StringStamped", variability="event"
+        )
         return (*watched, *told, jaw, order)
 
     def configure(self, setup):
@@ -90,15 +110,30 @@ class Watcher(Stepped):
 
 @pytest.fixture(scope="module")
 def watched():
-    common = {"view": "camera", "tip_frame": "view", "instrument": "400006", "engage": "held", "scale": SCALE, "orientation": "follow"}
+    common = {
+        "view": "camera",
+        "tip_frame": "view",
+        "instrument": "400006",
+        "engage": "held",
+        "scale": SCALE,
+        "orientation": "follow",
+    }
     participants = {
         "hands": Hands("hands", Params()),
         "right": Teleoperation("right", TeleoperationParams.model_validate(common | {"arm": "PSM1"})),
         "left": Teleoperation("left", TeleoperationParams.model_validate(common | {"arm": "PSM2"})),
         "motion": MotionController(
-            "motion", MotionParams.model_validate({"mounting": "cart", "initial_state": "homed", "arms": ARMS, "publish_period": "2 ms"})
+            "motion",
+            MotionParams.model_validate(
+                {"mounting": "cart", "initial_state": "homed", "arms": ARMS, "publish_period": "2 ms"}
+            ),
         ),
-        "robot": MujocoEngine("robot", MujocoParams.model_validate({"mounting": "cart", "arms": ARMS, "looks": False, "publish_period": "2 ms"})),
+        "robot": MujocoEngine(
+            "robot",
+            MujocoParams.model_validate(
+                {"mounting": "cart", "arms": ARMS, "looks": False, "publish_period": "2 ms"}
+            ),
+        ),
         "watcher": Watcher("watcher", Params()),
     }
     connections = [
@@ -135,13 +170,34 @@ def watched():
 def test_an_instrument_is_led_without_a_motion_controller_as_well(name):
     hands = Hands("hands", Params())
     teleoperation = Teleoperation("teleop", TeleoperationParams.model_validate({"instrument": name}))
-    robot = MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": {"instrument": name}}, "looks": False, "publish_period": "2 ms"}))
+    robot = MujocoEngine(
+        "robot",
+        MujocoParams.model_validate(
+            {"arms": {"PSM1": {"instrument": name}}, "looks": False, "publish_period": "2 ms"}
+        ),
+    )
     ports = {port.name for port in teleoperation.ports}
-    connections = ["hands.right/pose -> teleop.master", "teleop.servo_jp -> robot.PSM1/servo_jp", "robot.PSM1/measured_js -> teleop.measured_js"]
-    connections += ["robot.PSM1/tip_wrench -> teleop.tip_wrench", "robot.PSM1/rigid_wrench -> teleop.rigid_wrench"]
+    connections = [
+        "hands.right/pose -> teleop.master",
+        "teleop.servo_jp -> robot.PSM1/servo_jp",
+        "robot.PSM1/measured_js -> teleop.measured_js",
+    ]
+    connections += [
+        "robot.PSM1/tip_wrench -> teleop.tip_wrench",
+        "robot.PSM1/rigid_wrench -> teleop.rigid_wrench",
+    ]
     if "jaw/servo_jp" in ports:
-        connections += ["teleop.jaw/servo_jp -> robot.PSM1/jaw/servo_jp", "robot.PSM1/jaw/measured_js -> teleop.jaw/measured_js"]
-    scenario = {"name": "direct", "step": "2 ms", "duration": "20 ms", "order": ["teleop", "robot"], "connections": connections}
+        connections += [
+            "teleop.jaw/servo_jp -> robot.PSM1/jaw/servo_jp",
+            "robot.PSM1/jaw/measured_js -> teleop.jaw/measured_js",
+        ]
+    scenario = {
+        "name": "direct",
+        "step": "2 ms",
+        "duration": "20 ms",
+        "order": ["teleop", "robot"],
+        "connections": connections,
+    }
     assert run_in_process(scenario, {"hands": hands, "teleop": teleoperation, "robot": robot}).state == "done"
 
 
@@ -152,7 +208,11 @@ def test_a_view_without_a_camera_is_refused():
     motion = MotionController("motion", MotionParams.model_validate({"arms": {"PSM1": {}}}))
     robot = MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": {}}, "looks": False}))
     participants = {"hands": hands, "teleop": teleoperation, "motion": motion, "robot": robot}
-    connections = ["hands.right/pose -> teleop.master", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*"]
+    connections = [
+        "hands.right/pose -> teleop.master",
+        "motion.drive/* -> robot.*",
+        "robot.* -> motion.sense/*",
+    ]
     scenario = {"name": "blind", "step": "1 ms", "duration": "2 ms", "connections": connections}
     with pytest.raises(ScenarioError, match=r"base_in_view.* is not connected"):
         run_in_process(scenario, participants)
@@ -162,7 +222,9 @@ def test_a_view_without_a_camera_is_refused():
 
 
 def test_the_tip_goes_the_way_of_the_hand_in_the_picture(watched):
-    """The camera's frame has x to the left, y up and z ahead; the servos follow to within a fifth of a millimetre."""
+    """The camera's frame has x to the left, y up and z ahead; the servos follow to within a fifth of a
+    millimetre.
+    """
     away, left, up = WAY
     moved = watched.seen["right"][-1] - watched.seen["right"][20]
     assert np.allclose(moved[:3], SCALE * np.array([left, up, away]), atol=2e-4)
@@ -171,7 +233,8 @@ def test_the_tip_goes_the_way_of_the_hand_in_the_picture(watched):
 
 def test_an_arm_that_is_paused_stays_while_the_other_one_goes_on(watched):
     held = np.array(watched.seen["left"])[150:, :3]
-    assert np.ptp(held, axis=0).max() < 0.1 * SCALE * 0.5 * np.abs(WAY).max()  # the other one has half of its way to go
+    # the other one has half of its way to go
+    assert np.ptp(held, axis=0).max() < 0.1 * SCALE * 0.5 * np.abs(WAY).max()
     assert watched.states["left"][-2:] == ["ENABLED", "DISABLED"]
 
 

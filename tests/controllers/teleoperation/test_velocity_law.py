@@ -11,7 +11,9 @@ from tests.controllers.teleoperation.rig import H, Session
 CHAIN = TeleoperationParams(instrument="400006").chain
 STEP = H * 1e-9
 WEIGHTS = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])
-configurations = st.tuples(*(st.floats(low, high) for low, high in zip(0.95 * CHAIN.lower, 0.95 * CHAIN.upper, strict=True))).map(np.array)
+configurations = st.tuples(
+    *(st.floats(low, high) for low, high in zip(0.95 * CHAIN.lower, 0.95 * CHAIN.upper, strict=True))
+).map(np.array)
 vectors = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array)
 
 
@@ -22,13 +24,17 @@ def twist_between(before, after, step):
 
 
 def least_singular_value(q):
-    return np.linalg.svd(WEIGHTS[:, None] * CHAIN.jacobian(CHAIN.frames(q), frame="tip"), compute_uv=False)[-1]
+    return np.linalg.svd(WEIGHTS[:, None] * CHAIN.jacobian(CHAIN.frames(q), frame="tip"), compute_uv=False)[
+        -1
+    ]
 
 
 @settings(max_examples=60, deadline=None)
 @given(configurations, vectors, vectors, vectors)
 def test_the_hands_twist_in_its_own_frame_is_the_tips_in_its_own(q, linear, angular, turned):
-    """The paper's law, in any configuration that is not singular: what is commanded moves the tip as the hand moves, by kinematics alone."""
+    """The paper's law, in any configuration that is not singular: what is commanded moves the tip as the hand
+    moves, by kinematics alone.
+    """
     assume(least_singular_value(q) > 0.004)
     session = Session(law="velocity", instrument="400006", scale=0.2, start=q.tolist())
     session.hand[3:] = rotation.exp(turned)
@@ -37,7 +43,11 @@ def test_the_hands_twist_in_its_own_frame_is_the_tips_in_its_own(q, linear, angu
     expected = np.concatenate([0.2 * to_hand @ session.twist[:3], to_hand @ session.twist[3:]])
     exact = np.linalg.solve(CHAIN.jacobian(CHAIN.frames(q), frame="tip"), expected)
     after = q + STEP * exact
-    assume((np.abs(exact) < CHAIN.velocity).all() and (after >= CHAIN.lower).all() and (after <= CHAIN.upper).all())
+    assume(
+        (np.abs(exact) < CHAIN.velocity).all()
+        and (after >= CHAIN.lower).all()
+        and (after <= CHAIN.upper).all()
+    )
     session.step()
     assert np.allclose((session.command - q) / STEP, exact, rtol=1e-9, atol=1e-9)
     short = 1e-4 * STEP
@@ -48,7 +58,9 @@ def test_the_hands_twist_in_its_own_frame_is_the_tips_in_its_own(q, linear, angu
 @settings(max_examples=60, deadline=None)
 @given(configurations, vectors, vectors)
 def test_near_a_singularity_the_damped_joints_stay_slow_and_err_by_little(q, linear, angular):
-    """With the largest damping l and the smallest singular value below it, a joint moves at most by |v| / (2 l), and the tip is no faster than it is told."""
+    """With the largest damping l and the smallest singular value below it, a joint moves at most by |v| / (2
+    l), and the tip is no faster than it is told.
+    """
     q[2] = 0.0156 + 1e-3 * q[2]  # the wrist pitch axis passes the remote centre
     assume(least_singular_value(q) < 0.002)
     twist = np.concatenate([1e-4 * linear, 1e-3 * angular])
@@ -76,7 +88,12 @@ def test_what_a_limit_cuts_is_not_made_up_for(axis):
     session.twist[:] *= -0.01
     before, start = session.command, CHAIN.forward(session.command)
     session.step()
-    wanted = np.concatenate([rotation.matrix(session.hand[3:]).T @ session.twist[:3], rotation.matrix(session.hand[3:]).T @ session.twist[3:]])
+    wanted = np.concatenate(
+        [
+            rotation.matrix(session.hand[3:]).T @ session.twist[:3],
+            rotation.matrix(session.hand[3:]).T @ session.twist[3:],
+        ]
+    )
     if least_singular_value(before) > 0.004:
         assert twist_between(start, CHAIN.forward(session.command), STEP) @ wanted > 0.5 * wanted @ wanted
 

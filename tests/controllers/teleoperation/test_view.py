@@ -1,4 +1,6 @@
-"""A motion to the right on the desk is one to the right in the picture, in a whole cart seen through MuJoCo's kinematics and the endoscope's projection."""
+"""A motion to the right on the desk is one to the right in the picture, in a whole cart seen through MuJoCo's
+kinematics and the endoscope's projection.
+"""
 
 import mujoco
 import numpy as np
@@ -25,11 +27,17 @@ WAY = 0.005
 
 
 class Cart:
-    """The cart in MuJoCo, where the arms are told to be; and the motion controller, which tells where an arm's base is in the camera's frame."""
+    """The cart in MuJoCo, where the arms are told to be; and the motion controller, which tells where an
+    arm's base is in the camera's frame.
+    """
 
     def __init__(self, endoscope, tip_frame):
         self.endoscope = endoscope
-        arms = {"PSM1": {"instrument": DRIVER}, "PSM2": {"instrument": DRIVER}, "ECM": {"endoscope": endoscope, "tip_frame": tip_frame}}
+        arms = {
+            "PSM1": {"instrument": DRIVER},
+            "PSM2": {"instrument": DRIVER},
+            "ECM": {"endoscope": endoscope, "tip_frame": tip_frame},
+        }
         self.model = build(MujocoParams.model_validate({"mounting": "cart", "arms": arms, "looks": False}))
         self.data = mujoco.MjData(self.model)
         motion = Rig(arms={name: arm | {"start": STARTS[name]} for name, arm in arms.items()})
@@ -39,7 +47,9 @@ class Cart:
                 value[: len(STARTS[name])] = STARTS[name]
         motion.follows = False
         motion.step(count=11)
-        self.base_in_view = {name: motion.outputs[f"SUJ/{name}/measured_cp"].copy() for name in ("PSM1", "PSM2")}
+        self.base_in_view = {
+            name: motion.outputs[f"SUJ/{name}/measured_cp"].copy() for name in ("PSM1", "PSM2")
+        }
         for name, start in STARTS.items():
             self.put(name, start)
 
@@ -50,11 +60,16 @@ class Cart:
         mujoco.mj_kinematics(self.model, self.data)
 
     def seen(self, arm):
-        """Where the arm's tip is in the left picture, pixels right and down, and how far ahead of the camera, m."""
+        """Where the arm's tip is in the left picture, pixels right and down, and how far ahead of the camera,
+        m.
+        """
         camera = np.eye(4)
         roll = self.data.body("ECM/roll")
         camera[:3, :3], camera[:3, 3] = roll.xmat.reshape(3, 3), roll.xpos
-        point = np.linalg.inv(camera @ optical_in_roll(self.endoscope)) @ [*self.data.site(f"{arm}/tip").xpos, 1.0]
+        point = np.linalg.inv(camera @ optical_in_roll(self.endoscope)) @ [
+            *self.data.site(f"{arm}/tip").xpos,
+            1.0,
+        ]
         u, v, w = StereoCamera().projection("left") @ point
         return np.array([u / w, v / w, w])
 
@@ -67,7 +82,14 @@ def test_right_up_and_away_on_the_desk_are_right_up_and_away_in_the_picture(endo
     focal = StereoCamera().focal_length
     for direction, change in ((-LEFT, (1, 0, 0)), (UP, (0, -1, 0)), (AWAY, (0, 0, 1))):
         session = Session(
-            arm=arm, instrument=DRIVER, start=STARTS[arm], scale=1.0, view="camera", endoscope=endoscope, tip_frame=tip_frame, orientation="follow"
+            arm=arm,
+            instrument=DRIVER,
+            start=STARTS[arm],
+            scale=1.0,
+            view="camera",
+            endoscope=endoscope,
+            tip_frame=tip_frame,
+            orientation="follow",
         )
         session.values["base_in_view"][:] = cart.base_in_view[arm]
         session.step()
@@ -77,14 +99,25 @@ def test_right_up_and_away_on_the_desk_are_right_up_and_away_in_the_picture(endo
         session.step(count=100)
         cart.put(arm, session.command)
         u, v, ahead = cart.seen(arm)
-        moved = np.array([(u - 159.5) * ahead - (before[0] - 159.5) * before[2], (v - 143.5) * ahead - (before[1] - 143.5) * before[2], 0.0]) / focal
+        moved = (
+            np.array(
+                [
+                    (u - 159.5) * ahead - (before[0] - 159.5) * before[2],
+                    (v - 143.5) * ahead - (before[1] - 143.5) * before[2],
+                    0.0,
+                ]
+            )
+            / focal
+        )
         moved[2] = ahead - before[2]
         assert np.allclose(moved, WAY * np.array(change), atol=1e-7)
 
 
 @pytest.mark.parametrize("endoscope", ["straight", "up", "down"])
 def test_a_stylus_that_points_ahead_points_along_the_endoscope(endoscope):
-    """A stylus' own frame has z out of its point, x to the right and y down, as the endoscope's optical frame; so a matched hand looks as the tip does."""
+    """A stylus' own frame has z out of its point, x to the right and y down, as the endoscope's optical
+    frame; so a matched hand looks as the tip does.
+    """
     cart = Cart(endoscope, "kinematic")
     pointing = np.array([-LEFT, -UP, AWAY]).T  # columns: the stylus' axes on the desk
     view = View(TeleoperationParams(view="camera", endoscope=endoscope))
@@ -97,7 +130,10 @@ def test_a_stylus_that_points_ahead_points_along_the_endoscope(endoscope):
 def test_a_turned_stylus_is_registered_to_the_desk():
     turn = rotation.exp(np.array([0.0, 0.0, 0.4]))
     base_in_view = np.array([0.1, 0.2, 0.3, *rotation.exp(np.array([0.5, -1.0, 0.3]))])
-    straight, turned = (View(TeleoperationParams(view="camera", registration=tuple(q))).hand_in_base(base_in_view) for q in (np.array([0, 0, 0, 1.0]), turn))
+    straight, turned = (
+        View(TeleoperationParams(view="camera", registration=tuple(q))).hand_in_base(base_in_view)
+        for q in (np.array([0, 0, 0, 1.0]), turn)
+    )
     assert np.allclose(turned, rotation.product(straight, turn))
 
 

@@ -1,4 +1,6 @@
-"""The promises of the chain, over whatever a bad day can bring: each is checked from outside, from what went in and what came out."""
+"""The promises of the chain, over whatever a bad day can bring: each is checked from outside, from what went
+in and what came out.
+"""
 
 from copy import deepcopy
 from functools import cache
@@ -25,16 +27,28 @@ lengths = st.floats(-0.1, 0.1) | bad
 positions = st.tuples(lengths, lengths, lengths) | st.tuples(*3 * [st.floats(-0.02, 0.02)])
 velocities = st.tuples(*3 * [st.floats(-0.5, 0.5)]) | st.tuples(*3 * [st.floats(-3.0, 3.0) | bad])
 angles = st.floats(-1.0, 1.0)
-normals = st.tuples(angles, angles, angles).filter(lambda v: hypot(*v) > 0.01).map(lambda v: (v[0] / hypot(*v), v[1] / hypot(*v), v[2] / hypot(*v)))
+normals = (
+    st.tuples(angles, angles, angles)
+    .filter(lambda v: hypot(*v) > 0.01)
+    .map(lambda v: (v[0] / hypot(*v), v[1] / hypot(*v), v[2] / hypot(*v)))
+)
 good_planes = st.builds(
     lambda n, *rest: Plane(*n, *rest),
     normals, st.floats(-0.05, 0.05), st.floats(-2.0, 2.0), st.floats(0.0, 1e6), st.floats(0.0, 1e3), st.floats(0.0, 3.0),
 )  # fmt: skip
 any_planes = st.builds(Plane, *8 * [st.floats(-2.0, 2.0) | bad])
-models = st.tuples(st.lists(good_planes, max_size=5) | st.lists(any_planes | good_planes, max_size=4), st.integers(-3, 3), st.floats(0.0, 0.2) | bad)
+models = st.tuples(
+    st.lists(good_planes, max_size=5) | st.lists(any_planes | good_planes, max_size=4),
+    st.integers(-3, 3),
+    st.floats(0.0, 0.2) | bad,
+)
 """Planes, how much newer the stamp is than the last one's, and how long ago (s) the model arrived."""
 steps = st.sampled_from([TICK] * 12 + [0.0, 0.0003, 0.02, 0.06, 0.2, 5.0])
-ticks = st.lists(st.tuples(steps, positions, velocities, st.sampled_from([True] * 9 + [False]), st.none() | models), min_size=1, max_size=60)
+ticks = st.lists(
+    st.tuples(steps, positions, velocities, st.sampled_from([True] * 9 + [False]), st.none() | models),
+    min_size=1,
+    max_size=60,
+)
 
 
 def _from_segment(point: Vector3, end: Vector3) -> float:
@@ -42,7 +56,9 @@ def _from_segment(point: Vector3, end: Vector3) -> float:
     low, high = 0.0, 1.0
     for _ in range(45):
         one, two = low + 0.382 * (high - low), low + 0.618 * (high - low)
-        if hypot(*(p - one * e for p, e in zip(point, end, strict=True))) < hypot(*(p - two * e for p, e in zip(point, end, strict=True))):
+        if hypot(*(p - one * e for p, e in zip(point, end, strict=True))) < hypot(
+            *(p - two * e for p, e in zip(point, end, strict=True))
+        ):
             high = two
         else:
             low = one
@@ -64,7 +80,14 @@ def _begun(passivity: bool, pressed: bool) -> HapticLoop:
 @settings(max_examples=250)
 def test_whatever_comes_every_limit_holds(ticks: list, passivity: bool, pressed: bool) -> None:
     loop = deepcopy(_begun(passivity, pressed))
-    now, stamp, arrived, last, off_until, locked = 0.0, 0, 0.0 if pressed else -inf, loop.force, -inf if pressed else 0.0, False
+    now, stamp, arrived, last, off_until, locked = (
+        0.0,
+        0,
+        0.0 if pressed else -inf,
+        loop.force,
+        -inf if pressed else 0.0,
+        False,
+    )
     for dt, position, velocity, permitted, model in ticks:
         now += dt
         if model is not None:
@@ -88,7 +111,15 @@ def test_whatever_comes_every_limit_holds(ticks: list, passivity: bool, pressed:
         last = force
 
 
-def _run(loop: HapticLoop, ticks: int, position: Vector3 = STILL, *, start: float, planes: list[Plane] | None = None, **kinds: bool) -> list[Vector3]:
+def _run(
+    loop: HapticLoop,
+    ticks: int,
+    position: Vector3 = STILL,
+    *,
+    start: float,
+    planes: list[Plane] | None = None,
+    **kinds: bool,
+) -> list[Vector3]:
     """Tick at 1 kHz; with `planes`, a model comes at every fourth tick."""
     forces: list[Vector3] = []
     for i in range(ticks):
@@ -141,7 +172,8 @@ def test_a_short_silence_only_fades() -> None:
     forces = _run(loop, 120, (0, 0, -0.05), start=2.0)
     assert 0 < forces[-1][2] < 0.7
     back = _run(loop, 100, (0, 0, -0.05), start=2.12, planes=[WALL])
-    assert forces[-1][2] <= back[0][2] <= back[-1][2] <= forces[-1][2] + 0.1 * 1.98 + 0.01  # on from where it was, by the ramp
+    # on from where it was, by the ramp
+    assert forces[-1][2] <= back[0][2] <= back[-1][2] <= forces[-1][2] + 0.1 * 1.98 + 0.01
 
 
 def test_the_dead_man_takes_the_force_away_at_once() -> None:
@@ -162,13 +194,15 @@ def test_a_hand_too_fast_gets_no_force_until_it_lets_go() -> None:
 
 def test_taking_up_an_instrument_that_presses_already_gives_no_kick() -> None:
     loop = HapticLoop(LIMITS)
-    _run(loop, 1500, (0, 0, -0.05), start=0.0, planes=[])  # the dead-man is held, and the arm does not follow yet
+    # the dead-man is held, and the arm does not follow yet
+    _run(loop, 1500, (0, 0, -0.05), start=0.0, planes=[])
     forces = _run(loop, 1000, (0, 0, -0.05), start=1.5, planes=[WALL])
     assert [force[2] for force in forces[:3]] == pytest.approx([0.1, 0.2, 0.2], abs=0.01)
     assert forces[449][2] == pytest.approx((0.2 + 1.98 * 0.45), rel=0.01)
     assert forces[-1][2] == pytest.approx(1.98)
     _run(loop, 20, (0, 0, 0.001), start=2.5, planes=[])
-    assert _run(loop, 20, (0, 0, -0.0004), start=2.52, planes=[WALL])[-1][2] == pytest.approx(0.16)  # a light touch is there at once
+    # a light touch is there at once
+    assert _run(loop, 20, (0, 0, -0.0004), start=2.52, planes=[WALL])[-1][2] == pytest.approx(0.16)
 
 
 def test_another_session_starts_at_time_zero() -> None:
@@ -199,7 +233,9 @@ def test_reset_takes_the_force_and_the_contact() -> None:
 def test_the_same_ticks_give_the_same_bits() -> None:
     one, other = HapticLoop(LIMITS, passivity=True), HapticLoop(LIMITS, passivity=True)
     planes = [Plane(0.6, 0.0, 0.8, 0.01, 0.02, 300.0, 1.0, 0.4), WALL]
-    assert _run(one, 1500, (0.001, 0, -0.002), start=0.0, planes=planes) == _run(other, 1500, (0.001, 0, -0.002), start=0.0, planes=planes)
+    assert _run(one, 1500, (0.001, 0, -0.002), start=0.0, planes=planes) == _run(
+        other, 1500, (0.001, 0, -0.002), start=0.0, planes=planes
+    )
 
 
 def _engaged() -> SafetyChain:
@@ -226,5 +262,6 @@ def test_a_force_turns_slowly() -> None:
     for _ in range(16):
         _next(chain, 0, 0, 1.5)
     assert _next(chain, 0.05, 0, 1.5) == pytest.approx((0.05, 0, 1.5))
-    assert _next(chain, 1.5, 0, 0) == pytest.approx((0.1, 0, 0), abs=0.05)  # the old direction at once, the new one from there
+    # the old direction at once, the new one from there
+    assert _next(chain, 1.5, 0, 0) == pytest.approx((0.1, 0, 0), abs=0.05)
     assert _next(chain, -1.5, 0, 0) == pytest.approx((-0.1, 0, 0), abs=0.05)

@@ -16,7 +16,9 @@ velocities = st.tuples(*3 * [st.floats(-0.3, 0.3)]) | st.just(ZERO)
 
 
 @given(st.lists(st.tuples(forces, velocities, st.sampled_from([TICK, 0.0002, 0.02])), max_size=40))
-def test_with_enough_damping_the_hand_never_gets_more_than_it_gave(ticks: list[tuple[Vector3, Vector3, float]]) -> None:
+def test_with_enough_damping_the_hand_never_gets_more_than_it_gave(
+    ticks: list[tuple[Vector3, Vector3, float]],
+) -> None:
     watch = Passivity(damping=1e12)
     position, energy = np.zeros(3), 0.0
     for wanted, velocity, dt in ticks:
@@ -48,7 +50,9 @@ def test_what_one_contact_dissipated_does_not_pay_for_the_next() -> None:
 
 
 def _swing(watch: Passivity | None) -> float:
-    """Return the hand's motion, peak to peak, in the last of three seconds at a wall of 1 kN/m that is sampled at 50 Hz: too seldom by far."""
+    """Return the hand's motion, peak to peak, in the last of three seconds at a wall of 1 kN/m that is
+    sampled at 50 Hz: too seldom by far.
+    """
     hand = Hand(0.15, 200.0, 4.0, TICK, (0.0, 0.0, 0.01))
     heights: list[float] = []
     held = 0.0

@@ -19,9 +19,23 @@ ROUGH = TABLE._replace(damping=0.0, friction=0.5)
 near = st.floats(-0.02, 0.02)
 points = st.tuples(near, near, near)
 velocities = st.tuples(*3 * [st.floats(-0.5, 0.5)])
-normals = st.tuples(*3 * [st.floats(-1.0, 1.0)]).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.01).map(lambda v: tuple((v / np.linalg.norm(v)).tolist()))
-planes = st.builds(lambda n, *rest: Plane(*n, *rest), normals, st.floats(-0.01, 0.03), st.just(0.0), st.floats(0.0, 800.0), st.floats(0.0, 8.0), st.just(0.0))
-rough_planes = st.builds(lambda p, mu: p._replace(friction=mu), planes, st.sampled_from([0.0, 1e3]))  # what sticks whatever comes
+normals = (
+    st.tuples(*3 * [st.floats(-1.0, 1.0)])
+    .map(np.array)
+    .filter(lambda v: np.linalg.norm(v) > 0.01)
+    .map(lambda v: tuple((v / np.linalg.norm(v)).tolist()))
+)
+planes = st.builds(
+    lambda n, *rest: Plane(*n, *rest),
+    normals,
+    st.floats(-0.01, 0.03),
+    st.just(0.0),
+    st.floats(0.0, 800.0),
+    st.floats(0.0, 8.0),
+    st.just(0.0),
+)
+# what sticks whatever comes
+rough_planes = st.builds(lambda p, mu: p._replace(friction=mu), planes, st.sampled_from([0.0, 1e3]))
 
 
 def _force(planes: list[Plane], position: Vector3, velocity: Vector3 = ZERO, age: float = 0.0) -> np.ndarray:
@@ -29,10 +43,16 @@ def _force(planes: list[Plane], position: Vector3, velocity: Vector3 = ZERO, age
 
 
 @given(planes, points, velocities)
-def test_one_plane_is_a_spring_and_a_damper_along_its_normal(plane: Plane, position: Vector3, velocity: Vector3) -> None:
+def test_one_plane_is_a_spring_and_a_damper_along_its_normal(
+    plane: Plane, position: Vector3, velocity: Vector3
+) -> None:
     n = np.array(plane[:3])
     depth = plane.distance - n @ position
-    push = max(0.0, min(plane.stiffness, MOST_K) * depth - min(plane.damping, MOST_B) * (n @ velocity)) if depth > 0.0 else 0.0
+    push = (
+        max(0.0, min(plane.stiffness, MOST_K) * depth - min(plane.damping, MOST_B) * (n @ velocity))
+        if depth > 0.0
+        else 0.0
+    )
     assert _force([plane], position, velocity) == pytest.approx(push * n, abs=1e-12)
 
 
@@ -46,7 +66,8 @@ def test_damping_is_against_the_motion_of_the_surface() -> None:
     rising = TABLE._replace(distance=0.01, velocity=0.1)
     assert _force([rising], ZERO, (0.0, 0.0, 0.1))[2] == pytest.approx(2.0)
     assert _force([rising], ZERO, (0.0, 0.0, 0.0))[2] == pytest.approx(2.1)
-    assert _force([rising], ZERO, (0.0, 0.0, 0.0), age=DEAD_RECKONING)[2] == pytest.approx(0.015 * 200.0)  # where it stopped
+    # where it stopped
+    assert _force([rising], ZERO, (0.0, 0.0, 0.0), age=DEAD_RECKONING)[2] == pytest.approx(0.015 * 200.0)
 
 
 @given(st.lists(rough_planes, min_size=1, max_size=4), points)
@@ -58,9 +79,13 @@ def test_no_direction_is_stiffer_or_more_damped_than_allowed(planes: list[Plane]
     stiffness, damping = np.zeros((3, 3)), np.zeros((3, 3))
     undamped = [p._replace(damping=0.0) for p in planes]
     for axis, step in enumerate(1e-6 * np.eye(3)):
-        ends = [deepcopy(renderer).force(undamped, 0.0, tuple(np.array(position) + side * step), ZERO) for side in (1, -1)]
+        ends = [
+            deepcopy(renderer).force(undamped, 0.0, tuple(np.array(position) + side * step), ZERO)
+            for side in (1, -1)
+        ]
         stiffness[axis] = np.subtract(*ends) / -2e-6
-        smooth = [p._replace(friction=0.0, stiffness=400.0) for p in planes]  # pushed hard enough that none lets go
+        # pushed hard enough that none lets go
+        smooth = [p._replace(friction=0.0, stiffness=400.0) for p in planes]
         ends = [deepcopy(renderer).force(smooth, 0.0, position, tuple(side * step)) for side in (1, -1)]
         damping[axis] = np.subtract(*ends) / -2e-6
     assert np.linalg.norm(stiffness, 2) <= MOST_K * (1 + 1e-6)
@@ -68,7 +93,11 @@ def test_no_direction_is_stiffer_or_more_damped_than_allowed(planes: list[Plane]
 
 
 def test_walls_that_stand_square_keep_their_stiffness() -> None:
-    corner = [Plane(1, 0, 0, 0, 0, 400.0, 0, 0), Plane(0, 1, 0, 0, 0, 400.0, 0, 0), Plane(0, 0, 1, 0, 0, 400.0, 0, 0)]
+    corner = [
+        Plane(1, 0, 0, 0, 0, 400.0, 0, 0),
+        Plane(0, 1, 0, 0, 0, 400.0, 0, 0),
+        Plane(0, 0, 1, 0, 0, 400.0, 0, 0),
+    ]
     assert _force(corner, (-0.001, -0.002, -0.003)) == pytest.approx([0.4, 0.8, 1.2])
     assert _force([corner[0]] * 4, (-0.001, 0, 0)) == pytest.approx([0.4, 0, 0])
 
@@ -76,7 +105,9 @@ def test_walls_that_stand_square_keep_their_stiffness() -> None:
 def test_friction_holds_a_hand_and_does_not_chatter() -> None:
     renderer = Renderer(MOST_K, MOST_B)
     renderer.force([ROUGH], 0.0, (0.0, 0.0, -0.01), ZERO)  # 2 N: the cone's radius is 1 N, 5 mm of the spring
-    held = [renderer.force([ROUGH], 0.0, (0.002, 0.0, -0.01), (1e-4 * (-1) ** i, 0.0, 0.0)) for i in range(10)]
+    held = [
+        renderer.force([ROUGH], 0.0, (0.002, 0.0, -0.01), (1e-4 * (-1) ** i, 0.0, 0.0)) for i in range(10)
+    ]
     assert len(set(held)) == 1
     assert held[0] == pytest.approx((-0.4, 0.0, 2.0))
     assert renderer.force([ROUGH], 0.0, (0.001, 0.0, -0.01), ZERO)[0] == pytest.approx(-0.2)
@@ -99,7 +130,9 @@ def test_friction_starts_anew_with_the_contact() -> None:
 
 
 @given(planes, st.floats(0.0, 2.0), st.lists(st.tuples(points, velocities), max_size=8))
-def test_friction_stays_in_its_cone(plane: Plane, friction: float, way: list[tuple[Vector3, Vector3]]) -> None:
+def test_friction_stays_in_its_cone(
+    plane: Plane, friction: float, way: list[tuple[Vector3, Vector3]]
+) -> None:
     renderer = Renderer(MOST_K, MOST_B)
     for position, velocity in way:
         force = np.array(renderer.force([plane._replace(friction=friction)], 0.0, position, velocity))
@@ -108,9 +141,15 @@ def test_friction_stays_in_its_cone(plane: Plane, friction: float, way: list[tup
         assert np.dot(force - push, plane[:3]) == pytest.approx(0.0, abs=1e-9)
 
 
-@given(st.lists(st.builds(lambda p, mu: p._replace(friction=mu), planes, st.floats(0.0, 2.0)), max_size=4), st.lists(points, max_size=8))
-def test_friction_of_several_planes_stays_in_the_sum_of_their_cones(planes: list[Plane], way: list[Vector3]) -> None:
-    planes = [p._replace(damping=0.0, stiffness=min(p.stiffness, 100.0)) for p in planes]  # of four together, not too stiff
+@given(
+    st.lists(st.builds(lambda p, mu: p._replace(friction=mu), planes, st.floats(0.0, 2.0)), max_size=4),
+    st.lists(points, max_size=8),
+)
+def test_friction_of_several_planes_stays_in_the_sum_of_their_cones(
+    planes: list[Plane], way: list[Vector3]
+) -> None:
+    # of four together, not too stiff
+    planes = [p._replace(damping=0.0, stiffness=min(p.stiffness, 100.0)) for p in planes]
     renderer = Renderer(MOST_K, MOST_B)
     for position in way:
         force = np.array(renderer.force(planes, 0.0, position, ZERO))
@@ -124,7 +163,17 @@ GOOD = TABLE._asdict()
 
 @pytest.mark.parametrize(
     "change",
-    [{"nx": nan}, {"nz": 0.9}, {"nz": 0.0}, {"nz": inf}, {"distance": nan}, {"velocity": inf}, {"stiffness": -1.0}, {"damping": -0.1}, {"friction": nan}],
+    [
+        {"nx": nan},
+        {"nz": 0.9},
+        {"nz": 0.0},
+        {"nz": inf},
+        {"distance": nan},
+        {"velocity": inf},
+        {"stiffness": -1.0},
+        {"damping": -0.1},
+        {"friction": nan},
+    ],
 )
 def test_what_is_no_plane(change: dict[str, float]) -> None:
     assert checked([TABLE, Plane(**{**GOOD, **change})]) is None
@@ -137,5 +186,9 @@ def test_at_most_four_planes_of_unit_normals() -> None:
 
 
 def test_planes_of_a_message() -> None:
-    plane = ContactPlane(normal=Vector3Message(y=1.0), distance=0.1, velocity=0.2, stiffness=3.0, damping=0.4, friction=0.5)
-    assert planes_of(ContactModel(header={}, planes=[plane])) == (Plane(0.0, 1.0, 0.0, 0.1, 0.2, 3.0, 0.4, 0.5),)
+    plane = ContactPlane(
+        normal=Vector3Message(y=1.0), distance=0.1, velocity=0.2, stiffness=3.0, damping=0.4, friction=0.5
+    )
+    assert planes_of(ContactModel(header={}, planes=[plane])) == (
+        Plane(0.0, 1.0, 0.0, 0.1, 0.2, 3.0, 0.4, 0.5),
+    )

@@ -1,6 +1,8 @@
-"""Exercises every row of a gateway's table with a client of whatever middleware: what is told arrives as it was told, what is said enters as it was said.
+"""Exercises every row of a gateway's table with a client of whatever middleware: what is told arrives as it
+was told, what is said enters as it was said.
 
-A client is a `Peer`; its messages are our models, so a client in another process is handed `message.model_dump(mode="json")` and gives the like back.
+A client is a `Peer`; its messages are our models, so a client in another process is handed
+`message.model_dump(mode="json")` and gives the like back.
 
     gateway = Ros2Dds("ros", Ros2Dds.params_model.model_validate(WHOLE)); gateway.open(tmp_path)
     peer.join(gateway.rows)
@@ -31,7 +33,18 @@ from schemas.message import Message
 from schemas.ros import Header, JointState, Pose, Quaternion, Time
 from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["PYTHON_CLIENT", "WHOLE", "Peer", "check_late_joiner", "check_published", "check_served", "check_subscribed", "exercise", "sample", "without_stamp"]
+__all__ = [
+    "PYTHON_CLIENT",
+    "WHOLE",
+    "Peer",
+    "check_late_joiner",
+    "check_published",
+    "check_served",
+    "check_subscribed",
+    "exercise",
+    "sample",
+    "without_stamp",
+]
 
 WHOLE: dict[str, Any] = {
     "arms": {
@@ -47,10 +60,36 @@ WHOLE: dict[str, Any] = {
 """Parameters of a gateway that shows all there is."""
 
 _ARM = (
-    *("operating_state", "state_command", "setpoint_js", "setpoint_cp", "measured_js", "measured_cp", "measured_cv", "hold", "free"),
-    *("servo_jp", "servo_jr", "servo_cp", "servo_jf", "move_jp", "move_jr", "move_cp", "forward_kinematics", "inverse_kinematics"),
+    *(
+        "operating_state",
+        "state_command",
+        "setpoint_js",
+        "setpoint_cp",
+        "measured_js",
+        "measured_cp",
+        "measured_cv",
+        "hold",
+        "free",
+    ),
+    *(
+        "servo_jp",
+        "servo_jr",
+        "servo_cp",
+        "servo_jf",
+        "move_jp",
+        "move_jr",
+        "move_cp",
+        "forward_kinematics",
+        "inverse_kinematics",
+    ),
     *(f"{kind}/{name}" for kind in ("spatial", "body") for name in ("measured_cf", "servo_cf", "jacobian")),
-    *("local/measured_cp", "local/setpoint_cp", "local/forward_kinematics", "body/set_cf_orientation_absolute", "use_gravity_compensation"),
+    *(
+        "local/measured_cp",
+        "local/setpoint_cp",
+        "local/forward_kinematics",
+        "body/set_cf_orientation_absolute",
+        "use_gravity_compensation",
+    ),
     *("trajectory_j/set_ratio", "trajectory_j/ratio"),
 )
 _JAW = tuple(f"jaw/{name}" for name in ("measured_js", "setpoint_js", "servo_jp", "move_jp", "servo_jf"))
@@ -60,15 +99,18 @@ PYTHON_CLIENT = frozenset(
     + [f"/{arm}/{name}" for arm in ("PSM1", "PSM2", "PSM3") for name in (*_JAW, "emulate_tool_present")]
     + [f"/SUJ/{arm}/{name}" for arm in ("PSM1", "PSM2", "PSM3", "ECM") for name in _SUJ]
 )
-"""What programs made with dvrk_python and crtk_python_client (commits a1b337b3 and 33b4c387) expect a peer for."""
+"""What programs made with dvrk_python and crtk_python_client (commits a1b337b3 and 33b4c387) expect a peer
+for.
+"""
 
 
 class Peer(Protocol):
     """A ROS program."""
 
     def join(self, rows: Sequence[Row]) -> None:
-        """Subscribe to rows that are published (as latched ones where they are), announce publishers of those subscribed to, and make clients of
-        services; return once every one of them has found the gateway."""
+        """Subscribe to rows that are published (as latched ones where they are), announce publishers of those
+        subscribed to, and make clients of services; return once every one of them has found the gateway.
+        """
         ...
 
     def send(self, row: Row, message: Message) -> None:
@@ -99,9 +141,13 @@ def check_published(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeou
         if row.topic not in told:
             continue
         message = peer.heard(row, timeout_s)
-        assert encode(without_stamp(message)) == encode(without_stamp(told[row.topic])), f"{row.topic}: {message} was told as {told[row.topic]}"
+        assert encode(without_stamp(message)) == encode(without_stamp(told[row.topic])), (
+            f"{row.topic}: {message} was told as {told[row.topic]}"
+        )
         stamp = _stamp(message)
-        assert stamp is None or abs(stamp - begun_ns) < 60 * 10**9, f"{row.topic}: stamp {stamp} is no wall time"
+        assert stamp is None or abs(stamp - begun_ns) < 60 * 10**9, (
+            f"{row.topic}: stamp {stamp} is no wall time"
+        )
         if row.periodic and stamp is not None:
             following = _stamp(_refreshed(gateway, row, peer, timeout_s))
             assert following is not None
@@ -133,14 +179,18 @@ def _tell_states(gateway: Gateway) -> None:
 
 
 def _refreshed(gateway: Gateway, row: Row, peer: Peer, timeout_s: float) -> Message:
-    """Return the next message of a state; a slow client is told again, as states are published for a second only."""
+    """Return the next message of a state; a slow client is told again, as states are published for a second
+    only.
+    """
     _tell(gateway, row)
     return peer.heard(row, timeout_s)
 
 
 def check_subscribed(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeout_s: float = 5.0) -> None:
     """What a program says enters the simulation as it was said, and nothing is refused."""
-    said = {row.port.name: (row, sample(row)) for row in rows if row.way == "subscribe" and row.port is not None}
+    said = {
+        row.port.name: (row, sample(row)) for row in rows if row.way == "subscribe" and row.port is not None
+    }
     list(gateway.read(0))
     for row, message in said.values():
         peer.send(row, message)
@@ -167,7 +217,11 @@ def check_served(gateway: Gateway, peer: Peer, rows: Sequence[Row]) -> None:
         arm = gateway.params.arms.shown[row.owner]  # pyright: ignore[reportArgumentType]
         queries, home = KinematicsQueries(arm.chain), np.array(arm.start)
         _tell_states(gateway)
-        base = None if row.name.startswith("local/") else _value(VectorCodec(_port(gateway, f"SUJ/{row.owner}/measured_cp")))
+        base = (
+            None
+            if row.name.startswith("local/")
+            else _value(VectorCodec(_port(gateway, f"SUJ/{row.owner}/measured_cp")))
+        )
         if row.name == "inverse_kinematics":
             there = queries.forward(home)
             answer = peer.call(row, InverseKinematicsRequest(cp=_pose(there.value), jp=home))
@@ -179,7 +233,14 @@ def check_served(gateway: Gateway, peer: Peer, rows: Sequence[Row]) -> None:
             assert isinstance(answer, ForwardKinematicsResponse)
             assert answer.result, answer.message
             np.testing.assert_array_equal(_numbers(answer.cp), queries.forward(home, base).value)
-        refused = peer.call(row, InverseKinematicsRequest(jp=np.zeros(9)) if row.name == "inverse_kinematics" else ForwardKinematicsRequest(jp=np.zeros(9)))
+        refused = peer.call(
+            row,
+            (
+                InverseKinematicsRequest(jp=np.zeros(9))
+                if row.name == "inverse_kinematics"
+                else ForwardKinematicsRequest(jp=np.zeros(9))
+            ),
+        )
         assert not getattr(refused, "result", True)
         assert "joints" in getattr(refused, "message", "")
 
@@ -191,11 +252,15 @@ def check_late_joiner(gateway: Gateway, late: Peer, *, timeout_s: float = 5.0) -
     late.join(latched)
     for row in latched:
         message = late.heard(row, timeout_s)
-        assert encode(without_stamp(message)) == encode(without_stamp(told[row.topic])), f"{row.topic}: {message} was told as {told[row.topic]}"
+        assert encode(without_stamp(message)) == encode(without_stamp(told[row.topic])), (
+            f"{row.topic}: {message} was told as {told[row.topic]}"
+        )
 
 
 def sample(row: Row) -> Message:
-    """Return a valid message of a row with something of its own in every field that programs look at, stamped now."""
+    """Return a valid message of a row with something of its own in every field that programs look at, stamped
+    now.
+    """
     model = message_type(row.type)
     content: dict[str, Any] = {}
     if "header" in model.model_fields:
@@ -214,7 +279,9 @@ def sample(row: Row) -> Message:
 
 
 _TURN = Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5)
-_POSE = Pose.model_validate({"position": {"x": 0.01, "y": -0.02, "z": 0.12}, "orientation": _TURN.model_dump()})
+_POSE = Pose.model_validate(
+    {"position": {"x": 0.01, "y": -0.02, "z": 0.12}, "orientation": _TURN.model_dump()}
+)
 _CONTENT: dict[str, Any] = {
     "pose": _POSE,
     "quaternion": _TURN,
@@ -246,7 +313,11 @@ _DATA: dict[str, Any] = {
 def without_stamp(message: Message) -> Message:
     """Return a message with stamp 0."""
     header = getattr(message, "header", None)
-    return message.model_copy(update={"header": Header(frame_id=header.frame_id)}) if isinstance(header, Header) else message
+    return (
+        message.model_copy(update={"header": Header(frame_id=header.frame_id)})
+        if isinstance(header, Header)
+        else message
+    )
 
 
 def _stamp(message: Message) -> int | None:
@@ -268,7 +339,9 @@ def _port(gateway: Gateway, name: str) -> Any:
 
 def _pose(value: Vector) -> Pose:
     x, y, z, qx, qy, qz, qw = value.tolist()
-    return Pose.model_validate({"position": {"x": x, "y": y, "z": z}, "orientation": {"x": qx, "y": qy, "z": qz, "w": qw}})
+    return Pose.model_validate(
+        {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": qx, "y": qy, "z": qz, "w": qw}}
+    )
 
 
 def _numbers(pose: Pose) -> Vector:

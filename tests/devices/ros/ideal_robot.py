@@ -1,4 +1,6 @@
-"""A robot that is at once where its drives are told to be: `motion.drive/* -> robot.*`, `robot.* -> motion.sense/*`."""
+"""A robot that is at once where its drives are told to be: `motion.drive/* -> robot.*`, `robot.* ->
+motion.sense/*`.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +35,18 @@ class IdealRobot(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        told = [port.model_copy(update={"name": name, "causality": "output"}) for name, port in self._measured.items()]
+        told = [
+            port.model_copy(update={"name": name, "causality": "output"})
+            for name, port in self._measured.items()
+        ]
         commands = {name.replace("measured_js", "servo_jp"): port for name, port in self._measured.items()}
-        return (*told, *(Port(name=name, causality="input", type=port.type, names=port.names) for name, port in commands.items()))
+        return (
+            *told,
+            *(
+                Port(name=name, causality="input", type=port.type, names=port.names)
+                for name, port in commands.items()
+            ),
+        )
 
     def configure(self, setup: Setup) -> Outputs:
         return self._state

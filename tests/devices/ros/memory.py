@@ -48,7 +48,9 @@ class MemoryTransport(Transport):
 
     def heard(self, topic: str) -> list[Message]:
         """Return what was published so far."""
-        return [decode(message_type(self.rows[topic].type), payload) for payload in list(self.published[topic])]
+        return [
+            decode(message_type(self.rows[topic].type), payload) for payload in list(self.published[topic])
+        ]
 
     def send(self, topic: str, message: Message | bytes, client: str = "/console") -> None:
         """Publish as a program would."""
@@ -89,4 +91,6 @@ class MemoryPeer:
         return decode(message_type(row.type), self._transport.published[row.topic][self._at[row.topic] - 1])
 
     def call(self, row: Row, request: Message) -> Message:
-        return decode(message_type(f"{row.type}_Response"), self._transport.handlers[row.topic](encode(request)))
+        return decode(
+            message_type(f"{row.type}_Response"), self._transport.handlers[row.topic](encode(request))
+        )

@@ -1,4 +1,5 @@
-"""A ROS 2 program on real rclpy, led by a test: to each line of JSON on its input, `{"do": ..., ...}`, it says one on its output.
+"""A ROS 2 program on real rclpy, led by a test: to each line of JSON on its input, `{"do": ..., ...}`, it
+says one on its output.
 
 Run by the Python of `rclpy_environment`, which has nothing of ours. Its messages are nested dictionaries.
 """
@@ -13,7 +14,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 
 class Console:
-    """A node with subscriptions, publishers and clients by topic. Messages are taken when asked for: an executor in Python is too slow for hundreds."""
+    """A node with subscriptions, publishers and clients by topic.
+
+    Messages are taken when asked for: an executor in Python is too slow for hundreds.
+    """
 
     def __init__(self, name):
         rclpy.init()
@@ -22,11 +26,16 @@ class Console:
         self.subscriptions, self.publishers, self.services = {}, {}, {}
 
     def join(self, rows, timeout):
-        """Make what fits each of `rows`: topic, type, way and whether it is latched; return what has found no peer in time."""
+        """Make what fits each of `rows`: topic, type, way and whether it is latched; return what has found no
+        peer in time.
+        """
         for topic, type_, way, latched in rows:
             cls = found(type_)
             if way == "publish":
-                quality = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
+                quality = QoSProfile(
+                    depth=10,
+                    durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+                )
                 self.subscriptions[topic] = self.node.create_subscription(cls, topic, lambda _: None, quality)
             elif way == "subscribe":
                 self.publishers[topic] = self.node.create_publisher(cls, topic, 10)
@@ -78,12 +87,25 @@ class Console:
         return flat(future.result()) if future.done() else None
 
     def nodes(self):
-        return [f"{namespace.rstrip('/')}/{name}" for name, namespace in self.node.get_node_names_and_namespaces()]
+        return [
+            f"{namespace.rstrip('/')}/{name}" for name, namespace in self.node.get_node_names_and_namespaces()
+        ]
 
     def offered(self, topic):
         """Return node, type, hash, durability and reliability of each publisher and subscription of a topic."""
-        there = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(topic)
-        return [(it.node_name, it.topic_type, str(it.topic_type_hash), it.qos_profile.durability.name, it.qos_profile.reliability.name) for it in there]
+        there = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(
+            topic
+        )
+        return [
+            (
+                it.node_name,
+                it.topic_type,
+                str(it.topic_type_hash),
+                it.qos_profile.durability.name,
+                it.qos_profile.reliability.name,
+            )
+            for it in there
+        ]
 
 
 def found(type_):

@@ -1,7 +1,8 @@
-"""An environment with real rclpy, from PyPI's wheels of ROS 2 Jazzy, and with messages that have no wheels (crtk_msgs, tf2_msgs), generated from our models.
+"""An environment with real rclpy, from PyPI's wheels of ROS 2 Jazzy, and with messages that have no wheels
+(crtk_msgs, tf2_msgs), generated from our models.
 
-It is made once, in XDG's cache folder, by `python -m tests.devices.ros.rclpy_environment`, which prints its Python, or by the first test that asks for
-the fixture `rclpy_python`. A program by hand:
+It is made once, in XDG's cache folder, by `python -m tests.devices.ros.rclpy_environment`, which prints its
+Python, or by the first test that asks for the fixture `rclpy_python`. A program by hand:
 
     export ROS_DOMAIN_ID=42 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
     $(python -m tests.devices.ros.rclpy_environment) program.py
@@ -22,9 +23,18 @@ import pytest
 from schemas.codec import message_types
 from schemas.message import msg_text
 
-WHEELS = [f"ros-jazzy-{name}" for name in ("rclpy", "rmw-fastrtps-cpp", "sensor-msgs", "geometry-msgs", "std-msgs", "std-srvs")]
-WHEELS += [f"ros-jazzy-rosidl-{name}" for name in ("adapter", "generator-c", "generator-cpp", "generator-py", "generator-type-description")]
-WHEELS += [f"ros-jazzy-rosidl-typesupport-{name}" for name in ("c", "cpp", "fastrtps-c", "fastrtps-cpp", "introspection-c")]
+WHEELS = [
+    f"ros-jazzy-{name}"
+    for name in ("rclpy", "rmw-fastrtps-cpp", "sensor-msgs", "geometry-msgs", "std-msgs", "std-srvs")
+]
+WHEELS += [
+    f"ros-jazzy-rosidl-{name}"
+    for name in ("adapter", "generator-c", "generator-cpp", "generator-py", "generator-type-description")
+]
+WHEELS += [
+    f"ros-jazzy-rosidl-typesupport-{name}"
+    for name in ("c", "cpp", "fastrtps-c", "fastrtps-cpp", "introspection-c")
+]
 GENERATED = ("crtk_msgs", "tf2_msgs")
 BUILDER = Path(__file__).parent / "rclpy_messages.py"
 
@@ -53,7 +63,9 @@ def make(directory, executable, texts):
     if shutil.which("gcc") is None or shutil.which("g++") is None:
         raise NoEnvironmentError("gcc and g++ are needed, to compile the messages of crtk_msgs")
     if not Path(sysconfig.get_path("include"), "Python.h").exists():
-        raise NoEnvironmentError("Python.h is needed, to compile the messages of crtk_msgs: install python3-dev")
+        raise NoEnvironmentError(
+            "Python.h is needed, to compile the messages of crtk_msgs: install python3-dev"
+        )
     venv.create(directory, clear=True)
     install = [sys.executable, "-m", "pip", "--python", executable, "install", "--quiet", *WHEELS]
     installed = subprocess.run(install, capture_output=True, text=True, check=False)
@@ -63,7 +75,12 @@ def make(directory, executable, texts):
         (directory / "interfaces" / path).parent.mkdir(parents=True, exist_ok=True)
         (directory / "interfaces" / path).write_text(text)
     environment = os.environ | {"AMENT_PREFIX_PATH": str(directory)}
-    subprocess.run([executable, BUILDER, directory / "interfaces", *GENERATED], env=environment, stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(
+        [executable, BUILDER, directory / "interfaces", *GENERATED],
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        check=True,
+    )
 
 
 def interfaces(package):

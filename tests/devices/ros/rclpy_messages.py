@@ -1,7 +1,8 @@
-"""Generates and compiles Python messages of ROS 2 packages for rclpy: what colcon and CMake do, by the same generators.
+"""Generates and compiles Python messages of ROS 2 packages for rclpy: what colcon and CMake do, by the same
+generators.
 
-Run by the Python of an environment with rclpy and the generators, `rclpy_messages.py DIRECTORY PACKAGE...`, where DIRECTORY/PACKAGE has msg/*.msg and
-srv/*.srv.
+Run by the Python of an environment with rclpy and the generators, `rclpy_messages.py DIRECTORY PACKAGE...`,
+where DIRECTORY/PACKAGE has msg/*.msg and srv/*.srv.
 """
 
 import json
@@ -37,7 +38,12 @@ def build(package, source):
     messages = out / "rosidl_generator_py" / package
     module = messages / f"{package}_s__rosidl_typesupport_c.so"
     compile_(module, out)
-    shutil.copytree(messages, Path(sysconfig.get_path("purelib")) / package, ignore=shutil.ignore_patterns("*.c"), dirs_exist_ok=True)
+    shutil.copytree(
+        messages,
+        Path(sysconfig.get_path("purelib")) / package,
+        ignore=shutil.ignore_patterns("*.c"),
+        dirs_exist_ok=True,
+    )
     for name in (WIRE, INTROSPECTION):  # as which the middleware looks for it
         shutil.copy(module, PREFIX / "lib" / f"lib{package}__{name}.so")
 
@@ -51,21 +57,35 @@ def generate(package, out):
         "idl_tuples": [f"{idl}:{file.relative_to(idl)}" for file in interfaces],
         "ros_interface_files": [str(file) for file in interfaces],
         "ros_interface_dependencies": [f"{file.parents[1].name}:{file}" for file in dependencies],
-        "include_paths": [f"{name}:{share / name}" for name in sorted({file.parents[1].name for file in dependencies})],
+        "include_paths": [
+            f"{name}:{share / name}" for name in sorted({file.parents[1].name for file in dependencies})
+        ],
         "target_dependencies": [],
     }
 
     def call(generator, name, *rest):
-        templates, folder, header = share / name / "resource", out / name / package, f"{name}__visibility_control.h"
+        templates, folder, header = (
+            share / name / "resource",
+            out / name / package,
+            f"{name}__visibility_control.h",
+        )
         folder.mkdir(parents=True)
         if (templates / f"{header}.in").exists():
-            generate_visibility_control_file(package_name=package, template_path=templates / f"{header}.in", output_path=folder / "msg" / header)
+            generate_visibility_control_file(
+                package_name=package,
+                template_path=templates / f"{header}.in",
+                output_path=folder / "msg" / header,
+            )
         file = out / f"{name}.json"
         file.write_text(json.dumps(arguments | {"template_dir": str(templates), "output_dir": str(folder)}))
         return generator(str(file), *rest)
 
-    described = {Path(file).stem: file for file in call(generate_type_hash, "rosidl_generator_type_description")}
-    arguments["type_description_tuples"] = [f"{file.relative_to(idl)}:{described[file.stem]}" for file in interfaces]
+    described = {
+        Path(file).stem: file for file in call(generate_type_hash, "rosidl_generator_type_description")
+    }
+    arguments["type_description_tuples"] = [
+        f"{file.relative_to(idl)}:{described[file.stem]}" for file in interfaces
+    ]
     call(generate_c, "rosidl_generator_c")
     call(generate_typesupport_fastrtps_c, WIRE)
     call(generate_introspection, INTROSPECTION)
@@ -75,10 +95,33 @@ def generate(package, out):
 
 def compile_(module, out):
     """Compile all into the one module that Python imports."""
-    folders = [*(out / name for name in GENERATORS), sysconfig.get_path("include"), numpy.get_include(), PREFIX / "include", *(PREFIX / "include").iterdir()]
+    folders = [
+        *(out / name for name in GENERATORS),
+        sysconfig.get_path("include"),
+        numpy.get_include(),
+        PREFIX / "include",
+        *(PREFIX / "include").iterdir(),
+    ]
     sources = sorted(file for suffix in ("c", "cpp") for file in out.rglob(f"*.{suffix}"))
-    libraries = [file for file in sorted((PREFIX / "lib").glob("lib*.so")) if file.stem.endswith(("_c", "_cpp", "_py", "rcutils", "fastcdr"))]
-    subprocess.run(["gcc", "-fPIC", "-shared", "-o", module, *(f"-I{folder}" for folder in folders), *sources, *libraries, "-lstdc++"], check=True)
+    libraries = [
+        file
+        for file in sorted((PREFIX / "lib").glob("lib*.so"))
+        if file.stem.endswith(("_c", "_cpp", "_py", "rcutils", "fastcdr"))
+    ]
+    subprocess.run(
+        [
+            "gcc",
+            "-fPIC",
+            "-shared",
+            "-o",
+            module,
+            *(f"-I{folder}" for folder in folders),
+            *sources,
+            *libraries,
+            "-lstdc++",
+        ],
+        check=True,
+    )
 
 
 if __name__ == "__main__":

@@ -26,14 +26,25 @@ def free_domain():
 
 def environment(domain, discovery="LOCALHOST"):
     """Return the variables of a ROS program in a domain on this machine."""
-    return {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": discovery}
+    return {
+        "PATH": os.environ["PATH"],
+        "HOME": os.environ["HOME"],
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": discovery,
+    }
 
 
 class RclpyPeer:
     """A program as the table's exercise wants it."""
 
     def __init__(self, python, domain, name="console", **settings):
-        self.process = subprocess.Popen([python, CONSOLE, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(domain, **settings))
+        self.process = subprocess.Popen(
+            [python, CONSOLE, name],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment(domain, **settings),
+        )
 
     def __enter__(self):
         return self
@@ -51,7 +62,12 @@ class RclpyPeer:
         return json.loads(self.process.stdout.readline() or '"the console has died"')
 
     def join(self, rows, timeout_s=20.0):
-        assert self.do("join", rows=[(row.topic, row.type, row.way, row.latched) for row in rows], timeout=timeout_s) == []
+        assert (
+            self.do(
+                "join", rows=[(row.topic, row.type, row.way, row.latched) for row in rows], timeout=timeout_s
+            )
+            == []
+        )
 
     def send(self, row, message, times=1):
         self.do("send", topic=row.topic, message=plain(message), times=times)
@@ -70,4 +86,5 @@ class RclpyPeer:
 
 
 def plain(message):
-    return json.loads(message.model_dump_json(exclude={"structure_needs_at_least_one_member"}))  # that of an empty message has no name in rclpy
+    # that of an empty message has no name in rclpy
+    return json.loads(message.model_dump_json(exclude={"structure_needs_at_least_one_member"}))

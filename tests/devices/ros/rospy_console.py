@@ -1,7 +1,9 @@
-"""A ROS 1 program on real rospy that shares nothing with the gateway; run by the Python that has rospy, not by ours.
+"""A ROS 1 program on real rospy that shares nothing with the gateway; run by the Python that has rospy, not
+by ours.
 
-As a program it takes orders from standard input, one JSON list a line, and answers each with a line: `["answer", ...]` or `["error", "why"]`. As a module
-it has `Arm`, a client of CRTK as crtk_python_client is one (written from its behaviour), for whoever measures with it.
+As a program it takes orders from standard input, one JSON list a line, and answers each with a line:
+`["answer", ...]` or `["error", "why"]`. As a module it has `Arm`, a client of CRTK as crtk_python_client is
+one (written from its behaviour), for whoever measures with it.
 """
 
 import json
@@ -22,18 +24,27 @@ TEXTS = {
     "crtk_msgs/OperatingState": "Header header\nstring state\nbool is_homed\nbool is_busy",
     "crtk_msgs/StringStamped": "std_msgs/Header header\nstring string",
     "crtk_msgs/CartesianState": (
-        "std_msgs/Header header\ngeometry_msgs/Pose pose\nstd_msgs/Bool pose_is_valid\ngeometry_msgs/Twist twist\nstd_msgs/Bool twist_is_valid\n"
-        "geometry_msgs/Wrench wrench\nstd_msgs/Bool wrench_is_valid"
+        "std_msgs/Header header\ngeometry_msgs/Pose pose\nstd_msgs/Bool pose_is_valid\ngeometry_msgs/Twist"
+        " twist\nstd_msgs/Bool twist_is_valid\ngeometry_msgs/Wrench wrench\nstd_msgs/Bool wrench_is_valid"
     ),
-    "crtk_msgs/CartesianImpedanceHalfPlaneGains": "\n".join(f"geometry_msgs/Vector3 {name}" for name in ("p", "d", "bias", "deadband")),
+    "crtk_msgs/CartesianImpedanceHalfPlaneGains": "\n".join(
+        f"geometry_msgs/Vector3 {name}" for name in ("p", "d", "bias", "deadband")
+    ),
     "crtk_msgs/CartesianImpedance": (
-        "Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3 force_position\ngeometry_msgs/Quaternion torque_orientation\n"
-        "crtk_msgs/CartesianImpedanceHalfPlaneGains position_positive\ncrtk_msgs/CartesianImpedanceHalfPlaneGains position_negative\n"
-        "crtk_msgs/CartesianImpedanceHalfPlaneGains orientation_positive\ncrtk_msgs/CartesianImpedanceHalfPlaneGains orientation_negative"
+        "Header header\ngeometry_msgs/Quaternion force_orientation\ngeometry_msgs/Vector3"
+        " force_position\ngeometry_msgs/Quaternion"
+        " torque_orientation\ncrtk_msgs/CartesianImpedanceHalfPlaneGains"
+        " position_positive\ncrtk_msgs/CartesianImpedanceHalfPlaneGains"
+        " position_negative\ncrtk_msgs/CartesianImpedanceHalfPlaneGains"
+        " orientation_positive\ncrtk_msgs/CartesianImpedanceHalfPlaneGains orientation_negative"
     ),
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
-    "crtk_msgs/QueryForwardKinematics": "float64[] jp\ngeometry_msgs/Pose cp\n---\ngeometry_msgs/Pose cp\nbool result\nstring message",
-    "crtk_msgs/QueryInverseKinematics": "geometry_msgs/Pose cp\nfloat64[] jp\n---\nfloat64[] jp\nbool result\nstring message",
+    "crtk_msgs/QueryForwardKinematics": (
+        "float64[] jp\ngeometry_msgs/Pose cp\n---\ngeometry_msgs/Pose cp\nbool result\nstring message"
+    ),
+    "crtk_msgs/QueryInverseKinematics": (
+        "geometry_msgs/Pose cp\nfloat64[] jp\n---\nfloat64[] jp\nbool result\nstring message"
+    ),
 }
 made = {}
 
@@ -44,15 +55,27 @@ def ros1(type_):
 
 
 def text_of(name):
-    return TEXTS[name] if name in TEXTS else roslib.message.get_message_class(name)._full_text.split(RULER[:-1])[0]
+    return (
+        TEXTS[name]
+        if name in TEXTS
+        else roslib.message.get_message_class(name)._full_text.split(RULER[:-1])[0]
+    )
 
 
 def held(name, text):
-    """Return the messages that a definition holds, and those that these hold; what has no package is of the same."""
+    """Return the messages that a definition holds, and those that these hold; what has no package is of the
+    same.
+    """
     found = {}
     for kind in re.findall(r"^([A-Za-z_]\w*(?:/\w+)?)(?:\[\d*\])?\s+\w+", text, re.MULTILINE):
         if kind == "Header" or kind[0].isupper() or "/" in kind:
-            part = "std_msgs/Header" if kind == "Header" else kind if "/" in kind else f"{name.partition('/')[0]}/{kind}"
+            part = (
+                "std_msgs/Header"
+                if kind == "Header"
+                else kind
+                if "/" in kind
+                else f"{name.partition('/')[0]}/{kind}"
+            )
             found |= {part: text_of(part)} | held(part, text_of(part))
     return found
 
@@ -75,8 +98,16 @@ def service_class(type_):
     for part, text in held(name, TEXTS[name]).items():
         genmsg.msg_loader.load_msg_from_string(context, text, part)
     spec = genmsg.msg_loader.load_srv_from_string(context, TEXTS[name], name)
-    request, response = (built(f"{name}{part}", text) for part, text in zip(("Request", "Response"), TEXTS[name].split("\n---\n"), strict=True))
-    return SimpleNamespace(_type=name, _md5sum=genmsg.compute_md5(context, spec), _request_class=request, _response_class=response)
+    request, response = (
+        built(f"{name}{part}", text)
+        for part, text in zip(("Request", "Response"), TEXTS[name].split("\n---\n"), strict=True)
+    )
+    return SimpleNamespace(
+        _type=name,
+        _md5sum=genmsg.compute_md5(context, spec),
+        _request_class=request,
+        _response_class=response,
+    )
 
 
 def flat(value):
@@ -84,7 +115,11 @@ def flat(value):
     if isinstance(value, genpy.TVal):
         return {"sec": value.secs, "nanosec": value.nsecs}
     if isinstance(value, genpy.Message):
-        fields = {name.lower() if len(name) == 1 else name: flat(getattr(value, name)) for name in value.__slots__ if name != "seq"}
+        fields = {
+            name.lower() if len(name) == 1 else name: flat(getattr(value, name))
+            for name in value.__slots__
+            if name != "seq"
+        }
         return fields or {"structure_needs_at_least_one_member": 0}
     return [flat(each) for each in value] if isinstance(value, bytes | list | tuple) else value
 
@@ -110,20 +145,43 @@ def raw(kind, octets):
 
 
 class Arm:
-    """Enables, homes and moves one arm, and waits as crtk_python_client does: for busy told after the order, then for not busy."""
+    """Enables, homes and moves one arm, and waits as crtk_python_client does: for busy told after the order,
+    then for not busy.
+    """
 
     def __init__(self, name, stamped=True):
         self.name, self.stamped = name, stamped
         self.changed, self.state, self.joints, self.events, self.states = Condition(), None, None, [], 0
-        self.kept = [rospy.Subscriber(f"/{name}/operating_state", message_class("crtk_msgs/OperatingState"), self._told, queue_size=100)]
-        self.kept.append(rospy.Subscriber(f"/{name}/measured_js", message_class("sensor_msgs/JointState"), self._measured, queue_size=10, tcp_nodelay=True))
-        self.state_command = rospy.Publisher(f"/{name}/state_command", message_class("crtk_msgs/StringStamped"), latch=True, queue_size=10)
+        self.kept = [
+            rospy.Subscriber(
+                f"/{name}/operating_state",
+                message_class("crtk_msgs/OperatingState"),
+                self._told,
+                queue_size=100,
+            )
+        ]
+        self.kept.append(
+            rospy.Subscriber(
+                f"/{name}/measured_js",
+                message_class("sensor_msgs/JointState"),
+                self._measured,
+                queue_size=10,
+                tcp_nodelay=True,
+            )
+        )
+        self.state_command = rospy.Publisher(
+            f"/{name}/state_command", message_class("crtk_msgs/StringStamped"), latch=True, queue_size=10
+        )
         joints = message_class("sensor_msgs/JointState")
-        self.movers = {kind: rospy.Publisher(f"/{name}/{kind}", joints, queue_size=10, tcp_nodelay=True) for kind in ("move_jp", "servo_jp")}
+        self.movers = {
+            kind: rospy.Publisher(f"/{name}/{kind}", joints, queue_size=10, tcp_nodelay=True)
+            for kind in ("move_jp", "servo_jp")
+        }
 
     def _told(self, message):
         with self.changed:
-            if self.state is None or message.header.stamp > self.state.header.stamp:  # older ones are not looked at
+            # older ones are not looked at
+            if self.state is None or message.header.stamp > self.state.header.stamp:
                 self.state = message
                 self.events.append(message)
                 self.changed.notify_all()
@@ -143,7 +201,9 @@ class Arm:
     def _until(self, holds, seconds):
         with self.changed:
             if not self.changed.wait_for(holds, seconds):
-                raise TimeoutError(f"{self.name}: still waiting after {seconds} s; last told: {self.events[-3:]}")
+                raise TimeoutError(
+                    f"{self.name}: still waiting after {seconds} s; last told: {self.events[-3:]}"
+                )
 
     def command(self, word):
         message = message_class("crtk_msgs/StringStamped")()
@@ -181,7 +241,10 @@ class Arm:
         with self.changed:
             heard = len(self.events)
         self._order("move_jp", positions)
-        self._until(lambda: any(state.is_busy for state in self.events[heard:]) and not self.events[-1].is_busy, seconds)
+        self._until(
+            lambda: any(state.is_busy for state in self.events[heard:]) and not self.events[-1].is_busy,
+            seconds,
+        )
 
 
 class Console:
@@ -209,7 +272,9 @@ class Console:
             rospy.wait_for_service(topic, 10.0)
         ends = heard + [self.publishers[topic] for topic, _, way in rows if way == "subscribe"]
         end = time.time() + 20.0
-        while (missing := [each.name for each in ends if not each.get_num_connections()]) and time.time() < end:
+        while (
+            missing := [each.name for each in ends if not each.get_num_connections()]
+        ) and time.time() < end:
             time.sleep(0.02)
         return missing
 

@@ -21,23 +21,45 @@ NOETIC = "/opt/ros/noetic/lib/python3/dist-packages"
 
 @cache
 def rospy_python():
-    """Return a Python that has rospy, rosmaster and the common messages, with what its environment must have; None if there is none."""
-    for python, path in ((shutil.which("python3", path="/usr/bin"), ""), (shutil.which("python3", path="/usr/bin"), NOETIC), (sys.executable, "")):
+    """Return a Python that has rospy, rosmaster and the common messages, with what its environment must have;
+    None if there is none.
+    """
+    for python, path in (
+        (shutil.which("python3", path="/usr/bin"), ""),
+        (shutil.which("python3", path="/usr/bin"), NOETIC),
+        (sys.executable, ""),
+    ):
         if python is None:
             continue
-        wanted = "import rospy, rosmaster, rostopic, roslib.message, sensor_msgs.msg, geometry_msgs.msg, std_msgs.msg"
-        if subprocess.run([python, "-c", wanted], env=environment(path), capture_output=True, timeout=60, check=False).returncode == 0:
+        wanted = (
+            "import rospy, rosmaster, rostopic, roslib.message, sensor_msgs.msg, geometry_msgs.msg,"
+            " std_msgs.msg"
+        )
+        if (
+            subprocess.run(
+                [python, "-c", wanted], env=environment(path), capture_output=True, timeout=60, check=False
+            ).returncode
+            == 0
+        ):
             return python, path
     return None
 
 
 def environment(path, **more):
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "PYTHON"))}
-    return kept | {"PATH": f"{kept['PATH']}:/opt/ros/noetic/bin", "PYTHONPATH": path, "ROS_IP": "127.0.0.1"} | more
+    return (
+        kept
+        | {"PATH": f"{kept['PATH']}:/opt/ros/noetic/bin", "PYTHONPATH": path, "ROS_IP": "127.0.0.1"}
+        | more
+    )
 
 
 needs_rospy = pytest.mark.skipif(
-    rospy_python() is None, reason="needs rospy: apt install python3-rospy python3-rosmaster python3-rostopic python3-{sensor,geometry,std}-msgs"
+    rospy_python() is None,
+    reason=(
+        "needs rospy: apt install python3-rospy python3-rosmaster python3-rostopic"
+        " python3-{sensor,geometry,std}-msgs"
+    ),
 )
 
 
@@ -50,7 +72,9 @@ def until(condition, seconds=5.0):
 
 
 class Ros1:
-    """A master, which can be stopped and started again at the same port, and what programs must be told of it."""
+    """A master, which can be stopped and started again at the same port, and what programs must be told of
+    it.
+    """
 
     def __init__(self, directory):
         with socket.socket() as sock:
@@ -59,11 +83,20 @@ class Ros1:
         self.uri = f"http://127.0.0.1:{self.port}"
         python, path = rospy_python()
         self.python, self.process = python, None
-        self.environment = environment(path, ROS_MASTER_URI=self.uri, ROS_HOME=str(directory), ROS_LOG_DIR=str(directory / "log"))
+        self.environment = environment(
+            path, ROS_MASTER_URI=self.uri, ROS_HOME=str(directory), ROS_LOG_DIR=str(directory / "log")
+        )
 
     def start(self):
-        serve = f"import rosmaster.master, time; rosmaster.master.Master({self.port}).start(); time.sleep(1e6)"
-        self.process = subprocess.Popen([self.python, "-c", serve], env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        serve = (
+            f"import rosmaster.master, time; rosmaster.master.Master({self.port}).start(); time.sleep(1e6)"
+        )
+        self.process = subprocess.Popen(
+            [self.python, "-c", serve],
+            env=self.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         assert until(self._answers, 20.0), "the master does not start"
 
     def _answers(self):
@@ -93,7 +126,14 @@ class Program:
     def __init__(self, ros, name="console"):
         self.name = f"/{name}"
         command = [ros.python, str(CONSOLE), name]
-        self.process = subprocess.Popen(command, env=ros.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.process = subprocess.Popen(
+            command,
+            env=ros.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
 
     def __enter__(self):
         return self
@@ -138,4 +178,6 @@ class TablePeer:
         return message_type(row.type).model_validate(fields)
 
     def call(self, row, request):
-        return message_type(f"{row.type}_Response").model_validate(self.program.call(row.topic, request.model_dump(mode="json")))
+        return message_type(f"{row.type}_Response").model_validate(
+            self.program.call(row.topic, request.model_dump(mode="json"))
+        )

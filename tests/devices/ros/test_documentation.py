@@ -1,4 +1,5 @@
-"""docs/ros.md says what the gateways do: its tables are made of their tables, and what it prints for a shell or a scenario works.
+"""docs/ros.md says what the gateways do: its tables are made of their tables, and what it prints for a shell
+or a scenario works.
 
 `python -m tests.devices.ros.test_documentation` prints the tables.
 """
@@ -40,7 +41,9 @@ UNDER = {
 
 
 def lines_of(rows):
-    """Return the lines of a table: the topics of one owner, way and type together, those that all arms have under `<arm>`."""
+    """Return the lines of a table: the topics of one owner, way and type together, those that all arms have
+    under `<arm>`.
+    """
     having = {}
     for row in rows:
         having.setdefault((row.name, row.type), []).append(row.owner)
@@ -48,12 +51,19 @@ def lines_of(rows):
     for row in rows:
         psm, ecm = "PSM1" in having[row.name, row.type], "ECM" in having[row.name, row.type]
         arm = "/<arm>" if psm and ecm else "/<PSM>" if psm else "/ECM"
-        under = arm if row.owner in ("PSM1", "PSM2", "PSM3", "ECM") else UNDER.get(row.owner, f"/{row.owner}".rstrip("/"))
+        under = (
+            arm
+            if row.owner in ("PSM1", "PSM2", "PSM3", "ECM")
+            else UNDER.get(row.owner, f"/{row.owner}".rstrip("/"))
+        )
         names = groups.setdefault((under, way_of(row), re.sub("/(msg|srv)/", "/", row.type)), [])
         names += [] if row.name in names else [row.name]
     order = list(dict.fromkeys(under for under, *_ in groups))
     lines = sorted(groups.items(), key=lambda group: (order.index(group[0][0]), WAYS.index(group[0][1])))
-    return [f"| `{under}/` | {', '.join(f'`{name}`' for name in names)} | {type_} | {way} |" for (under, way, type_), names in lines]
+    return [
+        f"| `{under}/` | {', '.join(f'`{name}`' for name in names)} | {type_} | {way} |"
+        for (under, way, type_), names in lines
+    ]
 
 
 WAYS = ["states", "events", "pictures", "heard", "service"]
@@ -61,13 +71,17 @@ WAYS = ["states", "events", "pictures", "heard", "service"]
 
 def way_of(row):
     if row.way == "publish":
-        return "states" if row.periodic else "pictures" if row.name.startswith(("left/", "right/")) else "events"
+        return (
+            "states" if row.periodic else "pictures" if row.name.startswith(("left/", "right/")) else "events"
+        )
     return {"subscribe": "heard", "serve": "service"}[row.way]
 
 
 def tables():
     """Return the tables of the page."""
-    own = GatewayParams.model_validate({"profile": "paper", "arms": {"PSM1": HOLDING, "PSM2": HOLDING, "ECM": {}}})
+    own = GatewayParams.model_validate(
+        {"profile": "paper", "arms": {"PSM1": HOLDING, "PSM2": HOLDING, "ECM": {}}}
+    )
     missing = [f"| `{name}` | {why} |" for name, why in NOT_SERVED.items()]
     return {"TABLE": lines_of(face(SHOWN)), "MISSING": missing, "PAPER": lines_of(paper_face(own))}
 
@@ -90,7 +104,9 @@ def test_its_sessions_can_be_run(name, overrides):
 def test_its_scenario_is_driven_by_the_bag_of_a_real_arm(tmp_path):
     (whole,) = re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
     topics = (("/PSM1/setpoint_js", 6), ("/PSM1/jaw/setpoint_js", 1))
-    states = [(0.1 * k, topic, joints(0.1 * k, *[0.01 * k] * count)) for k in range(3) for topic, count in topics]
+    states = [
+        (0.1 * k, topic, joints(0.1 * k, *[0.01 * k] * count)) for k in range(3) for topic, count in topics
+    ]
     (tmp_path / "data").mkdir()
     write(tmp_path / "data" / "suturing", states)
     (tmp_path / "suturing.yaml").write_text(whole)
@@ -103,8 +119,13 @@ def test_its_settings_of_zenoh_let_a_program_in(gated):
     """As rmw_zenoh reads ZENOH_CONFIG_OVERRIDE: `key=value`, with semicolons between."""
     gateway, endpoint, authority = gated
     (override,) = re.findall(r"ZENOH_CONFIG_OVERRIDE=(\S*tls\S*)", TEXT)
-    (spelt_out,) = shlex.split(override.replace("$PEM", str(authority.issued("console").file)).replace("tls/hub.lab:7447", endpoint))
-    settings = {key: json.loads(value) for key, _, value in (setting.partition("=") for setting in spelt_out.split(";"))}
+    (spelt_out,) = shlex.split(
+        override.replace("$PEM", str(authority.issued("console").file)).replace("tls/hub.lab:7447", endpoint)
+    )
+    settings = {
+        key: json.loads(value)
+        for key, _, value in (setting.partition("=") for setting in spelt_out.split(";"))
+    }
     heard = []
     with Peer(endpoint, settings=settings) as console:
         console.listen(STATE, JOINTS, lambda message, _: heard.append(message))

@@ -22,13 +22,22 @@ PROGRAM = Path(__file__).parents[3] / "examples" / "ros2_psm.py"
 
 def test_the_program_of_the_documentation_moves_an_arm(rclpy_python, domain, tmp_path):
     gateway = f"{{kind: ros2-dds, domain: {domain}, mounting: cart, arms: *psm, cameras: []}}"
-    (tmp_path / "psm.yaml").write_text(SCENARIO.format(device=gateway, pace="realtime", duration="120 s") + "  - motion.* -> ros.*\n")
+    (tmp_path / "psm.yaml").write_text(
+        SCENARIO.format(device=gateway, pace="realtime", duration="120 s") + "  - motion.* -> ros.*\n"
+    )
     session = launch(load(str(tmp_path / "psm.yaml")), endpoint=free_endpoint(range(1)))
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
     def program():
         try:
-            return subprocess.run([rclpy_python, PROGRAM], env=environment, capture_output=True, text=True, timeout=100, check=False)
+            return subprocess.run(
+                [rclpy_python, PROGRAM],
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=100,
+                check=False,
+            )
         finally:
             session.state.shutdown()
 

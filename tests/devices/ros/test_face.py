@@ -14,12 +14,18 @@ PARAMS = GatewayParams.model_validate(WHOLE)
 ROWS = {row.topic: row for row in face(PARAMS)}
 
 ARM_NAMES = {
-    "subscribe": "state_command hold free servo_jp servo_jr servo_jf move_jp move_jr servo_cp servo_cr move_cp servo_cs servo_ci body/servo_cf"
-    " spatial/servo_cf use_gravity_compensation body/set_cf_orientation_absolute set_base_frame trajectory_j/set_ratio trajectory_j/set_ratio_v"
-    " trajectory_j/set_ratio_a",
-    "publish": "operating_state desired_state goal_reached error warning status measured_js setpoint_js gravity_compensation/setpoint_js measured_cp"
-    " setpoint_cp local/measured_cp local/setpoint_cp measured_cv local/measured_cv body/measured_cf spatial/measured_cf body/jacobian spatial/jacobian"
-    " trajectory_j/ratio trajectory_j/ratio_v trajectory_j/ratio_a",
+    "subscribe": (
+        "state_command hold free servo_jp servo_jr servo_jf move_jp move_jr servo_cp servo_cr move_cp"
+        " servo_cs servo_ci body/servo_cf spatial/servo_cf use_gravity_compensation"
+        " body/set_cf_orientation_absolute set_base_frame trajectory_j/set_ratio trajectory_j/set_ratio_v"
+        " trajectory_j/set_ratio_a"
+    ),
+    "publish": (
+        "operating_state desired_state goal_reached error warning status measured_js setpoint_js"
+        " gravity_compensation/setpoint_js measured_cp setpoint_cp local/measured_cp local/setpoint_cp"
+        " measured_cv local/measured_cv body/measured_cf spatial/measured_cf body/jacobian spatial/jacobian"
+        " trajectory_j/ratio trajectory_j/ratio_v trajectory_j/ratio_a"
+    ),
     "serve": "forward_kinematics local/forward_kinematics inverse_kinematics",
 }
 """As the bridge of the real system lists them (jhu-cisst/cisst-ros, commit 73aca61c)."""
@@ -55,9 +61,13 @@ def test_topics_and_ports_are_unique_and_of_known_types() -> None:
 @pytest.mark.parametrize("mounting", ["free", "cart"])
 @pytest.mark.parametrize("reference", ["camera", "base", "world"])
 def test_it_fits_the_motion_controller(mounting: str, reference: str) -> None:
-    """What both have is of one type, frame and size, and whatever motion tells or takes of an arm is in the table, but for what the real bridge lacks."""
+    """What both have is of one type, frame and size, and whatever motion tells or takes of an arm is in the
+    table, but for what the real bridge lacks.
+    """
     told = {name: WHOLE[name] for name in ("arms",)} | {"mounting": mounting, "reference": reference}
-    rows = {row.port.name: row.port for row in face(GatewayParams.model_validate(told)) if row.port is not None}
+    rows = {
+        row.port.name: row.port for row in face(GatewayParams.model_validate(told)) if row.port is not None
+    }
     ports = MotionController("motion", MotionParams.model_validate(told)).ports
     for port in ports:
         if port.name.startswith(("drive/", "sense/")) or port.name.endswith("setpoint_cv"):
@@ -66,7 +76,13 @@ def test_it_fits_the_motion_controller(mounting: str, reference: str) -> None:
         assert {ours.causality, port.causality} == {"input", "output"}
         assert (ours.type, ours.variability) == (port.type, port.variability)
         if port.variability == "signal":
-            assert (ours.names, ours.fields, ours.size, ours.shape, ours.frame) == (port.names, port.fields, port.size, port.shape, port.frame)
+            assert (ours.names, ours.fields, ours.size, ours.shape, ours.frame) == (
+                port.names,
+                port.fields,
+                port.size,
+                port.shape,
+                port.frame,
+            )
 
 
 def test_events_are_latched_states_are_periodic_and_pictures_neither() -> None:
@@ -92,7 +108,11 @@ def test_a_real_arm_is_the_other_way_round() -> None:
 def test_a_namespace_is_of_what_is_simulated() -> None:
     topics = {row.topic for row in face(GatewayParams.model_validate(WHOLE | {"namespace": "sim"}))}
     assert {"/sim/PSM1/measured_js", "/sim/tf", "/MTML/measured_js"} <= topics
-    assert all(row.name == ROWS[row.topic.removeprefix("/sim")].name for row in face(GatewayParams.model_validate({"namespace": "sim"})) if row.owner)
+    assert all(
+        row.name == ROWS[row.topic.removeprefix("/sim")].name
+        for row in face(GatewayParams.model_validate({"namespace": "sim"}))
+        if row.owner
+    )
 
 
 def test_an_arm_is_simulated_or_real() -> None:
@@ -105,12 +125,25 @@ def test_a_description_that_is_not_there() -> None:
         GatewayParams.model_validate({"robot_description": "nowhere.urdf"})
 
 
-@pytest.mark.parametrize(("topic", "leads"), [("servo_jp", True), ("jaw/move_jp", True), ("body/servo_cf", True), ("hold", False), ("state_command", False)])
+@pytest.mark.parametrize(
+    ("topic", "leads"),
+    [
+        ("servo_jp", True),
+        ("jaw/move_jp", True),
+        ("body/servo_cf", True),
+        ("hold", False),
+        ("state_command", False),
+    ],
+)
 def test_what_leads_an_arm(topic: str, leads: bool) -> None:
     assert ROWS[f"/PSM1/{topic}"].leads is leads
 
 
 def test_real_pedals_come_in_instead_of_going_out():
-    rows = [row for row in face(GatewayParams.model_validate({"listen": ["footpedals"], "namespace": "simulation"})) if row.owner == "footpedals"]
+    rows = [
+        row
+        for row in face(GatewayParams.model_validate({"listen": ["footpedals"], "namespace": "simulation"}))
+        if row.owner == "footpedals"
+    ]
     assert {row.way for row in rows} == {"subscribe"}
     assert "/footpedals/clutch" in {row.topic for row in rows}

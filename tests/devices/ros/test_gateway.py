@@ -33,7 +33,10 @@ from schemas.trocar_msgs import GatewayStatus
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise, sample
 from tests.devices.ros.memory import MemoryGateway, MemoryPeer
 
-SMALL: dict[str, Any] = {"arms": {"PSM1": {"instrument": "LARGE_NEEDLE_DRIVER_400006"}, "ECM": {}}, "listen": ["MTML"]}
+SMALL: dict[str, Any] = {
+    "arms": {"PSM1": {"instrument": "LARGE_NEEDLE_DRIVER_400006"}, "ECM": {}},
+    "listen": ["MTML"],
+}
 
 
 def make(params: dict[str, Any] = SMALL) -> MemoryGateway:
@@ -122,29 +125,51 @@ def test_a_state_that_is_old_is_told_no_more(gateway: MemoryGateway, monkeypatch
     assert 0 < count == len(gateway.transport.published["/PSM1/measured_js"])
 
 
-def test_stamps_increase_though_the_clock_is_set_back(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stamps_increase_though_the_clock_is_set_back(
+    gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
+) -> None:
     times = iter([10**18, 10**18, 5 * 10**17])
     monkeypatch.setattr("devices.ros.topics.stamps.time_ns", lambda: next(times))
     for _ in range(3):
-        gateway.write("PSM1/operating_state", OperatingState(header=Header(stamp=Time(sec=3)), state="ENABLED"))
-    stamps = [message.header.stamp.ns - 10**18 for message in gateway.transport.heard("/PSM1/operating_state") if isinstance(message, OperatingState)]
+        gateway.write(
+            "PSM1/operating_state", OperatingState(header=Header(stamp=Time(sec=3)), state="ENABLED")
+        )
+    stamps = [
+        message.header.stamp.ns - 10**18
+        for message in gateway.transport.heard("/PSM1/operating_state")
+        if isinstance(message, OperatingState)
+    ]
     assert stamps == [0, 1, 2]
 
 
 def test_frames_from_the_cart_to_tips_and_camera(tmp_path: Path) -> None:
     with make(SMALL | {"mounting": "cart"}) as gateway:
         gateway.open(tmp_path)
-        for name in ("SUJ/PSM1/local/measured_cp", "PSM1/local/measured_cp", "SUJ/ECM/local/measured_cp", "ECM/local/measured_cp"):
+        for name in (
+            "SUJ/PSM1/local/measured_cp",
+            "PSM1/local/measured_cp",
+            "SUJ/ECM/local/measured_cp",
+            "ECM/local/measured_cp",
+        ):
             gateway.write(name, np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]))
         sleep(0.1)
         told = gateway.transport.heard("/tf")[-1]
     assert isinstance(told, TFMessage)
     edges = {(one.header.frame_id, one.child_frame_id) for one in told.transforms}
-    assert edges == {("Cart", "PSM1_base"), ("PSM1_base", "PSM1"), ("Cart", "ECM_base"), ("ECM_base", "ECM"), ("ECM", "endoscope_left_optical")}
+    assert edges == {
+        ("Cart", "PSM1_base"),
+        ("PSM1_base", "PSM1"),
+        ("Cart", "ECM_base"),
+        ("ECM_base", "ECM"),
+        ("ECM", "endoscope_left_optical"),
+    }
     assert len({child for _, child in edges}) == len(edges)
     assert len({one.header.stamp.ns for one in told.transforms}) == 1
     for one in told.transforms[:4]:
-        assert one.transform.model_dump() == {"translation": {"x": 1.0, "y": 2.0, "z": 3.0}, "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+        assert one.transform.model_dump() == {
+            "translation": {"x": 1.0, "y": 2.0, "z": 3.0},
+            "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+        }
 
 
 def test_joint_states_of_all_arms(gateway: MemoryGateway) -> None:
@@ -154,33 +179,44 @@ def test_joint_states_of_all_arms(gateway: MemoryGateway) -> None:
     sleep(0.05)
     told = gateway.transport.heard("/joint_states")[-1]
     assert isinstance(told, JointState)
-    assert told.name == [f"PSM1_{name}" for name in ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw", "jaw")] + [
-        f"ECM_{name}" for name in ("yaw", "pitch", "insertion", "roll")
-    ]
+    assert told.name == [
+        f"PSM1_{name}" for name in ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw", "jaw")
+    ] + [f"ECM_{name}" for name in ("yaw", "pitch", "insertion", "roll")]
     assert told.position.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 0.5, 0.0, 1.0, 2.0, 3.0]
     assert told.velocity.tolist() == [6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 0.6, 4.0, 5.0, 6.0, 7.0]
 
 
 def test_a_description_is_latched(tmp_path: Path) -> None:
     file = tmp_path / "dvrk.urdf"
-    file.write_text('<robot name="dvrk"><mesh filename="assets/tip.obj" /><mesh filename="package://dvrk/tip.obj" /></robot>')
+    file.write_text(
+        '<robot name="dvrk"><mesh filename="assets/tip.obj" /><mesh filename="package://dvrk/tip.obj"'
+        " /></robot>"
+    )
     with make(SMALL | {"robot_description": str(file)}) as gateway:
         gateway.open(tmp_path)
         (told,) = words(gateway, "/robot_description")
-        assert told == f'<robot name="dvrk"><mesh filename="{tmp_path.as_uri()}/assets/tip.obj" /><mesh filename="package://dvrk/tip.obj" /></robot>'
+        assert (
+            told == f'<robot name="dvrk"><mesh filename="{tmp_path.as_uri()}/assets/tip.obj" /><mesh'
+            ' filename="package://dvrk/tip.obj" /></robot>'
+        )
         assert gateway.transport.rows["/robot_description"].latched
 
 
 def test_a_description_that_is_none(tmp_path: Path) -> None:
     file = tmp_path / "dvrk.urdf"
     file.write_text("solid tip")
-    with make(SMALL | {"robot_description": str(file)}) as gateway, pytest.raises(DeviceError, match="is no URDF"):
+    with (
+        make(SMALL | {"robot_description": str(file)}) as gateway,
+        pytest.raises(DeviceError, match="is no URDF"),
+    ):
         gateway.open(tmp_path)
 
 
 def test_a_service_without_a_session_says_so(gateway: MemoryGateway) -> None:
     peer = MemoryPeer(gateway.transport)
-    answer = peer.call(gateway.transport.rows["/PSM1/forward_kinematics"], ForwardKinematicsRequest(jp=np.zeros(6)))
+    answer = peer.call(
+        gateway.transport.rows["/PSM1/forward_kinematics"], ForwardKinematicsRequest(jp=np.zeros(6))
+    )
     assert "is the session running" in getattr(answer, "message", "")
 
 
@@ -194,7 +230,11 @@ BAD: list[tuple[str, Message | bytes, str]] = [
     ("jaw/move_jp", joints(0.1, 0.2), "2 values in position, expected 1"),
     ("servo_cp", PoseStamped.model_validate({"pose": {"orientation": {"w": 0.0}}}), "norm 0, expected 1"),
     ("move_cp", PoseStamped.model_validate({"pose": {"orientation": {"w": 2.0}}}), "norm 2, expected 1"),
-    ("servo_jp", encode(joints(*[1e300] * 6)).replace(b"\x9c\x75\x00\x88\x3c\xe4\x37\x7e", b"\x00" * 6 + b"\xf8\x7f"), "finite"),
+    (
+        "servo_jp",
+        encode(joints(*[1e300] * 6)).replace(b"\x9c\x75\x00\x88\x3c\xe4\x37\x7e", b"\x00" * 6 + b"\xf8\x7f"),
+        "finite",
+    ),
     ("servo_jp", b"", "no such message"),
     ("servo_jp", b"\x00\x01\x00\x00\xff", "no such message"),
     ("servo_jp", encode(joints(0.0))[:-3], "no such message"),
@@ -202,7 +242,9 @@ BAD: list[tuple[str, Message | bytes, str]] = [
 
 
 @pytest.mark.parametrize(("name", "message", "reason"), BAD)
-def test_what_is_no_command_is_an_error_on_the_arms_topic(gateway: MemoryGateway, name: str, message: Message | bytes, reason: str) -> None:
+def test_what_is_no_command_is_an_error_on_the_arms_topic(
+    gateway: MemoryGateway, name: str, message: Message | bytes, reason: str
+) -> None:
     gateway.transport.send(f"/PSM1/{name}", message)
     assert commands(gateway) == []
     (told,) = words(gateway, "/PSM1/error")
@@ -217,7 +259,11 @@ def test_only_six_finite_positions_move_an_arm(positions: list[float], velocitie
     gateway = _opened()
     raw = _cdr(positions, velocities)
     gateway.transport.send("/PSM1/servo_jp", raw)
-    good = len(positions) == 6 and len(velocities) in (0, 6) and bool(np.isfinite([*positions, *velocities]).all())
+    good = (
+        len(positions) == 6
+        and len(velocities) in (0, 6)
+        and bool(np.isfinite([*positions, *velocities]).all())
+    )
     assert len(commands(gateway)) == good
 
 
@@ -266,7 +312,9 @@ def _closed() -> Generator[None]:
 def _cdr(positions: list[float], velocities: list[float]) -> bytes:
     """Return a JointState with any numbers, which our own models refuse to write."""
     marks = [float(i + 1) * 1.2345e-7 for i in range(len(positions) + len(velocities))]
-    raw = encode(JointState(position=np.array(marks[: len(positions)]), velocity=np.array(marks[len(positions) :])))
+    raw = encode(
+        JointState(position=np.array(marks[: len(positions)]), velocity=np.array(marks[len(positions) :]))
+    )
     for mark, number in zip(marks, [*positions, *velocities], strict=True):
         raw = raw.replace(np.float64(mark).tobytes(), np.float64(number).tobytes(), 1)
     return raw
@@ -279,14 +327,20 @@ def test_the_console_has_warnings_only(gateway: MemoryGateway) -> None:
 
 
 def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> None:
-    old, now = (StringStamped(header=Header(stamp=Time.from_ns(stamp)), string="home") for stamp in (time_ns() - 10**11, time_ns()))
+    old, now = (
+        StringStamped(header=Header(stamp=Time.from_ns(stamp)), string="home")
+        for stamp in (time_ns() - 10**11, time_ns())
+    )
     gateway.transport.send("/PSM1/state_command", old)
     assert commands(gateway) == []
     (told,) = words(gateway, "/PSM1/warning")
     assert "before this gateway was there" in told
     gateway.transport.send("/PSM1/state_command", now)
     gateway.transport.send("/PSM1/state_command", StringStamped(string="enable"))  # from `ros2 topic pub`
-    assert commands(gateway) == [("PSM1/state_command", now), ("PSM1/state_command", StringStamped(string="enable"))]
+    assert commands(gateway) == [
+        ("PSM1/state_command", now),
+        ("PSM1/state_command", StringStamped(string="enable")),
+    ]
 
 
 def test_a_command_that_a_connection_brings_again_is_not_heeded_again(gateway: MemoryGateway) -> None:
@@ -298,7 +352,9 @@ def test_a_command_that_a_connection_brings_again_is_not_heeded_again(gateway: M
     assert "heeded before" in told
 
 
-def test_one_program_at_a_time_commands_an_arm(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_program_at_a_time_commands_an_arm(
+    gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
+) -> None:
     now = [0]
     monkeypatch.setattr(commander_module, "monotonic_ns", lambda: now[0])
     gateway.transport.send("/PSM1/servo_jp", joints(*[0.1] * 6), "/one")
@@ -307,7 +363,9 @@ def test_one_program_at_a_time_commands_an_arm(gateway: MemoryGateway, monkeypat
     gateway.transport.send("/PSM1/hold", EmptyMessage(), "/other")
     gateway.transport.send("/ECM/servo_jp", joints(*[0.1] * 4), "/other")
     assert [port for port, _ in commands(gateway)] == ["PSM1/servo_jp", "PSM1/hold", "ECM/servo_jp"]
-    assert all("/other is not heeded while /one commands the arm" in told for told in words(gateway, "/PSM1/warning"))
+    assert all(
+        "/other is not heeded while /one commands the arm" in told for told in words(gateway, "/PSM1/warning")
+    )
     now[0] = 1_000_000_001
     gateway.transport.send("/PSM1/move_jp", joints(*[0.2] * 6), "/other")
     assert [port for port, _ in commands(gateway)] == ["PSM1/move_jp"]
@@ -335,7 +393,9 @@ def test_ever_new_mistakes_are_not_quoted_for_ever(gateway: MemoryGateway) -> No
     assert len(words(gateway, "/PSM1/error")) == 8
 
 
-def test_the_same_mistake_is_told_again_later_with_how_often_it_came(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_mistake_is_told_again_later_with_how_often_it_came(
+    gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
+) -> None:
     now = [10**12]
     monkeypatch.setattr("devices.ros.topics.refusals.monotonic_ns", lambda: now[0])
     for _ in range(5):
@@ -350,7 +410,12 @@ def test_the_same_mistake_is_told_again_later_with_how_often_it_came(gateway: Me
 def test_what_a_real_arm_says_comes_in_as_the_signals_are(gateway: MemoryGateway) -> None:
     stamp = Header(stamp=Time.from_ns(time_ns()))
     gateway.transport.send("/MTML/gripper/measured_js", JointState(header=stamp, position=np.array([0.3])))
-    gateway.transport.send("/MTML/measured_js", JointState(header=stamp, name=list("abcdefg"), position=np.zeros(7), velocity=np.zeros(7), effort=np.zeros(7)))
+    gateway.transport.send(
+        "/MTML/measured_js",
+        JointState(
+            header=stamp, name=list("abcdefg"), position=np.zeros(7), velocity=np.zeros(7), effort=np.zeros(7)
+        ),
+    )
     gateway.transport.send("/MTML/measured_cp", PoseStamped())  # stamp 0: invalid
     (_, gripper), (_, measured) = commands(gateway)
     assert isinstance(gripper, JointState)
@@ -380,7 +445,9 @@ def test_the_status_tells_clients_and_rates(gateway: MemoryGateway) -> None:
     encode(second)
 
 
-def test_a_transport_that_fails_is_told_where_the_device_is_read(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_transport_that_fails_is_told_where_the_device_is_read(
+    gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(value: object) -> bytes:
         raise OSError("the wire is cut")
 

@@ -1,4 +1,6 @@
-"""Messages that a program has kept from before it was connected: commands are not heeded, states of real arms are."""
+"""Messages that a program has kept from before it was connected: commands are not heeded, states of real arms
+are.
+"""
 
 import time
 
@@ -50,9 +52,16 @@ def test_a_command_without_a_stamp_is_told_and_not_heeded(gateway, topic, messag
 
 def test_the_stamp_says_whether_it_is_from_before(gateway):
     now = time.time_ns()
-    assert not came_in(gateway, "/PSM1/move_jp", JointState(header=stamped(now - SECOND), position=JOINTS), now)
+    assert not came_in(
+        gateway, "/PSM1/move_jp", JointState(header=stamped(now - SECOND), position=JOINTS), now
+    )
     assert came_in(gateway, "/PSM1/move_jp", JointState(header=stamped(now + 1), position=JOINTS), now)
 
 
 def test_what_a_real_arm_has_kept_is_its_state(gateway):
-    assert came_in(gateway, "/MTML/operating_state", OperatingState(header=stamped(SECOND), state="ENABLED"), time.time_ns())
+    assert came_in(
+        gateway,
+        "/MTML/operating_state",
+        OperatingState(header=stamped(SECOND), state="ENABLED"),
+        time.time_ns(),
+    )

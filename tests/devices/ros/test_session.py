@@ -1,4 +1,6 @@
-"""A gateway in a session: programs enable, home and move an arm as on the real system, and nothing moves that should not."""
+"""A gateway in a session: programs enable, home and move an arm as on the real system, and nothing moves that
+should not.
+"""
 
 from __future__ import annotations
 
@@ -38,11 +40,18 @@ class Console:
     def move(self, *positions: float) -> None:
         since = time_ns()
         self.order("move_jp", JointState(position=np.array(positions)))
-        self.until(lambda: [s.is_busy for s in self.states(since)][-1:] == [False] and any(s.is_busy for s in self.states(since)))
+        self.until(
+            lambda: (
+                [s.is_busy for s in self.states(since)][-1:] == [False]
+                and any(s.is_busy for s in self.states(since))
+            )
+        )
 
     def states(self, since: int = 0) -> list[OperatingState]:
         told = self.transport.heard("/PSM1/operating_state")
-        return [state for state in told if isinstance(state, OperatingState) and state.header.stamp.ns > since]
+        return [
+            state for state in told if isinstance(state, OperatingState) and state.header.stamp.ns > since
+        ]
 
     def until(self, holds: Callable[[], bool], seconds: float = 10.0) -> None:
         end = monotonic() + seconds
@@ -57,21 +66,32 @@ class Console:
         return newest.position
 
     def words(self, topic: str) -> list[str]:
-        return [message.data for message in self.transport.heard(f"/PSM1/{topic}") if isinstance(message, StringMessage)]
+        return [
+            message.data
+            for message in self.transport.heard(f"/PSM1/{topic}")
+            if isinstance(message, StringMessage)
+        ]
 
 
 @contextmanager
 def session(duration: str) -> Generator[Console]:
     """Run a session in another thread."""
     controller = motion(arms=ARMS, mounting="cart")
-    gateway = MemoryGateway("ros", GatewayParams.model_validate({"arms": ARMS, "mounting": "cart", "publish_period": "5 ms"}))
+    gateway = MemoryGateway(
+        "ros", GatewayParams.model_validate({"arms": ARMS, "mounting": "cart", "publish_period": "5 ms"})
+    )
     scenario = {
         "name": "with_ros",
         "step": "2 ms",
         "duration": duration,
         "pace": "realtime",
         "order": ["motion", "robot"],
-        "connections": ["motion.drive/* -> robot.*", "robot.* -> motion.sense/*", "motion.* -> ros.*", "ros.* -> motion.*"],
+        "connections": [
+            "motion.drive/* -> robot.*",
+            "robot.* -> motion.sense/*",
+            "motion.* -> ros.*",
+            "ros.* -> motion.*",
+        ],
     }
     participants = {"motion": controller, "robot": IdealRobot(controller), "ros": gateway}
     with ThreadPoolExecutor(1) as pool:
@@ -96,7 +116,8 @@ def test_a_console_drives_an_arm_as_on_the_real_system() -> None:
         assert edges[0] == ("DISABLED", False, True)
         assert ("ENABLED", False, True) in edges
         console.move(*(HOME + 0.02))
-        console.until(lambda: np.allclose(console.positions, HOME + 0.02, atol=1e-6))  # states come after their own time
+        # states come after their own time
+        console.until(lambda: np.allclose(console.positions, HOME + 0.02, atol=1e-6))
         console.move(*(HOME + 0.02))  # nothing to move, and yet busy and then idle
         Console(console.transport, "/other").order("move_jp", JointState(position=HOME))
         console.order("move_jp", JointState(position=np.array([0.0, 0.0, 0.9, 0.0, 0.0, 0.0])))

@@ -18,7 +18,14 @@ STATUS = GatewayStatus(
     kind="ros2-dds",
     clients=[GatewayClient(name="/console", address="10.0.0.7")],
     topics=[
-        GatewayTopic(topic="/PSM1/servo_jp", way="subscribe", rate=0.0, messages=3, refused=1, reason="5 values in position, expected 6"),
+        GatewayTopic(
+            topic="/PSM1/servo_jp",
+            way="subscribe",
+            rate=0.0,
+            messages=3,
+            refused=1,
+            reason="5 values in position, expected 6",
+        ),
         GatewayTopic(topic="/PSM1/measured_js", way="publish", rate=99.97, messages=1000),
     ],
 )

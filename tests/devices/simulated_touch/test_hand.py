@@ -10,16 +10,31 @@ from devices.simulated_touch.hand import Hand
 numbers = st.floats(-1.0, 1.0)
 
 
-@given(st.floats(0.05, 1.0), st.floats(10.0, 2000.0), st.floats(0.0, 100.0), st.sampled_from([1e-3, 1e-2]), st.tuples(numbers, numbers, numbers))
-def test_it_moves_as_the_differential_equation_says(mass: float, stiffness: float, damping: float, tick: float, start: tuple[float, float, float]) -> None:
-    """m x'' = k (u - x) + c (u' - x') + F for constant u, u' and F, as the exponential of its matrix has it; weak, critical and strong damping."""
+@given(
+    st.floats(0.05, 1.0),
+    st.floats(10.0, 2000.0),
+    st.floats(0.0, 100.0),
+    st.sampled_from([1e-3, 1e-2]),
+    st.tuples(numbers, numbers, numbers),
+)
+def test_it_moves_as_the_differential_equation_says(
+    mass: float, stiffness: float, damping: float, tick: float, start: tuple[float, float, float]
+) -> None:
+    """m x'' = k (u - x) + c (u' - x') + F for constant u, u' and F, as the exponential of its matrix has it;
+    weak, critical and strong damping.
+    """
     for c in (damping, 2.0 * (stiffness * mass) ** 0.5):
         hand = Hand(mass, stiffness, c, tick, start)
         exact = np.array([start, (0.0, 0.0, 0.0)])
         matrix = expm(tick * np.array([[0.0, 1.0], [-stiffness / mass, -c / mass]]))
-        for force, target, velocity in (((1.0, 0.0, -2.0), ZERO, ZERO), (ZERO, (0.1, -0.1, 0.3), (0.5, 0.0, -0.2))):
+        for force, target, velocity in (
+            ((1.0, 0.0, -2.0), ZERO, ZERO),
+            (ZERO, (0.1, -0.1, 0.3), (0.5, 0.0, -0.2)),
+        ):
             hand.move(force, target, velocity)
-            rest = np.array([np.array(target) + (np.array(force) + c * np.array(velocity)) / stiffness, np.zeros(3)])
+            rest = np.array(
+                [np.array(target) + (np.array(force) + c * np.array(velocity)) / stiffness, np.zeros(3)]
+            )
             exact = rest + matrix @ (exact - rest)
         assert hand.position == pytest.approx(exact[0], rel=1e-7, abs=1e-9)
         assert hand.velocity == pytest.approx(exact[1], rel=1e-7, abs=1e-7)

@@ -28,17 +28,28 @@ PRESS: list[dict[str, Any]] = [
 
 
 def _device(path: list[dict[str, Any]] | str = PRESS, **params: Any) -> SimulatedTouch:
-    device = SimulatedTouch("touch", SimulatedTouchParams.model_validate({"styluses": {"right": {"path": path, **params}}}))
+    device = SimulatedTouch(
+        "touch", SimulatedTouchParams.model_validate({"styluses": {"right": {"path": path, **params}}})
+    )
     device.open(Path())
     return device
 
 
 def _table(time_ns: int, stiffness: float = 200.0) -> ContactModel:
     plane = ContactPlane(normal=Vector3(z=1.0), distance=0.0, stiffness=stiffness)
-    return ContactModel(header=Header(stamp=Time.from_ns(time_ns), frame_id="touch_right_base"), planes=[plane])
+    return ContactModel(
+        header=Header(stamp=Time.from_ns(time_ns), frame_id="touch_right_base"), planes=[plane]
+    )
 
 
-def _play(device: SimulatedTouch, until: float, *, period: int = 4 * MS, silent_from: float = 1e9, stiffness: float = 200.0) -> list[Sample]:
+def _play(
+    device: SimulatedTouch,
+    until: float,
+    *,
+    period: int = 4 * MS,
+    silent_from: float = 1e9,
+    stiffness: float = 200.0,
+) -> list[Sample]:
     """Meet the device every `period`: write what the simulation had for it, then read."""
     samples: list[Sample] = []
     for t in range(0, round(until * 1e9), period):
@@ -63,7 +74,8 @@ def _forces(samples: list[Sample]) -> np.ndarray:
 def test_the_hand_rests_where_grip_and_table_balance() -> None:
     device = _device()
     samples = _play(device, 4.0)
-    assert _heights(samples)[-1] == pytest.approx(-0.005, abs=1e-6)  # a grip of 200 N/m wants to be 10 mm below a table of 200 N/m
+    # a grip of 200 N/m wants to be 10 mm below a table of 200 N/m
+    assert _heights(samples)[-1] == pytest.approx(-0.005, abs=1e-6)
     assert _forces(samples)[-1] == pytest.approx([0, 0, 1.0], abs=1e-4)
 
 
@@ -113,22 +125,38 @@ def test_orientation_follows_the_path_and_the_twist_is_its_rate() -> None:
 
 
 def test_buttons_tell_of_every_change_once() -> None:
-    path = [{"at": 0}, {"at": "10.5 ms", "buttons": [0, 1]}, {"at": "12 ms", "buttons": []}, {"at": "50 ms", "buttons": [1]}]
+    path = [
+        {"at": 0},
+        {"at": "10.5 ms", "buttons": [0, 1]},
+        {"at": "12 ms", "buttons": []},
+        {"at": "50 ms", "buttons": [1]},
+    ]
     device = _device(path)
     joys: list[Joy] = _of([sample for t in (0, 40 * MS, 80 * MS) for sample in device.read(t)], "buttons")
-    assert [(joy.header.stamp.ns // MS, joy.buttons.tolist()) for joy in joys] == [(0, [0, 0]), (11, [1, 1]), (12, [0, 0]), (50, [0, 1])]
+    assert [(joy.header.stamp.ns // MS, joy.buttons.tolist()) for joy in joys] == [
+        (0, [0, 0]),
+        (11, [1, 1]),
+        (12, [0, 0]),
+        (50, [0, 1]),
+    ]
 
 
 @given(st.lists(st.integers(0, 100 * MS), max_size=20))
 def test_how_often_it_is_read_changes_nothing(times: list[int]) -> None:
     """Without a contact model; with one, the times at which it arrives do matter."""
-    path = [{"at": 0}, {"at": "20 ms", "position": [0.01, 0, 0], "buttons": [0]}, {"at": "70 ms", "position": [0, 0, 0], "buttons": [1]}]
+    path = [
+        {"at": 0},
+        {"at": "20 ms", "position": [0.01, 0, 0], "buttons": [0]},
+        {"at": "70 ms", "position": [0, 0, 0], "buttons": [1]},
+    ]
     at_once, in_parts = _device(path), _device(path)
     whole = at_once.read(100 * MS)
     parts = [sample for t in [*sorted(times), 100 * MS] for sample in in_parts.read(t)]
     assert [encode(s.message) for s in parts[-3:]] == [encode(s.message) for s in whole[-3:]]
     events = {"right/buttons", "right/diagnostics"}
-    assert [encode(s.message) for s in parts if s.port in events] == [encode(s.message) for s in whole if s.port in events]
+    assert [encode(s.message) for s in parts if s.port in events] == [
+        encode(s.message) for s in whole if s.port in events
+    ]
 
 
 def test_a_contact_model_is_felt_from_the_time_at_which_it_was_written() -> None:
@@ -199,19 +227,29 @@ def test_only_contact_models_are_taken() -> None:
 
 def test_stamps_of_late_reads_go_forward() -> None:
     device = _device()
-    stamps = [s.message.header.stamp.ns for t in (0, MS // 2, 3 * MS // 2, 9 * MS) for s in device.read(t) if s.port == "right/pose"]
+    stamps = [
+        s.message.header.stamp.ns
+        for t in (0, MS // 2, 3 * MS // 2, 9 * MS)
+        for s in device.read(t)
+        if s.port == "right/pose"
+    ]
     assert stamps == [0, MS, 9 * MS]
     assert all(a < b for a, b in pairwise(stamps))
 
 
 def test_a_misspelt_word_deep_in_a_scenario_is_told_with_the_right_one(tmp_path: Path) -> None:
     file = tmp_path / "scenario.yaml"
-    file.write_text("name: a\nstep: 1 ms\nparticipants:\n  touch: {kind: simulated-touch, styluses: {right: {path: [{at: 0, bottons: [0]}]}}}\n")
+    file.write_text(
+        "name: a\nstep: 1 ms\nparticipants:\n  touch: {kind: simulated-touch, styluses: {right: {path: [{at:"
+        " 0, bottons: [0]}]}}}\n"
+    )
     with pytest.raises(ScenarioError) as refused:
         load(str(file))
     (line,) = str(refused.value).splitlines()
     assert line.startswith(f"{file}:4:")
-    assert line.endswith("there is no 'bottons' here. Did you mean 'buttons'? Known: at, buttons, orientation, position.")
+    assert line.endswith(
+        "there is no 'bottons' here. Did you mean 'buttons'? Known: at, buttons, orientation, position."
+    )
 
 
 def test_a_hand_too_fast_has_no_force_until_it_lets_go_and_the_diagnosis_says_so() -> None:
@@ -229,4 +267,9 @@ def test_a_hand_too_fast_has_no_force_until_it_lets_go_and_the_diagnosis_says_so
     assert not forces[:500].any()
     assert forces[-1] == pytest.approx(1.0, abs=0.01)
     told = [message.message for message in _of(samples, "diagnostics")]
-    assert [text.partition(";")[0] for text in told] == ["force is on", "no force: the hand was too fast", "no force: the dead-man is not held", "force is on"]
+    assert [text.partition(";")[0] for text in told] == [
+        "force is on",
+        "no force: the hand was too fast",
+        "no force: the dead-man is not held",
+        "force is on",
+    ]

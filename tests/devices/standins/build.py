@@ -17,5 +17,7 @@ def compile_library(source: str, library: Path, *flags: str) -> Path:
     """Compile `source`, a file of this folder, into the shared library `library` and return its path."""
     assert COMPILER, WHY_NOT
     options = ["-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", *flags]
-    subprocess.run([COMPILER, *options, str(HERE / source), "-lm", "-lpthread", "-o", str(library)], check=True)
+    subprocess.run(
+        [COMPILER, *options, str(HERE / source), "-lm", "-lpthread", "-o", str(library)], check=True
+    )
     return library

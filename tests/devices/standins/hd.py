@@ -1,6 +1,8 @@
-"""The other side of hd.c: orders to the styluses behind the stand-in of HDAPI, and the log of what they were made to do.
+"""The other side of hd.c: orders to the styluses behind the stand-in of HDAPI, and the log of what they were
+made to do.
 
-Fields are those of `Device` in hd.c, axes and units HDAPI's where the name of a field is HDAPI's; `position`, `target` and `amplitude` are in m.
+Fields are those of `Device` in hd.c, axes and units HDAPI's where the name of a field is HDAPI's; `position`,
+`target` and `amplitude` are in m.
 """
 
 from __future__ import annotations
@@ -20,10 +22,15 @@ OK, NEEDS_UPDATE, NEEDS_MANUAL_INPUT = 0x5000, 0x5001, 0x5002
 ENCODER_RESET, AUTO, INKWELL = 1, 2, 4
 VARIABLE = "TROCAR_STANDIN_HD"
 
-_ORDERS = "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder error error_frames"
+_ORDERS = (
+    "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder"
+    " error error_frames"
+)
 _WHOLE = f"{_ORDERS} owner force_output updates last_style"
 _TRIPLES = ("motors", "target", "amplitude")
-_REST = "frequency turn_amplitude mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
+_REST = (
+    "frequency turn_amplitude mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
+)
 
 
 class Device(ctypes.Structure):
@@ -46,10 +53,15 @@ class Row:
 
 
 class HdWorld:
-    """Two styluses, made as they are at first: plugged in, in need of an update of their calibration, held still at the origin."""
+    """Two styluses, made as they are at first: plugged in, in need of an update of their calibration, held
+    still at the origin.
+    """
 
     def __init__(self, library: Path, file: Path) -> None:
-        """Make the world of the stand-in `library` in `file`. Processes see it if the environment variable VARIABLE names the file."""
+        """Make the world of the stand-in `library` in `file`.
+
+        Processes see it if the environment variable VARIABLE names the file.
+        """
         self.file = file
         hd = ctypes.CDLL(str(library))
         hd.standin_size.restype = ctypes.c_long
@@ -63,7 +75,9 @@ class HdWorld:
         hd.standin_make(self.address)
         self._logged = c_int64.from_buffer(self._memory)
         self.devices: Any = (Device * 2).from_buffer(self._memory, 8)
-        self._rows = np.frombuffer(self._memory, np.float64, offset=8 + ctypes.sizeof(self.devices)).reshape(-1, 12)
+        self._rows = np.frombuffer(self._memory, np.float64, offset=8 + ctypes.sizeof(self.devices)).reshape(
+            -1, 12
+        )
         assert self.devices[1].name == b"left", "hd.c and hd.py differ"
 
     def motors(self, device: int) -> tuple[float, float, float]:
@@ -71,6 +85,8 @@ class HdWorld:
         return tuple(self.devices[device].motors)
 
     def rows(self, device: int = 0, since: float = 0.0) -> NDArray[np.float64]:
-        """Return the log of one device from `since` (s of CLOCK_MONOTONIC) on, shape (n, 12); columns as in Row."""
+        """Return the log of one device from `since` (s of CLOCK_MONOTONIC) on, shape (n, 12); columns as in
+        Row.
+        """
         rows = self._rows[: self._logged.value]
         return rows[(rows[:, Row.DEVICE] == device) & (rows[:, Row.TIME] >= since)].copy()

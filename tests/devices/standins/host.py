@@ -1,4 +1,5 @@
-"""A device host in small, to be killed: `python host.py LIBRARY PLANES [STYLUSES]`, with TROCAR_STANDIN_HD set. Reads at 1 kHz and sends contact at 250 Hz.
+"""A device host in small, to be killed: `python host.py LIBRARY PLANES [STYLUSES]`, with TROCAR_STANDIN_HD
+set. Reads at 1 kHz and sends contact at 250 Hz.
 
 Each hand is on a floor 10 mm above the origin of its base frame, made of up to four planes.
 """
@@ -22,7 +23,10 @@ _PERIOD, _EVERY = 0.001, 4
 def floor(time_ns: int, planes: int) -> ContactModel:
     """Return a floor of `planes` planes that lean a little."""
     normals = [Vector3(x=lean, z=(1.0 - lean * lean) ** 0.5) for lean in _LEANS[:planes]]
-    surfaces = [ContactPlane(normal=n, distance=HEIGHT, stiffness=STIFFNESS / planes, damping=1.0, friction=0.3) for n in normals]
+    surfaces = [
+        ContactPlane(normal=n, distance=HEIGHT, stiffness=STIFFNESS / planes, damping=1.0, friction=0.3)
+        for n in normals
+    ]
     return ContactModel(header=Header(stamp=Time.from_ns(time_ns)), planes=surfaces)
 
 

@@ -1,4 +1,6 @@
-"""A tool on a servo presses a block in Bullet and leaves it, both engines coupled in one process; run as a program: the energy table."""
+"""A tool on a servo presses a block in Bullet and leaves it, both engines coupled in one process; run as a
+program: the energy table.
+"""
 
 import logging
 import sys
@@ -50,7 +52,9 @@ class Tool(Stepped):
         self.side.begin(inputs, self.x, self.v)
         for i in range(round(h * 1e-9 / SUB_STEP)):
             force = self.side.force(i * SUB_STEP, self.x, self.v)
-            servo = SERVO * (self.wanted(t * 1e-9 + i * SUB_STEP) - self.x) - 2 * sqrt(SERVO * self.mass) * self.v
+            servo = (
+                SERVO * (self.wanted(t * 1e-9 + i * SUB_STEP) - self.x) - 2 * sqrt(SERVO * self.mass) * self.v
+            )
             self.v = self.v + SUB_STEP / self.mass * (force + servo)
             self.side.add(force, SUB_STEP * self.v)
             self.x = self.x + SUB_STEP * self.v
@@ -77,9 +81,18 @@ class Tissue(BulletEngine):
 def cycle(mass, step_ms, algorithm, **tissue):
     """Return the energy made and the energy exchanged (J). Raises what the session raises."""
     organ = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa", "nodes": 75}
-    params = {"organs": {"block": organ}, "probes": {"tip": {"spheres": 1, "radius": RADIUS}}, "node_period": f"{step_ms * 4} ms", **tissue}
+    params = {
+        "organs": {"block": organ},
+        "probes": {"tip": {"spheres": 1, "radius": RADIUS}},
+        "node_period": f"{step_ms * 4} ms",
+        **tissue,
+    }
     engine = Tissue("tissue", BulletParams.model_validate(params))
-    scenario = {"name": "cycle", "step": f"{step_ms} ms", "duration": f"{round(DURATION * 1e3 / step_ms) * step_ms} ms"}
+    scenario = {
+        "name": "cycle",
+        "step": f"{step_ms} ms",
+        "duration": f"{round(DURATION * 1e3 / step_ms) * step_ms} ms",
+    }
     bond = {"motion": "tool.tip", "force": "tissue.tip", "algorithm": algorithm}
     summary = run_in_process({**scenario, "bonds": [bond]}, {"tool": Tool(mass), "tissue": engine})
     return summary.energy_residual_j, engine.exchanged

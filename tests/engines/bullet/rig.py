@@ -20,17 +20,24 @@ def params(block=BLOCK, probe=None, **rest):
 
 
 class Rig:
-    """Moves the probe from `start` (m; of every sphere) on straight lines at constant speed, and keeps what came out."""
+    """Moves the probe from `start` (m; of every sphere) on straight lines at constant speed, and keeps what
+    came out.
+    """
 
     def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=IMPULSE):
         self.engine = BulletEngine("tissue", model or params())
         self.period, self.t = period, 0
         self.outputs = dict(self.engine.configure(Setup(period, Path(), {"probe": plan})))
         on_frame = self.engine.params.probes["probe"].spheres is None
-        position, velocity, force = ("pose", "twist", "wrench") if on_frame else ("position", "velocity", "force")
+        position, velocity, force = (
+            ("pose", "twist", "wrench") if on_frame else ("position", "velocity", "force")
+        )
         self.pose = np.array([*np.ravel(start), *([0.0, 0.0, 0.0, 1.0] if on_frame else [])])
         self.twist = np.zeros(6 if on_frame else self.pose.size)
-        self.at, self.speed = (part[: np.size(start)].reshape(np.shape(start)) for part in (self.pose, self.twist))  # views
+        # views
+        self.at, self.speed = (
+            part[: np.size(start)].reshape(np.shape(start)) for part in (self.pose, self.twist)
+        )
         self.inputs = Inputs({f"probe/{position}": self.pose, f"probe/{velocity}": self.twist})
         self._force = f"probe/{force}"
         self.wrenches, self.hashes, self.power = [], [], []
@@ -48,7 +55,9 @@ class Rig:
         return self.follow(lambda t: (start + way * t / seconds, way / seconds), seconds)
 
     def follow(self, motion, seconds):
-        """Like `move`, on the way whose position (m) and velocity (m/s) `motion` returns for the seconds since now."""
+        """Like `move`, on the way whose position (m) and velocity (m/s) `motion` returns for the seconds
+        since now.
+        """
         steps = round(seconds * 1e9 / self.period)
         for i in range(steps):
             self.at[...], self.speed[...] = motion(i * self.period * 1e-9)

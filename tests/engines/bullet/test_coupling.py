@@ -7,7 +7,13 @@ from tests.engines.bullet.press_and_release import cycle
 
 
 @pytest.mark.parametrize(
-    ("mass", "algorithm", "step_ms"), [(0.4, "impulse", 1), (0.4, "impulse", 5), (0.02, "impulse-linearised", 1), (0.1, "impulse-linearised", 2)]
+    ("mass", "algorithm", "step_ms"),
+    [
+        (0.4, "impulse", 1),
+        (0.4, "impulse", 5),
+        (0.02, "impulse-linearised", 1),
+        (0.1, "impulse-linearised", 2),
+    ],
 )
 def test_next_to_no_energy_is_made(mass, algorithm, step_ms):
     made, exchanged = cycle(mass, step_ms, algorithm)

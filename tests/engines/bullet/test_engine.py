@@ -49,7 +49,9 @@ def test_how_often_the_nodes_are_output_does_not_change_the_physics():
 
 
 def test_same_inputs_give_the_same_hashes_in_another_process_and_beside_another_engine():
-    program = subprocess.run([sys.executable, "-m", "tests.engines.bullet_rig"], capture_output=True, text=True, check=True)
+    program = subprocess.run(
+        [sys.executable, "-m", "tests.engines.bullet_rig"], capture_output=True, text=True, check=True
+    )
     expected = [int(value, 16) for value in program.stdout.split()]  # also: nothing else on stdout
     with Rig(params(SMALL_BLOCK)) as other:
         other.hold(0.01)
@@ -96,7 +98,10 @@ def test_the_work_is_force_times_motion_and_a_cycle_loses_energy():
 
 @pytest.mark.parametrize("mean", [True, False])
 def test_sub_steps_and_multiples_of_the_step(mean):
-    with Rig(params(SMALL_BLOCK), period=2 * MS, plan=BondPlan("velocity", mean)) as coarse, Rig(params(SMALL_BLOCK)) as fine:
+    with (
+        Rig(params(SMALL_BLOCK), period=2 * MS, plan=BondPlan("velocity", mean)) as coarse,
+        Rig(params(SMALL_BLOCK)) as fine,
+    ):
         for rig in (coarse, fine):
             rig.move((0, 0, RADIUS - 2e-3), 0.1)
             rig.hold(0.2)
@@ -105,7 +110,15 @@ def test_sub_steps_and_multiples_of_the_step(mean):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"poisson_ratio": 0.5}, {"poisson_ratio": 0.0}, {"young_modulus": "-1 kPa"}, {"density": 0}, {"size": [1, 1, 0]}, {"nodes": 3}, {"anchors": "top"}],
+    [
+        {"poisson_ratio": 0.5},
+        {"poisson_ratio": 0.0},
+        {"young_modulus": "-1 kPa"},
+        {"density": 0},
+        {"size": [1, 1, 0]},
+        {"nodes": 3},
+        {"anchors": "top"},
+    ],
 )
 def test_unphysical_organs_are_refused(wrong):
     with pytest.raises(ValidationError):

@@ -1,4 +1,6 @@
-"""The force on a probe, against what the tissue receives and against the finite-element truth of the same mesh."""
+"""The force on a probe, against what the tissue receives and against the finite-element truth of the same
+mesh.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ FINE = {"timestep": "0.5 ms"}
 
 
 def presses(model, at, depths):
-    """Yield depth (m), force on the probe (N) and nodes (m) at rest at every depth, with spheres at `at` (m, shape (2,) or (k, 2))."""
+    """Yield depth (m), force on the probe (N) and nodes (m) at rest at every depth, with spheres at `at` (m,
+    shape (2,) or (k, 2)).
+    """
     radii = model.probes["probe"].radii if np.ndim(at) > 1 else model.probes["probe"].radii[0]
 
     def centres(depth):
@@ -32,7 +36,9 @@ def presses(model, at, depths):
             yield centres(depth), rig.force, rig.nodes
 
 
-@pytest.mark.parametrize("at", [(0.0, 0.0), (5e-3, 0.0), (4e-3, 3e-3), (2e-3, 1e-3)], ids=["node", "edge", "face", "off-node"])
+@pytest.mark.parametrize(
+    "at", [(0.0, 0.0), (5e-3, 0.0), (4e-3, 3e-3), (2e-3, 1e-3)], ids=["node", "edge", "face", "off-node"]
+)
 @pytest.mark.parametrize("organ", [BLOCK, {**BLOCK, "young_modulus": "25 kPa"}], ids=["soft", "stiff"])
 def test_the_tissue_receives_what_the_probe_feels(organ, at):
     model = params(organ)
@@ -43,7 +49,9 @@ def test_the_tissue_receives_what_the_probe_feels(organ, at):
 
 @pytest.mark.parametrize("radius", [2e-3, 5e-3])
 @pytest.mark.parametrize(
-    ("organ", "rest", "at"), [(BLOCK, {}, (0.0, 0.0)), (BLOCK, {}, (4e-3, 3e-3)), (SLAB, FINE, (0.0, 0.0))], ids=["coarse", "coarse, face", "fine"]
+    ("organ", "rest", "at"),
+    [(BLOCK, {}, (0.0, 0.0)), (BLOCK, {}, (4e-3, 3e-3)), (SLAB, FINE, (0.0, 0.0))],
+    ids=["coarse", "coarse, face", "fine"],
 )
 def test_the_force_at_a_depth_is_that_of_finite_elements(organ, rest, at, radius):
     model = params(organ, probe={"radius": radius}, **rest)
@@ -53,11 +61,14 @@ def test_the_force_at_a_depth_is_that_of_finite_elements(organ, rest, at, radius
 
 
 def test_each_of_several_spheres_feels_what_it_does():
-    at, radii = np.array([[-12e-3, 0.0], [0.0, 5e-3], [8e-3, -7e-3]]), [2e-3, 3e-3, 5e-3]  # on neighbouring faces
+    # on neighbouring faces
+    at, radii = np.array([[-12e-3, 0.0], [0.0, 5e-3], [8e-3, -7e-3]]), [2e-3, 3e-3, 5e-3]
     model = params(BLOCK, probe={"spheres": 3, "radius": radii})
     body = Body(model.organs["block"])
     for centres, forces, nodes in presses(model, at, (1e-3, 2e-3, 4e-3)):
-        np.testing.assert_allclose(forces.sum(axis=0), body.reaction(nodes), atol=0.02 * np.linalg.norm(forces.sum(axis=0)))
+        np.testing.assert_allclose(
+            forces.sum(axis=0), body.reaction(nodes), atol=0.02 * np.linalg.norm(forces.sum(axis=0))
+        )
         np.testing.assert_allclose(forces[:, 2], body.press(centres, radii)[:, 2], atol=0.1 * forces.max())
 
 
@@ -66,11 +77,18 @@ def test_the_force_follows_that_of_finite_elements_at_5_hz():
     body = Body(model.organs["block"])
     with Rig(model, start=(0.0, 0.0, RADIUS)) as rig:
         rig.move((0.0, 0.0, RADIUS - 3e-3), 0.1)
-        forces = rig.follow(lambda t: ([0.0, 0.0, RADIUS - 3e-3 - 2e-3 * np.sin(w * t)], [0.0, 0.0, -2e-3 * w * np.cos(w * t)]), 0.6)[200:, 2]
+        forces = rig.follow(
+            lambda t: (
+                [0.0, 0.0, RADIUS - 3e-3 - 2e-3 * np.sin(w * t)],
+                [0.0, 0.0, -2e-3 * w * np.cos(w * t)],
+            ),
+            0.6,
+        )[200:, 2]
     depths = np.linspace(1e-3, 5e-3, 9)
     curve = [body.press([[0.0, 0.0, RADIUS - depth]], [RADIUS])[0, 2] for depth in depths]
     ends = np.arange(201, 601) * 1e-3
-    truth = np.interp(3e-3 + 2e-3 * np.sin(w * (ends - 0.5e-3)), depths, curve)  # the force is the mean of a step
+    # the force is the mean of a step
+    truth = np.interp(3e-3 + 2e-3 * np.sin(w * (ends - 0.5e-3)), depths, curve)
     assert np.corrcoef(forces, truth)[0, 1] > 0.999
 
 
@@ -90,7 +108,10 @@ def test_a_drag_is_felt_as_much_by_the_tissue():
 def test_elastic_forces_are_those_of_finite_elements(seed, size):
     organ = params(SMALL_BLOCK).organs["block"]
     random = np.random.default_rng(seed)
-    nodes, at = organ.rest.nodes + size * random.standard_normal(organ.rest.nodes.shape), random.random(len(organ.rest.nodes)) < 0.2
+    nodes, at = (
+        organ.rest.nodes + size * random.standard_normal(organ.rest.nodes.shape),
+        random.random(len(organ.rest.nodes)) < 0.2,
+    )
     expected = internal_forces(organ.rest.nodes, organ.rest.tetrahedra, nodes, *organ.elastic.bullet_lame)
     forces = Elasticity(organ.rest, organ.elastic).forces(nodes, at)
     np.testing.assert_allclose(forces[at], expected[at], atol=1e-9 * np.abs(expected).max())
@@ -114,7 +135,9 @@ def test_no_point_of_a_triangle_is_nearer_than_the_closest(point, corners):
 def test_faces_are_touched_up_to_the_reach():
     nodes, faces = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]), np.array([[0, 1, 2]])
     for height, count in ((4e-3, 1), (6e-3, 0)):
-        found, weights, distance = touched_faces(nodes.mean(axis=0) + np.array([0, 0, height]), 5e-3, nodes, faces)
+        found, weights, distance = touched_faces(
+            nodes.mean(axis=0) + np.array([0, 0, height]), 5e-3, nodes, faces
+        )
         assert len(found) == len(weights) == len(distance) == count
         np.testing.assert_allclose(weights, np.full((count, 3), 1 / 3))
         np.testing.assert_allclose(distance, np.full(count, height))

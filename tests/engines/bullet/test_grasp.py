@@ -26,8 +26,15 @@ class Jaw:
     fingers = 2
 
     def __init__(self, organ, at, opening=OPEN, **grasp):
-        probe = {"spheres": 3 * self.fingers, "radius": RADIUS, "stiffness": "1 kN/m", "grasp": {"fingers": self.fingers, **grasp}}
-        self.params = BulletParams.model_validate({"organs": {"organ": organ}, "probes": {"jaw": probe}, "node_period": "1 ms"})
+        probe = {
+            "spheres": 3 * self.fingers,
+            "radius": RADIUS,
+            "stiffness": "1 kN/m",
+            "grasp": {"fingers": self.fingers, **grasp},
+        }
+        self.params = BulletParams.model_validate(
+            {"organs": {"organ": organ}, "probes": {"jaw": probe}, "node_period": "1 ms"}
+        )
         self.engine = BulletEngine("tissue", self.params)
         self.outputs = dict(self.engine.configure(Setup(MS, Path(), {"jaw": IMPULSE})))
         self.t, self.at, self.opening = 0, np.array(at, dtype=float), opening
@@ -40,14 +47,21 @@ class Jaw:
         self.engine.close()
 
     def spheres(self, at, opening):
-        return np.array([at + np.array([side * opening, 3e-3 * i, 0.0]) for side in (-1, 1) for i in (-1, 0, 1)])
+        return np.array(
+            [at + np.array([side * opening, 3e-3 * i, 0.0]) for side in (-1, 1) for i in (-1, 0, 1)]
+        )
 
     def move(self, seconds, at=None, opening=None):
-        start, self.at = self.spheres(self.at, self.opening), np.array(self.at if at is None else at, dtype=float)
+        start, self.at = (
+            self.spheres(self.at, self.opening),
+            np.array(self.at if at is None else at, dtype=float),
+        )
         self.opening = self.opening if opening is None else opening
         way, steps = self.spheres(self.at, self.opening) - start, round(seconds * 1e3)
         for i in range(steps):
-            inputs = Inputs({"jaw/position": (start + way * i / steps).ravel(), "jaw/velocity": (way / seconds).ravel()})
+            inputs = Inputs(
+                {"jaw/position": (start + way * i / steps).ravel(), "jaw/velocity": (way / seconds).ravel()}
+            )
             self.outputs |= self.engine.step(self.t, MS, inputs)
             self.t += MS
             self.events += self.outputs["jaw/events"]
@@ -176,7 +190,13 @@ class Hand(Jaw):
     fingers = 3
 
     def spheres(self, at, opening):
-        return np.array([at + np.array([x * opening, y * opening, -4e-3 * i]) for x, y in ((1, 0), (-1, 0), (0, -1)) for i in range(3)])
+        return np.array(
+            [
+                at + np.array([x * opening, y * opening, -4e-3 * i])
+                for x, y in ((1, 0), (-1, 0), (0, -1))
+                for i in range(3)
+            ]
+        )
 
 
 def test_three_fingers_close_on_a_post_and_lift_it():
@@ -193,12 +213,18 @@ def test_three_fingers_close_on_a_post_and_lift_it():
 @pytest.mark.parametrize("bonds", [{}, {"jaw": IMPULSE}], ids=["alone", "bonded"])
 def test_the_engine_keeps_its_contract(bonds):
     small = {**SLAB, "nodes": 18, "young_modulus": "3 kPa"}
-    params = BulletParams.model_validate({"organs": {"organ": small}, "probes": {"jaw": {"spheres": 2, "grasp": {}}}})
+    params = BulletParams.model_validate(
+        {"organs": {"organ": small}, "probes": {"jaw": {"spheres": 2, "grasp": {}}}}
+    )
     check_engine(lambda: BulletEngine("tissue", params), period_ns=MS, bonds=bonds)
 
 
-@pytest.mark.parametrize("wrong", [{"spheres": 5}, {"spheres": 6, "fingers": 4}, {"spheres": None}, {"spheres": 6, "hold": "0 N"}])
+@pytest.mark.parametrize(
+    "wrong", [{"spheres": 5}, {"spheres": 6, "fingers": 4}, {"spheres": None}, {"spheres": 6, "hold": "0 N"}]
+)
 def test_fingers_need_spheres(wrong):
     grasp = {key: wrong[key] for key in wrong.keys() & {"fingers", "hold"}}
     with pytest.raises(ValidationError):
-        BulletParams.model_validate({"organs": {"organ": SLAB}, "probes": {"jaw": {"spheres": wrong["spheres"], "grasp": grasp}}})
+        BulletParams.model_validate(
+            {"organs": {"organ": SLAB}, "probes": {"jaw": {"spheres": wrong["spheres"], "grasp": grasp}}}
+        )

@@ -39,7 +39,9 @@ def ripple(phase, monkeypatch):
     mesh = OrganParams.model_validate(SMALL_BLOCK).rest
     free = np.where(mesh.nodes[:, 2] > mesh.nodes[:, 2].min(), 1.0, 0.0)
     soft = OrganParams.model_validate(SMALL_BLOCK)
-    young_modulus = soft.young_modulus * (phase / (1e-3 * material.highest_frequency(mesh, free, soft.elastic))) ** 2
+    young_modulus = (
+        soft.young_modulus * (phase / (1e-3 * material.highest_frequency(mesh, free, soft.elastic))) ** 2
+    )
     with Rig(
         params({**SMALL_BLOCK, "young_modulus": young_modulus}),
     ) as rig:

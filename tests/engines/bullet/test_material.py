@@ -27,7 +27,11 @@ def test_small_strains_of_the_neo_hookean_model_obey_hookes_law(material, seed):
     forces = internal_forces(CUBE.nodes, CUBE.tetrahedra, nodes, *material.bullet_lame)
     stress = -(forces.T @ CUBE.nodes) / 0.02**3  # virial theorem
     mu, lambda_ = material.lame
-    np.testing.assert_allclose(stress, 2 * mu * strain + lambda_ * np.trace(strain) * np.eye(3), atol=1e-4 * (2 * mu + lambda_) * 1e-5)
+    np.testing.assert_allclose(
+        stress,
+        2 * mu * strain + lambda_ * np.trace(strain) * np.eye(3),
+        atol=1e-4 * (2 * mu + lambda_) * 1e-5,
+    )
 
 
 def test_the_truth_is_the_derivative_of_its_energy():
@@ -35,10 +39,13 @@ def test_the_truth_is_the_derivative_of_its_energy():
     nodes = CUBE.nodes + rng.normal(0, 5e-4, CUBE.nodes.shape)
     direction = rng.normal(0, 1, CUBE.nodes.shape)
     h = 1e-8
-    slope = (energy(CUBE.nodes, CUBE.tetrahedra, nodes + h * direction, 3e3, 2e4) - energy(CUBE.nodes, CUBE.tetrahedra, nodes - h * direction, 3e3, 2e4)) / (
-        2 * h
-    )
-    assert -np.sum(internal_forces(CUBE.nodes, CUBE.tetrahedra, nodes, 3e3, 2e4) * direction) == pytest.approx(slope, rel=1e-6)
+    slope = (
+        energy(CUBE.nodes, CUBE.tetrahedra, nodes + h * direction, 3e3, 2e4)
+        - energy(CUBE.nodes, CUBE.tetrahedra, nodes - h * direction, 3e3, 2e4)
+    ) / (2 * h)
+    assert -np.sum(
+        internal_forces(CUBE.nodes, CUBE.tetrahedra, nodes, 3e3, 2e4) * direction
+    ) == pytest.approx(slope, rel=1e-6)
 
 
 def frequencies(mesh, free, material):
@@ -48,8 +55,12 @@ def frequencies(mesh, free, material):
     for i in np.flatnonzero(moving):
         moved = mesh.nodes.copy()
         moved.flat[i] += h
-        columns.append(-internal_forces(mesh.nodes, mesh.tetrahedra, moved, *material.bullet_lame).ravel()[moving] / h)
-    return np.sqrt(np.linalg.eigvals(np.array(columns)).real / (material.density * mesh.volume / len(mesh.nodes)))
+        columns.append(
+            -internal_forces(mesh.nodes, mesh.tetrahedra, moved, *material.bullet_lame).ravel()[moving] / h
+        )
+    return np.sqrt(
+        np.linalg.eigvals(np.array(columns)).real / (material.density * mesh.volume / len(mesh.nodes))
+    )
 
 
 @pytest.mark.parametrize("poisson_ratio", [0.1, 0.4, 0.49])
@@ -57,7 +68,9 @@ def test_highest_frequency_against_all_frequencies(poisson_ratio):
     mesh = block(np.array([0.04, 0.03, 0.02]), 45)
     material = Material(1e4, poisson_ratio, 1000.0, 0.0)
     free = np.where(mesh.nodes[:, 2] > mesh.nodes[:, 2].min(), 1.0, 0.0)
-    assert highest_frequency(mesh, free, material) == pytest.approx(frequencies(mesh, free, material).max(), rel=0.01)
+    assert highest_frequency(mesh, free, material) == pytest.approx(
+        frequencies(mesh, free, material).max(), rel=0.01
+    )
 
 
 def test_lowest_frequency_against_all_frequencies_of_a_beam():

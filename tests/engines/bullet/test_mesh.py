@@ -36,12 +36,17 @@ def test_the_node_count_is_near_the_request(size, nodes):
 @given(SIZES, NODES)
 def test_the_surface_is_closed_and_faces_outwards(size, nodes):
     mesh = block(size, nodes)
-    edges = Counter((a, b) for face in mesh.triangles.tolist() for a, b in zip(face, face[1:] + face[:1], strict=True))
+    edges = Counter(
+        (a, b) for face in mesh.triangles.tolist() for a, b in zip(face, face[1:] + face[:1], strict=True)
+    )
     assert all(count == 1 and edges[b, a] == 1 for (a, b), count in edges.items())
     a, b, c = (mesh.nodes[mesh.triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
-    assert np.einsum("ij,ij->", a, normals) / 6 == pytest.approx(np.prod(size), rel=1e-9)  # divergence theorem
-    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2 * (size[0] * size[1] + size[1] * size[2] + size[0] * size[2]), rel=1e-9)
+    # divergence theorem
+    assert np.einsum("ij,ij->", a, normals) / 6 == pytest.approx(np.prod(size), rel=1e-9)
+    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(
+        2 * (size[0] * size[1] + size[1] * size[2] + size[0] * size[2]), rel=1e-9
+    )
 
 
 @settings(deadline=None, max_examples=40)
@@ -50,7 +55,9 @@ def test_a_block_is_its_own_mirror_image(size, nodes, axis):
     mesh = block(size, nodes)
     grid = np.rint(mesh.nodes / (size / block_cells(size, nodes)) * 2).astype(int)
     mirrored = grid * np.where(np.arange(3) == axis, -1, 1)
-    assert {frozenset(map(tuple, t)) for t in grid[mesh.tetrahedra].tolist()} == {frozenset(map(tuple, t)) for t in mirrored[mesh.tetrahedra].tolist()}
+    assert {frozenset(map(tuple, t)) for t in grid[mesh.tetrahedra].tolist()} == {
+        frozenset(map(tuple, t)) for t in mirrored[mesh.tetrahedra].tolist()
+    }
 
 
 def test_the_demo_block():
@@ -58,7 +65,13 @@ def test_the_demo_block():
 
 
 def test_bullet_keeps_the_order_and_every_bit_of_the_nodes():
-    params = OrganParams.model_validate({"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa", "position": ["10 mm", "-7 mm", "33.3 mm"]})
+    params = OrganParams.model_validate(
+        {
+            "size": ["80 mm", "60 mm", "20 mm"],
+            "young_modulus": "10 kPa",
+            "position": ["10 mm", "-7 mm", "33.3 mm"],
+        }
+    )
     client = connect("test", 1e-3, 9.81)
     try:
         organ = Organ("block", params, client)

@@ -16,7 +16,8 @@ from hub.verify import verify
 from schemas.errors import ScenarioError, SessionError
 from tests.engines.bullet.rig import MS, SMALL_BLOCK
 
-BED = {"bed": {"box": ["200 mm", "200 mm", "20 mm"], "position": [0, 0, "-35 mm"]}}  # its top is at z = -25 mm
+# its top is at z = -25 mm
+BED = {"bed": {"box": ["200 mm", "200 mm", "20 mm"], "position": [0, 0, "-35 mm"]}}
 
 
 def engine_of(organs, **rest):
@@ -33,7 +34,9 @@ def nodes_after(engine, milliseconds, name):
     return outputs[f"{name}/nodes"].nodes_m.astype(float).reshape(-1, 3)
 
 
-@pytest.mark.parametrize(("shape", "farthest"), [("kidney-with-adrenal", 0.03), ("colon", 0.01), ("liver-lobe", 0.03)])
+@pytest.mark.parametrize(
+    ("shape", "farthest"), [("kidney-with-adrenal", 0.03), ("colon", 0.01), ("liver-lobe", 0.03)]
+)
 def test_every_organ_comes_to_rest_on_its_own_anchors(shape, farthest):
     with engine_of({"organ": {"shape": shape, "nodes": 150}}) as engine:
         organ = engine.params.organs["organ"]
@@ -46,7 +49,9 @@ def test_every_organ_comes_to_rest_on_its_own_anchors(shape, farthest):
 
 
 def test_an_organ_may_lie_freely_on_a_bed_or_be_tied_to_it():
-    with engine_of({"free": {**SMALL_BLOCK, "position": [0, 0, "-4 mm"], "anchors": []}}, rigid=BED) as engine:
+    with engine_of(
+        {"free": {**SMALL_BLOCK, "position": [0, 0, "-4 mm"], "anchors": []}}, rigid=BED
+    ) as engine:
         nodes = nodes_after(engine, 160, "free")
         assert -0.026 < nodes[:, 2].min() < -0.024
         assert np.abs(nodes[:, :2].mean(axis=0)).max() < 1e-3
@@ -66,7 +71,10 @@ def test_organs_touch_one_another():
 
 
 def test_an_organ_that_falls_out_of_the_scene_ends_the_session_and_is_named():
-    with pytest.raises(SessionError, match=r"organ 'loose'.*it fell: nothing anchors it"), engine_of({"loose": {**SMALL_BLOCK, "anchors": []}}):
+    with (
+        pytest.raises(SessionError, match=r"organ 'loose'.*it fell: nothing anchors it"),
+        engine_of({"loose": {**SMALL_BLOCK, "anchors": []}}),
+    ):
         pass
 
 
@@ -86,7 +94,15 @@ def test_several_organs_in_several_engines_repeat_bit_for_bit():
     other = {"liver": {"shape": "liver-lobe", "nodes": 150}}
     with engine_of(organs) as one, engine_of(other) as two:
         assert [port.name for port in one.ports] == ["kidney/nodes", "block/nodes"]
-        interleaved = [(one.step(i * MS, MS, Inputs({})), two.step(i * MS, MS, Inputs({})), one.state_hash(), two.state_hash())[2:] for i in range(64)]
+        interleaved = [
+            (
+                one.step(i * MS, MS, Inputs({})),
+                two.step(i * MS, MS, Inputs({})),
+                one.state_hash(),
+                two.state_hash(),
+            )[2:]
+            for i in range(64)
+        ]
     with engine_of(other) as two, engine_of(organs) as one:
         assert list(zip(hashes(one), hashes(two), strict=True)) == interleaved
     assert len(set(interleaved)) > 4
@@ -94,8 +110,13 @@ def test_several_organs_in_several_engines_repeat_bit_for_bit():
 
 def test_an_organ_is_the_same_beside_another_and_alone():
     kidney = {"shape": "kidney-with-adrenal", "nodes": 150}
-    with engine_of({"kidney": kidney}) as alone, engine_of({"kidney": kidney, "block": {**SMALL_BLOCK, "position": ["300 mm", 0, 0]}}) as beside:
-        np.testing.assert_allclose(nodes_after(alone, 64, "kidney"), nodes_after(beside, 64, "kidney"), atol=1e-5)
+    with (
+        engine_of({"kidney": kidney}) as alone,
+        engine_of({"kidney": kidney, "block": {**SMALL_BLOCK, "position": ["300 mm", 0, 0]}}) as beside,
+    ):
+        np.testing.assert_allclose(
+            nodes_after(alone, 64, "kidney"), nodes_after(beside, 64, "kidney"), atol=1e-5
+        )
 
 
 SESSION = """\

@@ -23,7 +23,11 @@ from engines.bullet.organs.vtk_file import read_vtk
 from hub.planning.file_hashes import file_hashes
 
 BLOCK = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa"}
-EXTENTS = {"kidney-with-adrenal": (0.137, 0.062, 0.040), "colon": (0.120, 0.049, 0.048), "liver-lobe": (0.100, 0.124, 0.038)}
+EXTENTS = {
+    "kidney-with-adrenal": (0.137, 0.062, 0.040),
+    "colon": (0.120, 0.049, 0.048),
+    "liver-lobe": (0.100, 0.124, 0.038),
+}
 KILOGRAMS = {"kidney-with-adrenal": (0.125, 0.170), "colon": (0.06, 0.10), "liver-lobe": (0.18, 0.24)}
 
 
@@ -88,7 +92,8 @@ def test_measures_of_quality_on_a_regular_and_on_a_flat_tetrahedron():
 
 
 def test_an_organ_lies_where_and_as_the_scenario_says():
-    turned = organ(**BLOCK, position=["10 mm", 0, "5 mm"], orientation=[0, 0, 2**-0.5, 2**-0.5])  # a quarter turn about z
+    # a quarter turn about z
+    turned = organ(**BLOCK, position=["10 mm", 0, "5 mm"], orientation=[0, 0, 2**-0.5, 2**-0.5])
     assert turned.rest.nodes.min(axis=0) == pytest.approx([0.01 - 0.03, -0.04, 0.005 - 0.02])
     assert turned.rest.nodes.max(axis=0) == pytest.approx([0.01 + 0.03, 0.04, 0.005])
     (bottom,) = turned.anchored_nodes.values()
@@ -96,7 +101,10 @@ def test_an_organ_lies_where_and_as_the_scenario_says():
 
 
 def test_surfaces_by_name_and_by_box():
-    block = organ(**BLOCK, anchors=[{"surface": "left"}, {"box": {"low": ["30 mm", -1, -1], "high": [1, 1, 1]}, "to": "wall"}])
+    block = organ(
+        **BLOCK,
+        anchors=[{"surface": "left"}, {"box": {"low": ["30 mm", -1, -1], "high": [1, 1, 1]}, "to": "wall"}],
+    )
     assert block.local.nodes[block.anchored_nodes["world"]][:, 0] == pytest.approx(-0.04)
     assert block.local.nodes[block.anchored_nodes["wall"]][:, 0].min() >= 0.03
     on_surface = np.zeros(len(block.local.nodes), bool)
@@ -146,7 +154,10 @@ def test_materials_outside_nature_or_without_a_source_are_refused(wrong, says):
         ({"shape": "colon", "nodes": 6000}, "5000"),
         ({"shape": "colon", "anchors": [{"surface": "mesentary"}]}, "Did you mean 'mesentery'"),
         ({"shape": "colon", "anchors": [{}]}, "a surface or a box"),
-        ({"shape": "colon", "anchors": [{"box": {"low": [1, 1, 1], "high": [2, 2, 2]}}]}, "no node of the surface lies in the box"),
+        (
+            {"shape": "colon", "anchors": [{"box": {"low": [1, 1, 1], "high": [2, 2, 2]}}]},
+            "no node of the surface lies in the box",
+        ),
         ({"shape": "colon", "orientation": [1, 1, 0, 0]}, "no unit quaternion"),
     ],
 )
@@ -162,8 +173,14 @@ def test_an_organ_anchored_to_a_part_that_there_is_not_is_refused():
 
 
 def test_parameters_are_the_same_after_a_round_trip_through_json():
-    anchors = [{"surface": "mesentery", "to": "bed"}, {"box": {"low": [-1, -1, -1], "high": ["-50 mm", 1, 1]}}]
-    given = {"organs": {"tube": {"shape": "colon", "anchors": anchors}, "block": BLOCK}, "rigid": {"bed": {"box": [1, 1, 0.1]}}}
+    anchors = [
+        {"surface": "mesentery", "to": "bed"},
+        {"box": {"low": [-1, -1, -1], "high": ["-50 mm", 1, 1]}},
+    ]
+    given = {
+        "organs": {"tube": {"shape": "colon", "anchors": anchors}, "block": BLOCK},
+        "rigid": {"bed": {"box": [1, 1, 0.1]}},
+    }
     params = BulletParams.model_validate(given)
     assert BulletParams.model_validate_json(params.model_dump_json()) == params
 
@@ -178,7 +195,9 @@ def file_of(path, nodes, tetrahedra):
 
 def test_a_mesh_of_ones_own_works_like_a_shape(tmp_path):
     given = file_of(tmp_path / "organ.vtk", 1e3 * GOOD.nodes, GOOD.tetrahedra)
-    params = OrganParams.model_validate({**given, "mesh": "organ.vtk", "unit": "mm"}, context={"directory": tmp_path})
+    params = OrganParams.model_validate(
+        {**given, "mesh": "organ.vtk", "unit": "mm"}, context={"directory": tmp_path}
+    )
     np.testing.assert_allclose(params.rest.nodes, GOOD.nodes, atol=1e-15)
     np.testing.assert_array_equal(params.rest.tetrahedra, GOOD.tetrahedra)
     (bottom,) = params.anchored_nodes.values()
@@ -190,11 +209,20 @@ def test_a_mesh_of_ones_own_works_like_a_shape(tmp_path):
 @pytest.mark.parametrize("version", [2, 5])
 def test_binary_files_and_those_of_version_5_are_read(tmp_path, version):
     n, m = len(GOOD.nodes), len(GOOD.tetrahedra)
-    parts = [f"# vtk DataFile Version {version}.1\norgan\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS {n} double\n".encode(), GOOD.nodes.astype(">f8").tobytes()]
+    parts = [
+        f"# vtk DataFile Version {version}.1\norgan\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS {n} double\n".encode(),
+        GOOD.nodes.astype(">f8").tobytes(),
+    ]
     if version == 2:
-        parts += [f"\nCELLS {m} {5 * m}\n".encode(), np.insert(GOOD.tetrahedra, 0, 4, axis=1).astype(">i4").tobytes()]
+        parts += [
+            f"\nCELLS {m} {5 * m}\n".encode(),
+            np.insert(GOOD.tetrahedra, 0, 4, axis=1).astype(">i4").tobytes(),
+        ]
     else:
-        parts += [f"\nCELLS {m + 1} {4 * m}\nOFFSETS vtktypeint64\n".encode(), (4 * np.arange(m + 1)).astype(">i8").tobytes()]
+        parts += [
+            f"\nCELLS {m + 1} {4 * m}\nOFFSETS vtktypeint64\n".encode(),
+            (4 * np.arange(m + 1)).astype(">i8").tobytes(),
+        ]
         parts += [b"\nCONNECTIVITY vtktypeint64\n", GOOD.tetrahedra.astype(">i8").tobytes()]
     parts += [f"\nCELL_TYPES {m}\n".encode(), np.full(m, 10).astype(">i4").tobytes()]
     (tmp_path / "organ.vtk").write_bytes(b"".join(parts))
@@ -209,9 +237,16 @@ def test_a_damaged_file_is_refused_or_read_but_nothing_else(tmp_path, data):
     GOOD.write_vtk(tmp_path / "organ.vtk")
     content = (tmp_path / "organ.vtk").read_bytes()
     at = data.draw(st.integers(0, len(content) - 1))
-    put = data.draw(st.one_of(st.binary(max_size=6), st.sampled_from([b"nan ", b"-1 ", b"99999999999 ", b"1e300 ", b"OFFSETS x\n", b"CELLS 3 9\n"])))
+    put = data.draw(
+        st.one_of(
+            st.binary(max_size=6),
+            st.sampled_from([b"nan ", b"-1 ", b"99999999999 ", b"1e300 ", b"OFFSETS x\n", b"CELLS 3 9\n"]),
+        )
+    )
     content = content[:at] + put + content[at + data.draw(st.integers(0, 30)) :]
-    (tmp_path / "organ.vtk").write_bytes(content.replace(b"ASCII", b"BINARY") if data.draw(st.booleans()) else content)
+    (tmp_path / "organ.vtk").write_bytes(
+        content.replace(b"ASCII", b"BINARY") if data.draw(st.booleans()) else content
+    )
     with contextlib.suppress(ValueError):
         checked_mesh(*read_vtk(tmp_path / "organ.vtk"))
 
@@ -237,7 +272,9 @@ def not_finite():
 
 def cracked():
     nodes, tetrahedra = np.concatenate([GOOD.nodes, GOOD.nodes[:1]]), GOOD.tetrahedra.copy()
-    tetrahedra[np.flatnonzero((tetrahedra == 0).any(axis=1))[0]] = np.where(tetrahedra[(tetrahedra == 0).any(axis=1)][0] == 0, len(GOOD.nodes), tetrahedra[0])
+    tetrahedra[np.flatnonzero((tetrahedra == 0).any(axis=1))[0]] = np.where(
+        tetrahedra[(tetrahedra == 0).any(axis=1)][0] == 0, len(GOOD.nodes), tetrahedra[0]
+    )
     return nodes, tetrahedra
 
 
@@ -263,9 +300,18 @@ def pair(shared):
         (flipped(slice(None)), "all tetrahedra are inverted: swap two nodes"),
         (flattened(), r"tetrahedra are degenerate.*: 0"),
         (not_finite(), "1 nodes are not finite: 7"),
-        ((np.append(GOOD.nodes, [[0, 0, 0.001]], axis=0), GOOD.tetrahedra), f"1 nodes belong to no tetrahedron: {len(GOOD.nodes)}"),
-        ((GOOD.nodes, np.append(GOOD.tetrahedra, [[0, 1, 2, 999]], axis=0)), "1 tetrahedra name nodes that there are not"),
-        ((GOOD.nodes, np.append(GOOD.tetrahedra, GOOD.tetrahedra[-1:], axis=0)), "not watertight|three tetrahedra or more"),
+        (
+            (np.append(GOOD.nodes, [[0, 0, 0.001]], axis=0), GOOD.tetrahedra),
+            f"1 nodes belong to no tetrahedron: {len(GOOD.nodes)}",
+        ),
+        (
+            (GOOD.nodes, np.append(GOOD.tetrahedra, [[0, 1, 2, 999]], axis=0)),
+            "1 tetrahedra name nodes that there are not",
+        ),
+        (
+            (GOOD.nodes, np.append(GOOD.tetrahedra, GOOD.tetrahedra[-1:], axis=0)),
+            "not watertight|three tetrahedra or more",
+        ),
         (cracked(), "lie where others are, so the mesh is cracked"),
         (pair(0), "in 2 pieces"),
         (pair(1), "in 2 pieces"),
@@ -286,12 +332,27 @@ def test_a_bad_mesh_is_refused_with_what_is_wrong(tmp_path, mesh, says):
         ("solid stl", "no legacy .vtk file"),
         ("# vtk DataFile Version 2.0\nx\nASCII\nDATASET POLYDATA\n", "dataset 'POLYDATA'"),
         ("# vtk DataFile Version 2.0\nx\nUTF8\n", "not ASCII or BINARY"),
-        ("# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1", "ends too early"),
-        ("# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 x 0\n", "something else"),
-        ("# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS many float\n", "does not say how many"),
-        ("# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n", "has no CELLS, CELL_TYPES"),
         (
-            "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\nCELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n",
+            "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1",
+            "ends too early",
+        ),
+        (
+            "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 x 0\n",
+            "something else",
+        ),
+        (
+            "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS many float\n",
+            "does not say how many",
+        ),
+        (
+            "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n",
+            "has no CELLS, CELL_TYPES",
+        ),
+        (
+            (
+                "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n0 0 0 1 0 0"
+                " 0 1 0\nCELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n"
+            ),
             "must be tetrahedra.*1 of type 5",
         ),
     ],

@@ -6,7 +6,18 @@ import sys
 
 
 def test_the_liver_is_lifted_and_held():
-    run = [sys.executable, "-P", "-m", "hub.command_line", "run", "retraction", "--one-host", "--json", "--set", "duration=3.6 s"]
+    run = [
+        sys.executable,
+        "-P",
+        "-m",
+        "hub.command_line",
+        "run",
+        "retraction",
+        "--one-host",
+        "--json",
+        "--set",
+        "duration=3.6 s",
+    ]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     assert not done.returncode, done.stderr
     result = json.loads(done.stdout)

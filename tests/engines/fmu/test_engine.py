@@ -22,7 +22,10 @@ pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
 MS = 10**6
 SPRING, BALL = "mass_spring_damper", "bouncing_ball"
-CLOCK = '<Clock name="tick" intervalVariability="constant" intervalDecimal="0.1" valueReference="30" causality="input"/>'
+CLOCK = (
+    '<Clock name="tick" intervalVariability="constant" intervalDecimal="0.1" valueReference="30"'
+    ' causality="input"/>'
+)
 Make = Callable[..., FmuEngine]
 
 
@@ -50,12 +53,16 @@ def make(libraries: dict[str, Path], tmp_path: Path) -> Iterator[Make]:
 
 def inputs_of(engine: FmuEngine, rates: dict[str, float] | None = None, **values: Any) -> Inputs:
     given = {p.name: np.array(p.start, np.float64) for p in engine.ports if p.causality == "input"}
-    inputs = Inputs(given | {name: np.atleast_1d(np.asarray(value, np.float64)) for name, value in values.items()})
+    inputs = Inputs(
+        given | {name: np.atleast_1d(np.asarray(value, np.float64)) for name, value in values.items()}
+    )
     inputs._rates = {name: np.array([rate]) for name, rate in (rates or {}).items()}
     return inputs
 
 
-def run(engine: FmuEngine, steps: int, period: int = MS, start: int = 0, inputs: Inputs | None = None) -> dict[str, float]:
+def run(
+    engine: FmuEngine, steps: int, period: int = MS, start: int = 0, inputs: Inputs | None = None
+) -> dict[str, float]:
     """Step the engine; return the first element of every output at the end."""
     outputs: Any = {}
     inputs = inputs or inputs_of(engine)
@@ -77,9 +84,20 @@ class TestPorts:
 
     def test_fmi2_variables_with_unit_start_and_type(self, make: Make) -> None:
         found = ports(make(SPRING, period=0))
-        assert set(found) == {"F", "x", "v", "body/a_x5B_1_x5D_", "x_mm", "steps", "stage", "locked", "seen_locked"}
+        assert set(found) == {
+            "F",
+            "x",
+            "v",
+            "body/a_x5B_1_x5D_",
+            "x_mm",
+            "steps",
+            "stage",
+            "locked",
+            "seen_locked",
+        }
         assert (found["F"].causality, found["F"].unit, found["F"].start) == ("input", "N", (0.0,))
-        assert (found["x"].causality, found["x"].unit, found["x"].start) == ("output", "m", None)  # unit of the declared type
+        # unit of the declared type
+        assert (found["x"].causality, found["x"].unit, found["x"].start) == ("output", "m", None)
         assert found["x_mm"].unit == "mm"  # as the FMU declares it
         assert found["body/a_x5B_1_x5D_"].unit == "m/s2"
         assert found["locked"].start == (0.0,)
@@ -88,7 +106,11 @@ class TestPorts:
 
     def test_fmi3_arrays_and_structural_parameters(self, make: Make) -> None:
         found = ports(make(BALL, period=0))
-        assert (found["u"].type, found["u"].size, found["u"].start) == ("std_msgs/msg/Float64MultiArray", 3, (0.0, 0.0, 0.0))
+        assert (found["u"].type, found["u"].size, found["u"].start) == (
+            "std_msgs/msg/Float64MultiArray",
+            3,
+            (0.0, 0.0, 0.0),
+        )
         assert found["state"].size == 2
         assert "height" not in found  # an alias of h
         assert ports(make(BALL, period=0, start={"size": 5}))["u"].size == 5
@@ -97,8 +119,12 @@ class TestPorts:
         found = ports(make(BALL, period=0, start={"u": [1, 2, 3], "frozen": True}))
         assert (found["u"].start, found["frozen"].start) == ((1.0, 2.0, 3.0), (1.0,))
 
-    @pytest.mark.parametrize(("model", "variable", "kind"), [(SPRING, "note", "String"), (BALL, "image", "Binary")])
-    def test_what_is_no_number_is_left_out_with_a_reason(self, make: Make, caplog: pytest.LogCaptureFixture, model: str, variable: str, kind: str) -> None:
+    @pytest.mark.parametrize(
+        ("model", "variable", "kind"), [(SPRING, "note", "String"), (BALL, "image", "Binary")]
+    )
+    def test_what_is_no_number_is_left_out_with_a_reason(
+        self, make: Make, caplog: pytest.LogCaptureFixture, model: str, variable: str, kind: str
+    ) -> None:
         with caplog.at_level(logging.INFO, "engines.fmu"):
             assert variable not in ports(make(model, period=0))
         assert any(f"'{variable}' becomes no port" in line and kind in line for line in caplog.messages)
@@ -128,18 +154,29 @@ class TestBadFmus:
     @pytest.mark.parametrize(
         ("model", "edits", "said"),
         [
-            (SPRING, {"<CoSimulation ": "<ModelExchange ", 'canHandleVariableCommunicationStepSize="true" canInterpolateInputs="true" ': ""}, "model exchange"),
+            (
+                SPRING,
+                {
+                    "<CoSimulation ": "<ModelExchange ",
+                    'canHandleVariableCommunicationStepSize="true" canInterpolateInputs="true" ': "",
+                },
+                "model exchange",
+            ),
             (SPRING, {'fmiVersion="2.0"': 'fmiVersion="4.0"'}, "Unsupported FMI version"),
             (SPRING, {"<ModelVariables>": "<Model"}, "XMLSyntaxError"),
             (BALL, {'<Binary name="image"': CLOCK + '<Binary name="image"'}, "tick"),
         ],
     )
-    def test_what_cannot_be_co_simulated(self, make: Make, model: str, edits: dict[str, str], said: str) -> None:
+    def test_what_cannot_be_co_simulated(
+        self, make: Make, model: str, edits: dict[str, str], said: str
+    ) -> None:
         assert said in str(self.error(make(model, period=0, edits=edits)))
 
     def test_no_binary_for_this_platform(self, libraries: dict[str, Path], tmp_path: Path) -> None:
         path = build.pack(SPRING, libraries[SPRING], tmp_path / "win.fmu", folder="win64")
-        assert "no binary for this platform, linux64; it has: win64" in str(self.error(FmuEngine("plant", FmuParams(path=path))))
+        assert "no binary for this platform, linux64; it has: win64" in str(
+            self.error(FmuEngine("plant", FmuParams(path=path)))
+        )
         path = build.pack(SPRING, None, tmp_path / "none.fmu")
         assert "it has: none" in str(self.error(FmuEngine("plant", FmuParams(path=path))))
 
@@ -158,7 +195,9 @@ class TestBadFmus:
         with pytest.raises(SessionError, match="cannot be instantiated"):
             make(model, edits={"{trocar-": "{other-"})
 
-    def test_rules_of_the_schema_are_logged_and_not_enforced(self, make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    def test_rules_of_the_schema_are_logged_and_not_enforced(
+        self, make: Make, caplog: pytest.LogCaptureFixture
+    ) -> None:
         engine = make(SPRING, edits={'<Unit name="N">': '<Unit name="kN">'})
         assert ports(engine)["F"].unit == "N"
         assert any("breaks rules of FMI" in line for line in caplog.messages)
@@ -192,7 +231,9 @@ class TestStart:
             (BALL, {"size": "many"}, "no quantity"),
         ],
     )
-    def test_a_value_that_does_not_fit_is_refused_before_anything_starts(self, make: Make, model: str, start: dict[str, Any], said: str) -> None:
+    def test_a_value_that_does_not_fit_is_refused_before_anything_starts(
+        self, make: Make, model: str, start: dict[str, Any], said: str
+    ) -> None:
         with pytest.raises(ScenarioError) as caught:
             _ = make(model, period=0, start=start).ports
         assert said in str(caught.value)
@@ -231,13 +272,20 @@ class TestStep:
         assert outputs["v"] == pytest.approx(v, abs=1e-9)
         assert outputs["steps"] == 500
 
-    @pytest.mark.parametrize(("interpolates", "step", "tolerance"), [(True, None, 1e-9), (False, "1 ms", 1e-6), (False, None, 1e-4)])
-    def test_a_force_that_is_extrapolated_inside_the_step(self, make: Make, interpolates: bool, step: str | None, tolerance: float) -> None:
+    @pytest.mark.parametrize(
+        ("interpolates", "step", "tolerance"),
+        [(True, None, 1e-9), (False, "1 ms", 1e-6), (False, None, 1e-4)],
+    )
+    def test_a_force_that_is_extrapolated_inside_the_step(
+        self, make: Make, interpolates: bool, step: str | None, tolerance: float
+    ) -> None:
         edits = None if interpolates else {' canInterpolateInputs="true"': ""}
         engine = make(SPRING, period=10 * MS, step=step, edits=edits)
         for i in range(30):
             outputs = engine.step(i * 10 * MS, 10 * MS, inputs_of(engine, {"F": 20.0}, F=20 * i * 0.01))
-        truth = solve_ivp(lambda t, y: [y[1], 20 * t - 10 * y[0] - 0.1 * y[1]], (0, 0.3), [0, 0], rtol=1e-11, atol=1e-13).y[:, -1]
+        truth = solve_ivp(
+            lambda t, y: [y[1], 20 * t - 10 * y[0] - 0.1 * y[1]], (0, 0.3), [0, 0], rtol=1e-11, atol=1e-13
+        ).y[:, -1]
         assert outputs["x"] == pytest.approx(truth[0], abs=tolerance)
         held = make(SPRING, period=10 * MS, edits=edits)
         for i in range(30):
@@ -274,7 +322,13 @@ class TestStep:
         for i in range(1500):
             force = 400 * (0.02 - float(outputs["x"][0])) - 30 * float(outputs["v"][0])
             outputs = engine.step(i * MS, MS, inputs_of(engine, F=force))
-        truth = solve_ivp(lambda t, y: [y[1], 400 * (0.02 - y[0]) - 32 * y[1] - 10 * y[0]], (0, 1.5), [0, 0], rtol=1e-9, atol=1e-12).y[:, -1]
+        truth = solve_ivp(
+            lambda t, y: [y[1], 400 * (0.02 - y[0]) - 32 * y[1] - 10 * y[0]],
+            (0, 1.5),
+            [0, 0],
+            rtol=1e-9,
+            atol=1e-12,
+        ).y[:, -1]
         assert outputs["x"] == pytest.approx(truth[0], rel=1e-4)
 
     def test_not_configured(self, make: Make) -> None:
@@ -300,7 +354,9 @@ class TestEvents:
                 return speed * t - self.G * t**2 / 2, count
             bounce += flight
 
-    @pytest.mark.parametrize("edits", [None, {' hasEventMode="true"': ""}, {' canHandleVariableCommunicationStepSize="true"': ""}])
+    @pytest.mark.parametrize(
+        "edits", [None, {' hasEventMode="true"': ""}, {' canHandleVariableCommunicationStepSize="true"': ""}]
+    )
     @pytest.mark.parametrize("period", [MS, 50 * MS, 500 * MS])
     def test_no_bounce_is_lost_or_late(self, make: Make, period: int, edits: dict[str, str] | None) -> None:
         outputs = run(make(BALL, period=period, edits=edits), 2000 * MS // period, period=period)
@@ -342,8 +398,20 @@ class TestFaults:
         ("fault", "said"),
         [
             (1, r"output 'v' is \[nan\], expected finite numbers, at 0\.001 s"),
-            (2, r"fmi2DoStep returned 'discard' for the step from 0 s to 0\.001 s, of which it got to 0 s; the FMU says: told to discard \(0\)"),
-            (3, r"fmi2DoStep returned 'error' for the step from 0 s to 0\.001 s; the FMU says: told to fail \(0\)"),
+            (
+                2,
+                (
+                    r"fmi2DoStep returned 'discard' for the step from 0 s to 0\.001 s, of which it got to 0"
+                    r" s; the FMU says: told to discard \(0\)"
+                ),
+            ),
+            (
+                3,
+                (
+                    r"fmi2DoStep returned 'error' for the step from 0 s to 0\.001 s; the FMU says: told to"
+                    r" fail \(0\)"
+                ),
+            ),
             (4, r"fmi2SetReal returned 'discard' for 'F'"),
             (5, r"fmi2DoStep returned 'fatal'.*told to die"),
         ],
@@ -353,13 +421,19 @@ class TestFaults:
         with pytest.raises(SessionError, match=said):
             run(engine, 1)
 
-    def test_messages_go_to_logging_and_not_to_the_terminal(self, make: Make, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_messages_go_to_logging_and_not_to_the_terminal(
+        self, make: Make, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+    ) -> None:
         with caplog.at_level(logging.DEBUG, "engines.fmu.log"):
             engine = make(SPRING, start={"fault": 3})
             with pytest.raises(SessionError):
                 run(engine, 1)
             make(SPRING).close()
-        assert ("engines.fmu.log", logging.ERROR, "plant: logStatus: told to fail (0)") in caplog.record_tuples
+        assert (
+            "engines.fmu.log",
+            logging.ERROR,
+            "plant: logStatus: told to fail (0)",
+        ) in caplog.record_tuples
         assert ("engines.fmu.log", logging.DEBUG, "plant: logStatus: terminated (0)") in caplog.record_tuples
         assert capfd.readouterr() == ("", "")
 

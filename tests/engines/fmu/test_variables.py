@@ -39,7 +39,14 @@ def test_port_names_are_valid_and_lead_back_to_the_variable(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("variable", "port"),
-    [("x", "x"), ("arm.joint_1.q", "arm/joint_1/q"), ("body.r[1]", "body/r_x5B_1_x5D_"), ("der(v)", "der_x28_v_x29_"), ("_q", "x5F_q"), ("x1_y", "x1_y")],
+    [
+        ("x", "x"),
+        ("arm.joint_1.q", "arm/joint_1/q"),
+        ("body.r[1]", "body/r_x5B_1_x5D_"),
+        ("der(v)", "der_x28_v_x29_"),
+        ("_q", "x5F_q"),
+        ("x1_y", "x1_y"),
+    ],
 )
 def test_port_names_of_common_variables(variable: str, port: str) -> None:
     assert port_name(variable) == port
@@ -58,7 +65,9 @@ def test_port_names_of_common_variables(variable: str, port: str) -> None:
         (3, "Float64", [1e308], []),
     ],
 )
-def test_numbers_have_an_exact_place_or_are_refused(major: int, name: str, good: list[float], bad: list[float]) -> None:
+def test_numbers_have_an_exact_place_or_are_refused(
+    major: int, name: str, good: list[float], bad: list[float]
+) -> None:
     number = number_type(major, name)
     assert number is not None
     kept = number.from_float64(np.array(good, np.float64), "v")

@@ -27,8 +27,16 @@ def compile_library(model: str, folder: Path, *flags: str) -> Path:
     return library
 
 
-def pack(model: str, library: Path | None, path: Path, edits: Mapping[str, str] | None = None, folder: str | None = None) -> Path:
-    """Write the FMU of `model` to `path`, with each key of `edits` replaced by its value in modelDescription.xml."""
+def pack(
+    model: str,
+    library: Path | None,
+    path: Path,
+    edits: Mapping[str, str] | None = None,
+    folder: str | None = None,
+) -> Path:
+    """Write the FMU of `model` to `path`, with each key of `edits` replaced by its value in
+    modelDescription.xml.
+    """
     text = (HERE / model / "modelDescription.xml").read_text()
     for old, new in (edits or {}).items():
         assert old in text, old

@@ -1,4 +1,6 @@
-"""The model's equations of motion: against the identified ones, their energy, gravity compensation, and where a servo comes to rest."""
+"""The model's equations of motion: against the identified ones, their energy, gravity compensation, and where
+a servo comes to rest.
+"""
 
 import json
 from pathlib import Path
@@ -16,7 +18,9 @@ from robots import rotation
 from robots.dvrk.dynamics import of_ecm, of_psm
 from robots.dvrk.instruments import instrument
 
-REFERENCE = json.loads((Path(__file__).parents[2] / "robots" / "data" / "reference_dynamics.json").read_text())
+REFERENCE = json.loads(
+    (Path(__file__).parents[2] / "robots" / "data" / "reference_dynamics.json").read_text()
+)
 NEEDLE_DRIVER = "LARGE_NEEDLE_DRIVER_400006"
 TILTS = [np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.2, -0.4, 0.1, 0.889])]
 
@@ -26,11 +30,15 @@ def tilted(arm, tilt, **params):
     return {"arms": {arm: {"orientation": orientation, **params}}, "looks": False}
 
 
-@pytest.mark.parametrize("case", REFERENCE["cases"][:6] + REFERENCE["cases"][-3:], ids=lambda case: str(case["q"]))
+@pytest.mark.parametrize(
+    "case", REFERENCE["cases"][:6] + REFERENCE["cases"][-3:], ids=lambda case: str(case["q"])
+)
 def test_the_model_has_the_identified_dynamics(case):
     found = dynamics("PSM1", NEEDLE_DRIVER, case["q"], [0.0] * 6)
     assert np.allclose(found.inertia[:3, :3], case["inertia"], rtol=0.0, atol=0.05 * np.max(case["inertia"]))
-    assert np.allclose(found.gravity[:3], case["gravity"], rtol=0.0, atol=0.05 * np.max(np.abs(case["gravity"])))
+    assert np.allclose(
+        found.gravity[:3], case["gravity"], rtol=0.0, atol=0.05 * np.max(np.abs(case["gravity"]))
+    )
     if "elastic" in case:
         assert np.allclose(found.elastic[:4], case["elastic"], atol=1e-6)
 
@@ -52,7 +60,9 @@ class Run:
         self.arm = arm
         self.engine = MujocoEngine("robot", MujocoParams.model_validate(scene))
         self.outputs = self.engine.configure(Setup(period_ns=1_000_000, directory=Path(), bonds={}))
-        starts = {port.name: np.array(port.start, float) for port in self.engine.ports if port.causality == "input"}
+        starts = {
+            port.name: np.array(port.start, float) for port in self.engine.ports if port.causality == "input"
+        }
         self.command, self.mode = starts[f"{arm}/servo_jp"], starts[f"{arm}/control_mode"]
         self.inputs, self.t = Inputs(starts), 0
 
@@ -68,7 +78,10 @@ class Run:
 
 
 @pytest.mark.parametrize("tilt", TILTS, ids=str)
-@pytest.mark.parametrize(("arm", "start"), [("PSM1", [-0.054, -0.2134, 0.2, -1.52, 0.2, -0.4]), ("ECM", [0.5, 0.8, 0.1, 0.4])])  # springs at rest
+# springs at rest
+@pytest.mark.parametrize(
+    ("arm", "start"), [("PSM1", [-0.054, -0.2134, 0.2, -1.52, 0.2, -0.4]), ("ECM", [0.5, 0.8, 0.1, 0.4])]
+)
 def test_gravity_compensation_holds_the_arm_however_its_base_stands(arm, start, tilt):
     run = Run(arm, tilted(arm, tilt, start=start))
     run.mode[:] = [2.0, 2.0]
@@ -87,7 +100,15 @@ def test_without_torque_the_arm_sinks_unless_it_has_brakes(arm):
     assert (np.abs(run.q - start).max() > 1e-2) == (arm == "PSM1")
 
 
-@pytest.mark.parametrize("goal", [[0.5, -0.4, 0.2, 1.0, 0.5, -0.4], [-1.2, 0.8, 0.05, -2.0, -0.6, 0.7], [0.05, 0.02, 0.11, 0.05, 0.02, 0.03]], ids=str)
+@pytest.mark.parametrize(
+    "goal",
+    [
+        [0.5, -0.4, 0.2, 1.0, 0.5, -0.4],
+        [-1.2, 0.8, 0.05, -2.0, -0.6, 0.7],
+        [0.05, 0.02, 0.11, 0.05, 0.02, 0.03],
+    ],
+    ids=str,
+)
 def test_the_servo_comes_to_rest_where_it_is_told(goal):
     run = Run("PSM1", tilted("PSM1", TILTS[1], instrument=NEEDLE_DRIVER))
     start, goal, seconds = run.q, np.array(goal), 2.0
@@ -102,8 +123,12 @@ def test_the_servo_comes_to_rest_where_it_is_told(goal):
 
 
 def test_a_free_arm_without_friction_keeps_its_energy():
-    model = build(SceneParams.model_validate({"arms": {"PSM1": {"instrument": NEEDLE_DRIVER}}, "looks": False}), 1e-4)
-    model.dof_damping[:] = model.dof_frictionloss[:] = model.tendon_damping[:] = model.tendon_frictionloss[:] = 0.0
+    model = build(
+        SceneParams.model_validate({"arms": {"PSM1": {"instrument": NEEDLE_DRIVER}}, "looks": False}), 1e-4
+    )
+    model.dof_damping[:] = model.dof_frictionloss[:] = model.tendon_damping[:] = model.tendon_frictionloss[
+        :
+    ] = 0.0
     model.actuator_gainprm[:] = model.actuator_biasprm[:] = model.body_gravcomp[:] = 0.0
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
@@ -124,8 +149,22 @@ def test_the_wrist_of_a_tilted_base_feels_gravity_turned():
     model = build(SceneParams.model_validate(tilted("PSM1", tilt, instrument=NEEDLE_DRIVER)))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    names = [f"PSM1/{name}" for name in ("yaw", "pitch", "insertion", "counterweight", "pitch_back", "pitch_front", "pitch_bottom", "pitch_top")]
-    follow = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [0, 1, 0], [0, 1, 0], [0, -1, 0], [0, -1, 0]])
+    names = [
+        f"PSM1/{name}"
+        for name in (
+            "yaw",
+            "pitch",
+            "insertion",
+            "counterweight",
+            "pitch_back",
+            "pitch_front",
+            "pitch_bottom",
+            "pitch_top",
+        )
+    ]
+    follow = np.array(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [0, 1, 0], [0, 1, 0], [0, -1, 0], [0, -1, 0]]
+    )
     found = follow.T @ [data.qfrc_bias[int(model.joint(name).dofadr[0])] for name in names]
     pull = rotation.matrix(tilt).T @ [0.0, 0.0, -9.81]
     assert np.allclose(found, of_psm(instrument(NEEDLE_DRIVER)).gravity(np.zeros(6), pull)[:3], atol=1e-4)

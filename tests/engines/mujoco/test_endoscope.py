@@ -48,8 +48,19 @@ def camera_pose(endoscope: str = "straight") -> Vector:
 
 def make(points: NDArray[np.float64] | None = None, **params: Any) -> Endoscope:
     """An endoscope that sees a small bright cube at each of `points`, shape (n, 3), in the world."""
-    given = {} if points is None else {f"cube{i}": {"kind": "block", "size": ["1.5 mm"] * 3, "position": point.tolist()} for i, point in enumerate(points)}
-    scene = {"arms": {"ECM": {"start": ECM_START, "endoscope": params.pop("endoscope", "straight")}}, "objects": given, "looks": False}
+    given = (
+        {}
+        if points is None
+        else {
+            f"cube{i}": {"kind": "block", "size": ["1.5 mm"] * 3, "position": point.tolist()}
+            for i, point in enumerate(points)
+        }
+    )
+    scene = {
+        "arms": {"ECM": {"start": ECM_START, "endoscope": params.pop("endoscope", "straight")}},
+        "objects": given,
+        "looks": False,
+    }
     return Endoscope("endoscope", EndoscopeParams.model_validate(scene | params))
 
 
@@ -57,7 +68,9 @@ def state(endoscope: Endoscope) -> Vector:
     """The joint positions of the scene at its start."""
     model = build(endoscope.params)
     positions = model.qpos0.copy()
-    positions[[model.joint(f"ECM/{joint.name}").qposadr[0] for joint in endoscope.params.arms["ECM"].chain.joints]] = ECM_START
+    positions[
+        [model.joint(f"ECM/{joint.name}").qposadr[0] for joint in endoscope.params.arms["ECM"].chain.joints]
+    ] = ECM_START
     return positions
 
 
@@ -73,7 +86,9 @@ def pixels(image: Any) -> NDArray[np.uint8]:
 
 
 def bright_spots(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """The middle (u, v) of each yellow spot, shape (n, 2): red and no blue, which nothing else in these scenes is."""
+    """The middle (u, v) of each yellow spot, shape (n, 2): red and no blue, which nothing else in these
+    scenes is.
+    """
     from scipy import ndimage
 
     red, blue = picture[:, :, 0].astype(float), picture[:, :, 2].astype(float)
@@ -83,7 +98,13 @@ def bright_spots(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize(
-    "lens", [{}, {"endoscope": "up"}, {"endoscope": "down", "width": 640, "height": 360}, {"field_of_view": "70 deg", "baseline": "8 mm", "width": 480}]
+    "lens",
+    [
+        {},
+        {"endoscope": "up"},
+        {"endoscope": "down", "width": 640, "height": 360},
+        {"field_of_view": "70 deg", "baseline": "8 mm", "width": 480},
+    ],
 )
 def test_known_points_are_where_camera_info_projects_them(gl: str, lens: dict[str, Any]) -> None:
     pose = camera_pose(lens.get("endoscope", "straight"))
@@ -152,7 +173,9 @@ def test_a_camera_that_is_off_draws_nothing_and_has_the_same_state(monkeypatch: 
 
 def test_cameras_that_stand_in_the_world_look_at_their_target(gl: str) -> None:
     target = [0.1, -0.2, 0.3]
-    outputs = shoot(make(np.array([target]), view={"position": [0.25, -0.2, 0.35], "target": target}, baseline="0 mm"))
+    outputs = shoot(
+        make(np.array([target]), view={"position": [0.25, -0.2, 0.35], "target": target}, baseline="0 mm")
+    )
     for eye in EYES:
         (spot,) = bright_spots(pixels(outputs[f"{eye}/image_raw"][0]))
         assert spot == pytest.approx([159.5, 143.5], abs=0.5)
@@ -173,8 +196,17 @@ def test_without_an_ecm_the_cameras_see_the_scene(gl: str) -> None:
     [
         {"arms": {"PSM1": {}}},
         {"arms": {"PSM3": {"instrument": "400006"}, "ECM": {}}},
-        {"arms": {"PSM1": {"instrument": "420006"}, "PSM2": {"instrument": "400049"}, "ECM": {}}, "mounting": "cart"},
-        {"arms": {"PSM2": {}}, "objects": {"ring": {"kind": "ring", "position": [0, 0, 0]}, "needle": {"kind": "needle", "position": [0, 0, 0]}}},
+        {
+            "arms": {"PSM1": {"instrument": "420006"}, "PSM2": {"instrument": "400049"}, "ECM": {}},
+            "mounting": "cart",
+        },
+        {
+            "arms": {"PSM2": {}},
+            "objects": {
+                "ring": {"kind": "ring", "position": [0, 0, 0]},
+                "needle": {"kind": "needle", "position": [0, 0, 0]},
+            },
+        },
     ],
 )
 def test_the_number_of_positions_is_known_before_the_model_is_built(scene: dict[str, Any]) -> None:
@@ -187,7 +219,9 @@ def test_it_keeps_the_contract_of_an_engine(gl: str) -> None:
     check_engine(make, period_ns=PERIOD_NS, inputs={"qpos": state(make())})
 
 
-def test_without_opengl_it_runs_without_pictures_and_says_what_to_install(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+def test_without_opengl_it_runs_without_pictures_and_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(opengl, "find", lambda: NOTHING)
     with caplog.at_level(logging.WARNING):
         outputs = shoot(make(images="both"))

@@ -26,7 +26,9 @@ class Run:
     """An engine with its inputs, stepped by hand."""
 
     def __init__(self, plan=IMPULSE, period=H, **params):
-        self.engine = MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": {"start": START}}, **params}))
+        self.engine = MujocoEngine(
+            "robot", MujocoParams.model_validate({"arms": {"PSM1": {"start": START}}, **params})
+        )
         bonds = {} if plan is None else {"PSM1/probe": plan}
         self.outputs = self.engine.configure(Setup(period_ns=period, directory=Path(), bonds=bonds))
         self.command, self.wrench = np.array(START), np.zeros(6)
@@ -76,7 +78,12 @@ def test_the_arm_starts_at_rest_where_it_is_told():
 
 
 def test_measured_cp_is_the_forward_kinematics_of_measured_js():
-    run = wander(Run(arms={"PSM1": {"start": START, "position": [0.3, 0.2, 0.1], "orientation": [0.5, 0.5, 0.5, 0.5]}}), 50)
+    run = wander(
+        Run(
+            arms={"PSM1": {"start": START, "position": [0.3, 0.2, 0.1], "orientation": [0.5, 0.5, 0.5, 0.5]}}
+        ),
+        50,
+    )
     tip = run.engine.params.arms["PSM1"].chain.forward(run.output("measured_js")[:6])
     assert np.allclose(run.output("measured_cp")[:3], tip[:3, 3], atol=1e-12)
     turn = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
@@ -88,7 +95,11 @@ def test_the_servo_reaches_its_goal_but_for_friction():
     run.command += [0.05, -0.04, 0.01, 0.2, 0.1, -0.1]
     run.steps(1500)
     discs = drives.discs(instrument("palpation-probe"))
-    losses = [DRIVES[name].coulomb_friction + sum(abs(disc.shares.get(name, 0.0)) * disc.coulomb_friction for disc in discs) for name in psm.JOINT_NAMES]
+    losses = [
+        DRIVES[name].coulomb_friction
+        + sum(abs(disc.shares.get(name, 0.0)) * disc.coulomb_friction for disc in discs)
+        for name in psm.JOINT_NAMES
+    ]
     stiction = [loss / DRIVES[name].stiffness for loss, name in zip(losses, psm.JOINT_NAMES, strict=True)]
     assert (np.abs(run.output("measured_js")[:6] - run.command) <= np.array(stiction) * 1.01 + 1e-6).all()
     assert np.allclose(run.output("setpoint_js"), run.command)
@@ -152,7 +163,9 @@ def test_effective_mass_is_the_least_that_a_blow_meets():
         run = Run(timestep="1 us", period=1000)
         run.wrench[axis] = blow
         response[:, axis] = run.steps(1).output("probe/twist")[:3] / (blow * 1e-6)
-    assert run.engine.bonds[0].effective_mass == pytest.approx(1.0 / np.linalg.eigvalsh((response + response.T) / 2)[-1], rel=1e-3)
+    assert run.engine.bonds[0].effective_mass == pytest.approx(
+        1.0 / np.linalg.eigvalsh((response + response.T) / 2)[-1], rel=1e-3
+    )
 
 
 def test_the_linearised_correction_pulls_back_to_the_prediction():
@@ -177,7 +190,10 @@ def test_equal_runs_have_equal_hashes(plan):
 def test_restore_returns_to_the_same_bits(plan):
     run = wander(Run(plan), 40)
     saved, command, wrench, t = run.engine.save(), run.command.copy(), run.wrench.copy(), run.t
-    first = wander(run, 40, seed=2).engine.state_hash(), {name: value.copy() for name, value in run.outputs.items()}
+    first = (
+        wander(run, 40, seed=2).engine.state_hash(),
+        {name: value.copy() for name, value in run.outputs.items()},
+    )
     for again in (run, Run(plan)):
         again.engine.restore(saved)
         assert again.engine.save() == saved

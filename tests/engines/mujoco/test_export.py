@@ -17,7 +17,11 @@ from robots.dvrk.linkage import LINKAGES
 SCENE = SceneParams.model_validate(
     {
         "mounting": "cart",
-        "arms": {"PSM1": {"instrument": "400006"}, "PSM3": {"instrument": "400172"}, "ECM": {"endoscope": "down"}},
+        "arms": {
+            "PSM1": {"instrument": "400006"},
+            "PSM3": {"instrument": "400172"},
+            "ECM": {"endoscope": "down"},
+        },
         "setup_joints": {"PSM1": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]},
     }
 )
@@ -38,10 +42,33 @@ def some_positions(model):
 
 def test_mjcf_reads_back_as_it_was(folder):
     model, back = build(SCENE), mujoco.MjModel.from_xml_path(str(folder / "dvrk.xml"))
-    assert (model.nq, model.nv, model.nu, model.neq, model.ngeom, model.nsensor) == (back.nq, back.nv, back.nu, back.neq, back.ngeom, back.nsensor)
-    for field in ("body_mass", "body_inertia", "body_ipos", "body_pos", "jnt_range", "jnt_stiffness", "qpos_spring", "dof_damping", "dof_armature"):
+    assert (model.nq, model.nv, model.nu, model.neq, model.ngeom, model.nsensor) == (
+        back.nq,
+        back.nv,
+        back.nu,
+        back.neq,
+        back.ngeom,
+        back.nsensor,
+    )
+    for field in (
+        "body_mass",
+        "body_inertia",
+        "body_ipos",
+        "body_pos",
+        "jnt_range",
+        "jnt_stiffness",
+        "qpos_spring",
+        "dof_damping",
+        "dof_armature",
+    ):
         assert np.allclose(getattr(model, field), getattr(back, field), rtol=1e-12, atol=1e-15), field
-    for field in ("dof_frictionloss", "actuator_biasprm", "actuator_forcerange", "tendon_frictionloss", "body_gravcomp"):
+    for field in (
+        "dof_frictionloss",
+        "actuator_biasprm",
+        "actuator_forcerange",
+        "tendon_frictionloss",
+        "body_gravcomp",
+    ):
         assert np.allclose(getattr(model, field), getattr(back, field), rtol=1e-5), field
     assert [model.body(i).name for i in range(model.nbody)] == [back.body(i).name for i in range(back.nbody)]
     data, other = mujoco.MjData(model), mujoco.MjData(back)
@@ -60,7 +87,8 @@ def test_a_keyframe_holds_the_arms_where_they_start(folder):
     assert data.joint("PSM1/insertion").qpos[0] == SCENE.arms["PSM1"].start[2] > 0.1
     assert data.joint("PSM1/counterweight").qpos[0] == -SCENE.arms["PSM1"].start[2]
     mujoco.mj_step(model, data, nstep=1000)
-    assert np.abs(data.qpos - start).max() < 5e-3  # no more than the springs of roll and pitch pull their servos away
+    # no more than the springs of roll and pitch pull their servos away
+    assert np.abs(data.qpos - start).max() < 5e-3
 
 
 def test_meshes_read_back_where_they_were(folder):
@@ -82,8 +110,12 @@ def test_urdf_has_the_tip_poses_of_the_arms(robot):
     rng = np.random.default_rng(2)
     for arm, params in SCENE.arms.items():
         q = rng.uniform(params.chain.lower, params.chain.upper)
-        robot.update_cfg({f"{arm}_{joint.name}": value for joint, value in zip(params.chain.joints, q, strict=True)})
-        assert np.allclose(robot.get_transform(f"{arm}_tip", f"{arm}_base"), params.chain.forward(q), atol=1e-12)
+        robot.update_cfg(
+            {f"{arm}_{joint.name}": value for joint, value in zip(params.chain.joints, q, strict=True)}
+        )
+        assert np.allclose(
+            robot.get_transform(f"{arm}_tip", f"{arm}_base"), params.chain.forward(q), atol=1e-12
+        )
 
 
 def test_urdf_moves_the_linkage_with_the_arm(robot):
@@ -92,16 +124,25 @@ def test_urdf_moves_the_linkage_with_the_arm(robot):
     zero = np.zeros(len(robot.actuated_joint_names))
     for pin in LINKAGES["PSM1"].pins:
         robot.update_cfg(zero)
-        local = [np.linalg.inv(robot.get_transform(f"PSM1_{body}_link", "PSM1_base")) @ [*pin.position, 1.0] for body in pin.bodies]
+        local = [
+            np.linalg.inv(robot.get_transform(f"PSM1_{body}_link", "PSM1_base")) @ [*pin.position, 1.0]
+            for body in pin.bodies
+        ]
         robot.update_cfg({"PSM1_pitch": pitch, "PSM1_yaw": 0.2})
-        first, second = (robot.get_transform(f"PSM1_{body}_link", "PSM1_base") @ point for body, point in zip(pin.bodies, local, strict=True))
+        first, second = (
+            robot.get_transform(f"PSM1_{body}_link", "PSM1_base") @ point
+            for body, point in zip(pin.bodies, local, strict=True)
+        )
         assert np.allclose(first, second, atol=1e-12)
         assert not np.allclose(first[:3], pin.position, atol=1e-3)
 
 
 def test_urdf_opens_both_fingers_by_half_the_jaw(robot):
     robot.update_cfg({"PSM1_jaw": 0.6})
-    left, right = (robot.get_transform(f"PSM1_{side}_link", "PSM1_wrist_yaw_link")[:3, :3] for side in ("jaw_left", "jaw_right"))
+    left, right = (
+        robot.get_transform(f"PSM1_{side}_link", "PSM1_wrist_yaw_link")[:3, :3]
+        for side in ("jaw_left", "jaw_right")
+    )
     assert np.allclose(left[:, 0], [np.cos(0.3), np.sin(0.3), 0.0])
     assert np.allclose(right[:, 0], [np.cos(0.3), -np.sin(0.3), 0.0])
     jaw = SCENE.arms["PSM1"].tool.jaw
@@ -117,7 +158,9 @@ def test_urdf_has_the_masses_of_the_model(robot):
 
 
 def test_mujoco_reads_the_urdf(folder):
-    """It refuses moving links without mass, looks for meshes beside the file, and makes equalities of the mimics."""
+    """It refuses moving links without mass, looks for meshes beside the file, and makes equalities of the
+    mimics.
+    """
     model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.urdf"))
     params = SCENE.arms["PSM1"]
     q = np.random.default_rng(3).uniform(params.chain.lower, params.chain.upper)
@@ -125,14 +168,21 @@ def test_mujoco_reads_the_urdf(folder):
     for joint, value in zip(params.chain.joints, q, strict=True):
         data.joint(f"PSM1_{joint.name}").qpos = value
     mujoco.mj_kinematics(model, data)
-    expected = setup_joints.base_pose("PSM1", np.array(SCENE.setup_joints["PSM1"])) @ params.chain.frames(q)[5]
+    expected = (
+        setup_joints.base_pose("PSM1", np.array(SCENE.setup_joints["PSM1"])) @ params.chain.frames(q)[5]
+    )
     assert np.allclose(data.body("PSM1_wrist_yaw_link").xpos, expected[:3, 3], atol=1e-9)
     assert model.neq == 2 * 7 + 4
     assert model.nmesh
 
 
 def test_urdf_meshes_are_beside_it(folder, robot):
-    names = {visual.geometry.mesh.filename for link in robot.robot.links for visual in link.visuals if visual.geometry.mesh}
+    names = {
+        visual.geometry.mesh.filename
+        for link in robot.robot.links
+        for visual in link.visuals
+        if visual.geometry.mesh
+    }
     assert names
     assert all((folder / name).is_file() for name in names)
 
@@ -142,7 +192,12 @@ def run(*words):
 
 
 @pytest.mark.parametrize(
-    "written", [("--q", "0.3", "-0.2", "0.15", "0.5", "-0.4", "0.25"), ("--q", "0.3,-0.2,0.15,0.5,-0.4,0.25"), ("--q=0.3 -0.2 0.15 0.5 -0.4 0.25",)]
+    "written",
+    [
+        ("--q", "0.3", "-0.2", "0.15", "0.5", "-0.4", "0.25"),
+        ("--q", "0.3,-0.2,0.15,0.5,-0.4,0.25"),
+        ("--q=0.3 -0.2 0.15 0.5 -0.4 0.25",),
+    ],
 )
 def test_positions_are_numbers_in_a_row(written):
     result = run("fk", "PSM1", *written, "--instrument", "400006", "--json")
@@ -157,12 +212,36 @@ def test_first_position_may_be_negative():
 
 
 def test_dynamics_are_those_of_the_model():
-    result = run("dynamics", "PSM1", "--q", "0.3", "-0.2", "0.15", "0.5", "-0.4", "0.25", "--dq", ".1", ".1", ".01", "0", "0", "0", "--json")
+    result = run(
+        "dynamics",
+        "PSM1",
+        "--q",
+        "0.3",
+        "-0.2",
+        "0.15",
+        "0.5",
+        "-0.4",
+        "0.25",
+        "--dq",
+        ".1",
+        ".1",
+        ".01",
+        "0",
+        "0",
+        "0",
+        "--json",
+    )
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found["joints"] == ["yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw"]
     inertia = np.array(found["inertia"])
-    identified = np.array([[0.187651513, 0.0185569597, -0.000980066578], [0.0185569597, 0.204328846, 0.033], [-0.000980066578, 0.033, 0.4167]])
+    identified = np.array(
+        [
+            [0.187651513, 0.0185569597, -0.000980066578],
+            [0.0185569597, 0.204328846, 0.033],
+            [-0.000980066578, 0.033, 0.4167],
+        ]
+    )
     assert np.allclose(inertia, inertia.T)
     assert np.linalg.eigvalsh(inertia).min() > 0
     assert np.abs(inertia[:3, :3] - identified).max() < 0.05 * identified.max()
@@ -174,7 +253,13 @@ def test_dynamics_are_those_of_the_model():
 def test_dynamics_for_a_person():
     result = run("dynamics", "ECM", "--q", "0,0,0.1,0")
     assert result.exit_code == 0
-    assert [line.split()[0] for line in result.stdout.splitlines()] == ["gravity", "yaw", "pitch", "insertion", "roll"]
+    assert [line.split()[0] for line in result.stdout.splitlines()] == [
+        "gravity",
+        "yaw",
+        "pitch",
+        "insertion",
+        "roll",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -188,7 +273,10 @@ def test_dynamics_for_a_person():
         (("dynamics", "MTML", "--q", "0"), "no arm 'MTML' in the model"),
         (("dynamics", "PSM1", "--instrument", "12", "--q", "0,0,0,0,0,0"), "no instrument '12'"),
         (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0"), "1 joint velocities, expected 6"),
-        (("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0,0,0,0,0,inf"), "not all joint velocities are finite"),
+        (
+            ("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0,0,0,0,0,inf"),
+            "not all joint velocities are finite",
+        ),
         (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "one place"),
         (("export", "x", "--instrument", "PSM1"), "ARM=N"),
         (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
@@ -206,10 +294,26 @@ def test_bad_usage_is_refused_with_what_is_allowed(words, message, tmp_path, mon
 
 
 @pytest.mark.parametrize(
-    ("name", "words", "file"), [("a.urdf", (), "a.urdf"), ("b.xml", (), "b.xml"), ("c", ("--format", "urdf"), "c/dvrk.urdf"), ("d", (), "d/dvrk.xml")]
+    ("name", "words", "file"),
+    [
+        ("a.urdf", (), "a.urdf"),
+        ("b.xml", (), "b.xml"),
+        ("c", ("--format", "urdf"), "c/dvrk.urdf"),
+        ("d", (), "d/dvrk.xml"),
+    ],
 )
 def test_export_writes_what_the_name_says(tmp_path, name, words, file):
-    result = run("export", str(tmp_path / name), "--arms", "PSM1", "--instrument", "PSM1=400049", "--mounting", "free", *words)
+    result = run(
+        "export",
+        str(tmp_path / name),
+        "--arms",
+        "PSM1",
+        "--instrument",
+        "PSM1=400049",
+        "--mounting",
+        "free",
+        *words,
+    )
     assert result.exit_code == 0, result.output
     assert (tmp_path / file).is_file()
     assert list((tmp_path / file).parent.glob("assets/*.obj"))
@@ -221,9 +325,16 @@ def test_urdf_slides_the_pads_of_a_roller_against_each_other(tmp_path):
     robot = yourdfpy.URDF.load(str(tmp_path / "dvrk.urdf"), load_meshes=False)
     roller = scene.arms["PSM1"].tool.roller
     limit = robot.joint_map["PSM1_roller"].limit
-    assert (limit.lower, limit.upper, limit.effort) == (roller.joint.lower, roller.joint.upper, roller.joint.effort)
+    assert (limit.lower, limit.upper, limit.effort) == (
+        roller.joint.lower,
+        roller.joint.upper,
+        roller.joint.effort,
+    )
     robot.update_cfg({"PSM1_roller": 0.5})
-    left, right = (robot.get_transform(f"PSM1_pad_{side}_link", "PSM1_wrist_yaw_link")[:3, 3] for side in ("left", "right"))
+    left, right = (
+        robot.get_transform(f"PSM1_pad_{side}_link", "PSM1_wrist_yaw_link")[:3, 3]
+        for side in ("left", "right")
+    )
     ahead = scene.arms["PSM1"].tool.tip[:3, 2]
     assert np.allclose(left, 0.5 * roller.wire_radius * ahead)
     assert np.allclose(right, -0.5 * roller.wire_radius * ahead)

@@ -16,8 +16,12 @@ H = 1_000_000
 THICKNESS = {"needle": 0.4e-3, "ring": 1e-3}
 DRIVER = instrument("400006")
 RCM_HEIGHT = 0.2
-TOUCHING = RCM_HEIGHT - DRIVER.jaw.length + 0.0065  # insertion at which the fingers reach the table; 6.5 mm: of the tip over the RCM at insertion 0
-RADIUS = {"needle": NeedleParams(kind="needle", position=(0, 0, 0)).radius, "ring": RingParams(kind="ring", position=(0, 0, 0)).radius}
+# insertion at which the fingers reach the table; 6.5 mm: of the tip over the RCM at insertion 0
+TOUCHING = RCM_HEIGHT - DRIVER.jaw.length + 0.0065
+RADIUS = {
+    "needle": NeedleParams(kind="needle", position=(0, 0, 0)).radius,
+    "ring": RingParams(kind="ring", position=(0, 0, 0)).radius,
+}
 
 
 class Rig:
@@ -26,11 +30,22 @@ class Rig:
     def __init__(self, kind, **scene):
         place = {"kind": kind, "position": [-RADIUS[kind], 0.0, THICKNESS[kind]]}
         arm = {"instrument": "400006", "position": [0.0, 0.0, RCM_HEIGHT], "jaw": 0.5}
-        params = {"arms": {"PSM1": arm}, "table": {"position": [0, 0, 0]}, "objects": {"thing": place}, "looks": False, **scene}
+        params = {
+            "arms": {"PSM1": arm},
+            "table": {"position": [0, 0, 0]},
+            "objects": {"thing": place},
+            "looks": False,
+            **scene,
+        }
         self.engine = MujocoEngine("robot", MujocoParams.model_validate(params))
         self.outputs = self.engine.configure(Setup(period_ns=H, directory=Path()))
         values = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
-        self.inputs, self.joints, self.jaw, self.step = Inputs(values), values["PSM1/servo_jp"], values["PSM1/jaw/servo_jp"], 0
+        self.inputs, self.joints, self.jaw, self.step = (
+            Inputs(values),
+            values["PSM1/servo_jp"],
+            values["PSM1/jaw/servo_jp"],
+            0,
+        )
         self.slip = 0.0
 
     def run(self, seconds, move=lambda t: None):
@@ -56,7 +71,13 @@ class Rig:
 
         def move(t):
             grow = min(1.0, t)
-            angles = np.array([5.0, 3.0, 3.0]) * 1e-3 / [0.15, 0.15, 1.0] * grow * np.sin(2.0 * np.pi * np.array([2.0, 1.5, 3.0]) * t)
+            angles = (
+                np.array([5.0, 3.0, 3.0])
+                * 1e-3
+                / [0.15, 0.15, 1.0]
+                * grow
+                * np.sin(2.0 * np.pi * np.array([2.0, 1.5, 3.0]) * t)
+            )
             self.joints[:3] = np.add(angles, [0.0, 0.0, depth])
 
         return self.run(seconds, move)

@@ -24,10 +24,15 @@ class Run:
     """An engine with a hand, stepped by hand."""
 
     def __init__(self, **arm):
-        self.engine = MujocoEngine("robot", MujocoParams.model_validate({**SCENE, "arms": {"PSM1": {"instrument": "MUSHA_HAND", **arm}}}))
+        self.engine = MujocoEngine(
+            "robot",
+            MujocoParams.model_validate({**SCENE, "arms": {"PSM1": {"instrument": "MUSHA_HAND", **arm}}}),
+        )
         self.outputs = self.engine.configure(Setup(period_ns=H, directory=Path(), bonds={}))
         self.model, self.data = self.engine._model, self.engine._data
-        self.values = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
+        self.values = {
+            port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"
+        }
         self.t = 0
 
     def go(self, closings, steps=1000):
@@ -86,7 +91,8 @@ def test_a_blocked_phalanx_lets_the_others_go_on():
     command[[0, 3]] = HAND.command("grasp", 0.4)[[0, 3]]
     run.go(command, 600)
     assert run.positions[0, 1] == pytest.approx(start[0, 1], abs=np.radians(1.0))
-    assert run.positions[0, 2] > HAND.unloaded(command)[0, 2] + np.radians(10.0)  # the distal joint takes up what is wound up
+    # the distal joint takes up what is wound up
+    assert run.positions[0, 2] > HAND.unloaded(command)[0, 2] + np.radians(10.0)
 
 
 def test_opening_pushes_no_harder_than_springs_and_rotor():
@@ -109,7 +115,10 @@ def test_all_vertices_of_the_folded_hand_pass_the_trocar():
 
 def test_fingers_touch_one_another_and_nothing_else_of_the_arm():
     run = Run().go(np.radians([10.0, 10.0, 0.0, 10.0, 10.0, 0.0]), 600)
-    touching = {frozenset(run.model.geom(int(g)).name.split("/")[1].split("_")[0] for g in contact.geom) for contact in run.data.contact[: run.data.ncon]}
+    touching = {
+        frozenset(run.model.geom(int(g)).name.split("/")[1].split("_")[0] for g in contact.geom)
+        for contact in run.data.contact[: run.data.ncon]
+    }
     assert touching
     assert all(len(pair) == 2 and all(name.startswith("finger") for name in pair) for pair in touching)
 
@@ -134,7 +143,13 @@ def test_an_exported_hand_reads_back(tmp_path):
     scene = SceneParams.model_validate(SCENE)
     write(scene, tmp_path / "hand.xml", "mjcf")
     model, back = build(scene), mujoco.MjModel.from_xml_path(str(tmp_path / "hand.xml"))
-    assert (model.nq, model.nu, model.ntendon, model.npair, model.nsensor) == (back.nq, back.nu, back.ntendon, back.npair, back.nsensor)
+    assert (model.nq, model.nu, model.ntendon, model.npair, model.nsensor) == (
+        back.nq,
+        back.nu,
+        back.ntendon,
+        back.npair,
+        back.nsensor,
+    )
     assert np.allclose(model.wrap_prm, back.wrap_prm, rtol=1e-5)  # MJCF has six digits
     write(scene, tmp_path / "hand.urdf", "urdf")
     robot = yourdfpy.URDF.load(str(tmp_path / "hand.urdf"), load_meshes=False)

@@ -20,7 +20,10 @@ from schemas.vectors import Vector
 
 FIXED = ("psm", "ecm", "cart", *(f"suj/{arm}" for arm in get_args(CartArm)))
 INSTRUMENTS = tuple(f"instrument/{name}" for name in instruments())
-GRASPING = tuple(f"instrument/{number}" for number in ("400006", "420006", "400049", "420049", "400093", "400172", "400205"))
+GRASPING = tuple(
+    f"instrument/{number}"
+    for number in ("400006", "420006", "400049", "420049", "400093", "400172", "400205")
+)
 
 TOLERANCE = 0.005
 """m. Rounded edges and what we left out of the CAD's outline."""
@@ -28,7 +31,9 @@ TOLERANCE = 0.005
 
 def bounds(what: str, body: str, names: tuple[str, ...] = ()) -> Vector:
     """Return the lowest and the highest corner of a body's parts, shape (2, 3)."""
-    vertices = np.concatenate([part.vertices for part in parts(what)[body] if not names or part.name in names])
+    vertices = np.concatenate(
+        [part.vertices for part in parts(what)[body] if not names or part.name in names]
+    )
     return np.array([vertices.min(axis=0), vertices.max(axis=0)])
 
 
@@ -39,7 +44,9 @@ def triangles(what: str) -> int:
 
 @pytest.mark.parametrize("what", [*FIXED, *INSTRUMENTS])
 def test_every_mesh_is_closed_and_faces_outward(what: str) -> None:
-    """Every edge of a mesh, sharp ones merged, is run through once in each direction, and the volume is positive."""
+    """Every edge of a mesh, sharp ones merged, is run through once in each direction, and the volume is
+    positive.
+    """
     names = [part.name for shown in parts(what).values() for part in shown]
     assert names
     assert len(set(names)) == len(names)
@@ -82,8 +89,12 @@ def test_the_whole_cart_has_about_ten_thousand_triangles() -> None:
         ("cart", "cart", (-0.456, -0.568, -0.166), (0.456, 0.365, 1.801)),
     ],
 )
-def test_outer_dimensions_are_the_published_ones(what: str, body: str, low: tuple[float, ...], high: tuple[float, ...]) -> None:
-    """Bounding boxes of the CAD meshes in med-air/SurRoL (PSM) and jhu-dvrk/dvrk_model (ECM, SUJ), carried to the frame of the look."""
+def test_outer_dimensions_are_the_published_ones(
+    what: str, body: str, low: tuple[float, ...], high: tuple[float, ...]
+) -> None:
+    """Bounding boxes of the CAD meshes in med-air/SurRoL (PSM) and jhu-dvrk/dvrk_model (ECM, SUJ), carried to
+    the frame of the look.
+    """
     names = ("yaw",) if (what, body) == ("psm", "yaw") else ()
     np.testing.assert_allclose(bounds(what, body, names), [low, high], atol=TOLERANCE)
 
@@ -91,7 +102,9 @@ def test_outer_dimensions_are_the_published_ones(what: str, body: str, low: tupl
 @pytest.mark.parametrize(("what", "linkage"), [("psm", PSM), ("ecm", ECM)])
 def test_links_reach_their_pivots(what: str, linkage: Linkage) -> None:
     """Two bodies that meet in a pivot both have something there."""
-    pivots = [((joint.name, joint.parent), joint.pivot) for joint in linkage.joints if joint.follows == "pitch"]
+    pivots = [
+        ((joint.name, joint.parent), joint.pivot) for joint in linkage.joints if joint.follows == "pitch"
+    ]
     pivots += [(pin.bodies, pin.position) for pin in linkage.pins]
     for bodies, pivot in pivots:
         for body in bodies:
@@ -115,7 +128,9 @@ def test_pads_meet_in_the_plane_of_the_axis_and_the_tip(what: str) -> None:
         assert isinstance(box, Primitive)
         face = side * box.pose[:3, 0] @ box.pose[:3, 3] - box.size[0]
         assert abs(face) < 1e-12
-        pad = next(part for part in looks[name] if part.name == f"{name}_pad").vertices @ box.pose[:3, 0] * side
+        pad = (
+            next(part for part in looks[name] if part.name == f"{name}_pad").vertices @ box.pose[:3, 0] * side
+        )
         assert pad.min() == pytest.approx(0.0, abs=1e-9)
         assert pad.max() < 5e-4
         end = box.pose[2, 3] - box.size[2]
@@ -132,7 +147,9 @@ def test_what_collides_is_convex_and_belongs_to_a_body_with_a_look(what: str) ->
                 corners = shape.vertices[shape.faces]
                 normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
                 normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-                outside = np.max(normals @ shape.vertices.T - np.sum(normals * corners[:, 0], axis=1, keepdims=True))
+                outside = np.max(
+                    normals @ shape.vertices.T - np.sum(normals * corners[:, 0], axis=1, keepdims=True)
+                )
                 assert outside < 1e-6
             else:
                 np.testing.assert_allclose(shape.pose[:3, :3] @ shape.pose[:3, :3].T, np.eye(3), atol=1e-12)
@@ -141,13 +158,19 @@ def test_what_collides_is_convex_and_belongs_to_a_body_with_a_look(what: str) ->
 def test_the_same_bytes_in_another_process() -> None:
     """Meshes do not depend on what was built before, nor on the process."""
     script = (
-        "import hashlib; from engines.mujoco.looks import parts; h = hashlib.sha256()\n"
-        "for what in {whats!r}:\n for shown in parts(what).values():\n  for p in shown: h.update(p.vertices.tobytes() + p.faces.tobytes())\n"
-        "print(h.hexdigest())"
+        "import hashlib; from engines.mujoco.looks import parts; h = hashlib.sha256()\nfor what in"
+        " {whats!r}:\n for shown in parts(what).values():\n  for p in shown: h.update(p.vertices.tobytes() +"
+        " p.faces.tobytes())\nprint(h.hexdigest())"
     )
     whats = (*FIXED, *GRASPING)
     digests = {
-        subprocess.run([sys.executable, "-P", "-c", script.format(whats=order)], check=True, capture_output=True, text=True).stdout for order in (whats, whats)
+        subprocess.run(
+            [sys.executable, "-P", "-c", script.format(whats=order)],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for order in (whats, whats)
     }
     assert len(digests) == 1
 

@@ -28,7 +28,9 @@ FREE = scene(
     PSM3={"position": [2, 0, 0], "probe_radius": "4 mm"},
     ECM={"endoscope": "up", "position": [3, 0, 0]},
 )
-CART = SceneParams.model_validate({"mounting": "cart", "arms": {arm: {} if arm == "ECM" else {"instrument": "420006"} for arm in ARMS}})
+CART = SceneParams.model_validate(
+    {"mounting": "cart", "arms": {arm: {} if arm == "ECM" else {"instrument": "420006"} for arm in ARMS}}
+)
 MODEL, CART_MODEL = build(FREE), build(CART)
 fractions = st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6).map(np.array)
 
@@ -41,7 +43,9 @@ def place(model, data, arm, params, q):
     """Put an arm's joints at `q`, its linkage where that wants it, and its fingers closed."""
     known = dict(zip([joint.name for joint in params.chain.joints], q, strict=True))
     for link in links(arm, params):
-        value = known.get(link.name, 0.0) if link.follow is None else link.follow.ratio * known[link.follow.joint]
+        value = (
+            known.get(link.name, 0.0) if link.follow is None else link.follow.ratio * known[link.follow.joint]
+        )
         data.joint(f"{arm}/{link.name}").qpos[0] = value
         if link.follow is None:
             data.ctrl[model.actuator_ctrladr[model.actuator(f"{arm}/{link.name}").id]] = value
@@ -56,7 +60,10 @@ def gaps(model, data, arm, params):
         found = data.body(f"{arm}/{body}")
         return found.xpos + found.xmat.reshape(3, 3) @ local
 
-    return [np.linalg.norm(at(pin.bodies[0], pin.position) - at(pin.bodies[1], pin.position)) for pin in LINKAGES[arm].pins]
+    return [
+        np.linalg.norm(at(pin.bodies[0], pin.position) - at(pin.bodies[1], pin.position))
+        for pin in LINKAGES[arm].pins
+    ]
 
 
 @settings(max_examples=30, deadline=None)
@@ -98,7 +105,12 @@ def test_the_pivots_of_the_linkages_meet_in_motion(arm):
     worst = 0.0
     for i in range(2000):
         t = i * MODEL.opt.timestep
-        for joint, q, v in zip(("yaw", "pitch", "insertion"), middle + swing * np.sin(frequency * t), swing * frequency * np.cos(frequency * t), strict=True):
+        for joint, q, v in zip(
+            ("yaw", "pitch", "insertion"),
+            middle + swing * np.sin(frequency * t),
+            swing * frequency * np.cos(frequency * t),
+            strict=True,
+        ):
             at = MODEL.actuator_ctrladr[MODEL.actuator(f"{arm}/{joint}").id]
             data.ctrl[at : at + 2] = q, v
         mujoco.mj_step(MODEL, data)
@@ -122,13 +134,17 @@ def test_setup_joints_are_settable():
     model = build(set_so)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    assert np.allclose(data.site("PSM2/base").xpos, setup_joints.base_pose("PSM2", np.array(q))[:3, 3], atol=1e-12)
+    assert np.allclose(
+        data.site("PSM2/base").xpos, setup_joints.base_pose("PSM2", np.array(q))[:3, 3], atol=1e-12
+    )
     assert model.nq == CART_MODEL.nq  # braked: none of them is free to move
 
 
 @pytest.mark.parametrize("arms", [pair for n in (1, 2, 3) for pair in combinations(ARMS, n)], ids="+".join)
 def test_every_part_of_the_cart_is_a_model(arms):
-    model = build(SceneParams.model_validate({"mounting": "cart", "arms": {arm: {} for arm in arms}, "looks": False}))
+    model = build(
+        SceneParams.model_validate({"mounting": "cart", "arms": {arm: {} for arm in arms}, "looks": False})
+    )
     for arm, params in CART.arms.items():
         if arm in arms:
             moving = len(params.chain.joints) + len(LINKAGES[arm].joints)
@@ -150,7 +166,10 @@ def test_fingers_open_either_way_by_half_the_jaw_angle():
         data.joint(finger("PSM1", side)).qpos[0] = angle / 2
     mujoco.mj_forward(MODEL, data)
     tip = data.site("PSM1/tip").xmat.reshape(3, 3)
-    left, right = (tip.T @ data.body(finger("PSM1", side)).xmat.reshape(3, 3) @ [0.0, forth, 0.0] for side, forth in zip(FINGERS, (1, -1), strict=True))
+    left, right = (
+        tip.T @ data.body(finger("PSM1", side)).xmat.reshape(3, 3) @ [0.0, forth, 0.0]
+        for side, forth in zip(FINGERS, (1, -1), strict=True)
+    )
     assert np.allclose(left, [0.0, np.sin(angle / 2), np.cos(angle / 2)])
     assert np.allclose(right, [0.0, -np.sin(angle / 2), np.cos(angle / 2)])
 

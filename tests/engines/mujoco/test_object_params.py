@@ -10,8 +10,14 @@ MIDDLE = {"position": [0, 0, 0]}
     ("scene", "message"),
     [
         ({"table": {**MIDDLE, "size": ["0 m", "1 m", "1 m"]}}, "greater than 0"),
-        ({"objects": {"a": {"kind": "block", **MIDDLE, "size": ["1 mm", "-1 mm", "1 mm"]}}}, "greater than 0"),
-        ({"objects": {"a": {"kind": "ring", **MIDDLE, "wire_radius": "8 mm"}}}, r"wire_radius \(0.008 m\) must be less than radius \(0.008 m\)"),
+        (
+            {"objects": {"a": {"kind": "block", **MIDDLE, "size": ["1 mm", "-1 mm", "1 mm"]}}},
+            "greater than 0",
+        ),
+        (
+            {"objects": {"a": {"kind": "ring", **MIDDLE, "wire_radius": "8 mm"}}},
+            r"wire_radius \(0.008 m\) must be less than radius \(0.008 m\)",
+        ),
         ({"objects": {"a": {"kind": "needle", **MIDDLE, "radius": "0.4 mm"}}}, "must be less than radius"),
         ({"objects": {"PSM1": {"kind": "ring", **MIDDLE}}}, "no arm's name"),
         ({"objects": {"a": {"kind": "cube", **MIDDLE}}}, "'ring', 'needle', 'block'"),

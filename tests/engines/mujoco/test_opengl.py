@@ -50,17 +50,41 @@ def test_the_first_that_works_is_taken_and_all_failures_are_told(monkeypatch: py
 
 @pytest.mark.parametrize("wish", ["none-such", "egl", None])
 def test_mujoco_is_imported_whatever_mujoco_gl_asks_for(wish: str | None) -> None:
-    environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"} | ({} if wish is None else {"MUJOCO_GL": wish})
-    what = "import os\nfrom engines.mujoco.opengl import import_mujoco\nimport_mujoco()\nimport mujoco\nprint(mujoco.MjData, os.environ.get('MUJOCO_GL'))"
-    done = subprocess.run([sys.executable, "-P", "-c", what], env=environment, capture_output=True, text=True, timeout=60, check=False)
+    environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"} | (
+        {} if wish is None else {"MUJOCO_GL": wish}
+    )
+    what = (
+        "import os\nfrom engines.mujoco.opengl import import_mujoco\nimport_mujoco()\nimport"
+        " mujoco\nprint(mujoco.MjData, os.environ.get('MUJOCO_GL'))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", what],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.endswith(f"MjData'> {wish}\n")
 
 
 def test_a_session_runs_where_mujoco_gl_names_what_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "none-such")
-    what = ["-m", "hub.command_line", "run", "cart", "--one-host", "--set", "duration=5 ms", "--set", "participants.robot.looks=false"]
-    done = subprocess.run([sys.executable, "-P", *what], capture_output=True, text=True, timeout=60, check=False)
+    what = [
+        "-m",
+        "hub.command_line",
+        "run",
+        "cart",
+        "--one-host",
+        "--set",
+        "duration=5 ms",
+        "--set",
+        "participants.robot.looks=false",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-P", *what], capture_output=True, text=True, timeout=60, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert "publishes no pictures" in done.stderr
     assert "apt-get install libosmesa6" in " ".join(done.stderr.split())

@@ -75,12 +75,17 @@ def liver(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def pictures(recording: Recording) -> list[NDArray[np.uint8]]:
-    found = [decode(Picture, message.payload) for message in recording.messages("/engine/camera/out/left/image_raw")]
+    found = [
+        decode(Picture, message.payload)
+        for message in recording.messages("/engine/camera/out/left/image_raw")
+    ]
     return [image.data.reshape(image.height, image.width, 3) for image in found]
 
 
 def test_the_camera_sees_the_tissue_wherever_that_runs(recordings: dict[str, Recording]) -> None:
-    assert [ack.state_hash.tolist() for ack in recordings["hub"].acks("camera")] == [ack.state_hash.tolist() for ack in recordings["tissue"].acks("camera")]
+    assert [ack.state_hash.tolist() for ack in recordings["hub"].acks("camera")] == [
+        ack.state_hash.tolist() for ack in recordings["tissue"].acks("camera")
+    ]
     one, other = pictures(recordings["hub"]), pictures(recordings["tissue"])
     assert len(one) == 5
     for left, right in zip(one, other, strict=True):
@@ -100,17 +105,35 @@ def test_an_eye_of_the_endoscope_looks_along_its_shaft(recordings: dict[str, Rec
     scene = RecordedScene(recordings["tissue"])
     left, right = (liver(scene.picture(160_000_000, eye, (160, 120))) for eye in ("left", "right"))
     assert left.any()
-    assert np.flatnonzero(left.any(axis=0)).mean() > np.flatnonzero(right.any(axis=0)).mean()  # what is near is further right in the left eye
+    # what is near is further right in the left eye
+    assert np.flatnonzero(left.any(axis=0)).mean() > np.flatnonzero(right.any(axis=0)).mean()
 
 
 def test_all_soft_bodies_of_all_engines_are_shown(recordings: dict[str, Recording]) -> None:
-    aside = RecordedScene(recordings["hub"]).picture(0, "overview", (120, 90), (0.2, 0.045, 0.06), (0.0, 0.045, 0.0))
-    assert len(np.flatnonzero(np.diff(liver(aside).any(axis=0)))) == 4, "one beside the other, with a gap between"
+    aside = RecordedScene(recordings["hub"]).picture(
+        0, "overview", (120, 90), (0.2, 0.045, 0.06), (0.0, 0.045, 0.0)
+    )
+    assert len(np.flatnonzero(np.diff(liver(aside).any(axis=0)))) == 4, (
+        "one beside the other, with a gap between"
+    )
 
 
 def test_the_command_writes_a_picture(recordings: dict[str, Recording], tmp_path: Path) -> None:
     file = tmp_path / "moment.png"
-    done = CliRunner().invoke(app, [str(recordings["tissue"].file), "-o", str(file), "--time", "0.1", "--width", "160", "--height", "120"])
+    done = CliRunner().invoke(
+        app,
+        [
+            str(recordings["tissue"].file),
+            "-o",
+            str(file),
+            "--time",
+            "0.1",
+            "--width",
+            "160",
+            "--height",
+            "120",
+        ],
+    )
     assert done.exit_code == 0, done.output
     assert done.stdout.strip() == str(file)
     with Image.open(file) as picture:
@@ -120,7 +143,11 @@ def test_the_command_writes_a_picture(recordings: dict[str, Recording], tmp_path
 
 @pytest.mark.parametrize(
     ("arguments", "problem"),
-    [(["-o", "moment.bmp"], ".png or .jpg"), (["-o", "moment.png", "--from", "1,2"], "write x,y,z"), (["-o", "moment.png", "--width", "5000"], "1024")],
+    [
+        (["-o", "moment.bmp"], ".png or .jpg"),
+        (["-o", "moment.png", "--from", "1,2"], "write x,y,z"),
+        (["-o", "moment.png", "--width", "5000"], "1024"),
+    ],
 )
 def test_bad_usage_is_refused(recordings: dict[str, Recording], arguments: list[str], problem: str) -> None:
     done = CliRunner().invoke(app, [str(recordings["tissue"].file), *arguments])
@@ -138,8 +165,8 @@ def test_a_scene_on_the_cart_is_drawn_as_it_was_stated(tmp_path: Path) -> None:
         pytest.skip(f"no OpenGL: {found.detail}")
     file = tmp_path / "cart.yaml"
     file.write_text(
-        "name: cart\nstep: 5 ms\nduration: 10 ms\n"
-        "participants: {robot: {kind: mujoco, mounting: cart, looks: false, arms: {PSM1: {instrument: palpation-probe}, ECM: {endoscope: up}}}}\n"
+        "name: cart\nstep: 5 ms\nduration: 10 ms\nparticipants: {robot: {kind: mujoco, mounting: cart, looks:"
+        " false, arms: {PSM1: {instrument: palpation-probe}, ECM: {endoscope: up}}}}\n"
     )
     launch(load(str(file)), endpoint=free_endpoint(range(1)), record=tmp_path / "bag").run()
     picture = RecordedScene(Recording(tmp_path / "bag")).picture(0, camera="left", size=(40, 30))

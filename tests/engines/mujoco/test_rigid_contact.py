@@ -14,7 +14,8 @@ H = 1_000_000
 GRAVITY = 9.81
 HEIGHT = 0.2
 DRIVER = instrument("400006")
-TOUCHING = HEIGHT - DRIVER.jaw.length + 0.0065  # insertion at which the fingers reach the table; 6.5 mm: of the tip over the RCM at insertion 0
+# insertion at which the fingers reach the table; 6.5 mm: of the tip over the RCM at insertion 0
+TOUCHING = HEIGHT - DRIVER.jaw.length + 0.0065
 SIZE, DENSITY = (0.004, 0.006, 0.02), 5000.0
 
 
@@ -22,7 +23,9 @@ class Rig:
     def __init__(self, **scene):
         self.engine = MujocoEngine("robot", MujocoParams.model_validate({"looks": False, **scene}))
         self.outputs = self.engine.configure(Setup(period_ns=H, directory=Path()))
-        self.values = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
+        self.values = {
+            port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"
+        }
         self.inputs, self.now = Inputs(self.values), 0
 
     def run(self, seconds, **joints):
@@ -63,9 +66,13 @@ def test_what_it_holds_pulls_with_its_weight_where_its_middle_is(grasp):
 
 def test_nothing_touched_is_no_force_and_a_table_pushes_up_at_the_middle_of_a_probe():
     """The wrist bends along with it, so the sphere rubs a little on the table."""
-    rig = Rig(arms={"PSM1": {"instrument": "palpation-probe", "probe_radius": 0.005, "position": [0.0, 0.0, 0.13]}}, table={"position": [0, 0, 0]})
+    rig = Rig(
+        arms={"PSM1": {"instrument": "palpation-probe", "probe_radius": 0.005, "position": [0.0, 0.0, 0.13]}},
+        table={"position": [0, 0, 0]},
+    )
     assert not rig.run(0.01).wrench("PSM1").any()
-    below = [0, 0, 0.12 + 0.0125, 0, 0, 0]  # 1 mm into the table: at insertion 120 mm, the probe is 113.5 mm below the remote centre of motion
+    # 1 mm into the table: at insertion 120 mm, the probe is 113.5 mm below the remote centre of motion
+    below = [0, 0, 0.12 + 0.0125, 0, 0, 0]
     force, moment = np.split(rig.run(0.3, PSM1=below).run(0.2).wrench("PSM1"), 2)
     assert force[2] > 0.5
     assert np.linalg.norm(force[:2]) < 0.5 * force[2]
@@ -73,13 +80,29 @@ def test_nothing_touched_is_no_force_and_a_table_pushes_up_at_the_middle_of_a_pr
 
 
 def test_two_instruments_push_one_another_with_equal_and_opposite_wrenches():
-    """Probes of 5 mm hang side by side, 12 mm apart; one base frame is turned by 90 degrees. PSM1 swings by 4 mm towards PSM2."""
+    """Probes of 5 mm hang side by side, 12 mm apart; one base frame is turned by 90 degrees.
+
+    PSM1 swings by 4 mm towards PSM2.
+    """
     probe = {"instrument": "palpation-probe", "probe_radius": 0.005}
-    rig = Rig(arms={"PSM1": probe, "PSM2": {**probe, "position": [0.012, 0.0, 0.0], "orientation": [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]}})
+    rig = Rig(
+        arms={
+            "PSM1": probe,
+            "PSM2": {
+                **probe,
+                "position": [0.012, 0.0, 0.0],
+                "orientation": [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)],
+            },
+        }
+    )
     rig.run(0.3, PSM1=[0.004 / 0.1135, 0, 0.12, 0, 0, 0]).run(0.1)
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     first, second = rig.wrench("PSM1").reshape(2, 3), rig.wrench("PSM2").reshape(2, 3) @ turn.T
     tips = rig.outputs["PSM1/measured_cp"][:3], turn @ rig.outputs["PSM2/measured_cp"][:3] + [0.012, 0.0, 0.0]
     assert first[0][0] < -0.05
     assert np.allclose(first[0], -second[0], atol=1e-12)
-    assert np.allclose(first[1] + np.cross(tips[0], first[0]), -second[1] - np.cross(tips[1], second[0]), atol=1e-4 * np.linalg.norm(first[0]))
+    assert np.allclose(
+        first[1] + np.cross(tips[0], first[0]),
+        -second[1] - np.cross(tips[1], second[0]),
+        atol=1e-4 * np.linalg.norm(first[0]),
+    )

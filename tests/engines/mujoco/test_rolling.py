@@ -25,7 +25,9 @@ from robots.dvrk.rolling_needle_driver import PADS
 TOOL, NEEDLE = instrument("ROLLING_NEEDLE_DRIVER"), Needle()
 START = np.array(psm.HOME)
 MS = 10**6
-ROLLED_BY = 0.13  # rad: the wire sinks 20 um into the pads, which are hard but not rigid, so it rolls as one that is 5 % thinner, of a quarter turn each way
+# rad: the wire sinks 20 um into the pads, which are hard but not rigid, so it rolls as one that is 5 %
+# thinner, of a quarter turn each way
+ROLLED_BY = 0.13
 
 
 def held(hold):
@@ -36,15 +38,29 @@ def scene(hold=0.5, **more):
     """The needle between the pads, which all but touch it."""
     pose = held(hold).forward(np.append(START, 0.0))
     touching = 2.0 * np.arcsin(TOOL.roller.wire_radius / TOOL.roller.distance)
-    needle = {"kind": "needle", "position": pose[:3, 3].tolist(), "orientation": rotation.from_matrix(pose).tolist()}
+    needle = {
+        "kind": "needle",
+        "position": pose[:3, 3].tolist(),
+        "orientation": rotation.from_matrix(pose).tolist(),
+    }
     arm = {"instrument": TOOL.name, "start": START.tolist(), "jaw": float(touching) - 1e-3}
-    return MujocoParams.model_validate({"arms": {"PSM1": arm}, "objects": {"needle": needle}, "looks": False, "publish_period": "1 ms", **more})
+    return MujocoParams.model_validate(
+        {
+            "arms": {"PSM1": arm},
+            "objects": {"needle": needle},
+            "looks": False,
+            "publish_period": "1 ms",
+            **more,
+        }
+    )
 
 
 class Rig:
     def __init__(self, params):
         self.engine = MujocoEngine("robot", params)
-        self.inputs = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
+        self.inputs = {
+            port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"
+        }
         self.outputs = self.engine.configure(Setup(period_ns=MS, directory=Path()))
         self.t = 0
 
@@ -121,8 +137,18 @@ def test_a_routine_rolls_the_needle_through_the_motion_controller():
     arms = {"PSM1": {"instrument": TOOL.name, "start": START.tolist(), "jaw": params.arms["PSM1"].jaw}}
     squeeze = {"do": "jaw", "arm": "PSM1", "angle": "-20 deg", "roll": 0.0}
     participants = {
-        "routine": Routine("routine", RoutineParams.model_validate({"steps": [squeeze, {"do": "wait", "time": "150 ms"}, {**squeeze, "roll": "45 deg"}]})),
-        "motion": MotionController("motion", MotionParams.model_validate({"mounting": "free", "reference": "base", "initial_state": "homed", "arms": arms})),
+        "routine": Routine(
+            "routine",
+            RoutineParams.model_validate(
+                {"steps": [squeeze, {"do": "wait", "time": "150 ms"}, {**squeeze, "roll": "45 deg"}]}
+            ),
+        ),
+        "motion": MotionController(
+            "motion",
+            MotionParams.model_validate(
+                {"mounting": "free", "reference": "base", "initial_state": "homed", "arms": arms}
+            ),
+        ),
         "robot": MujocoEngine("robot", params),
     }
     scenario = {
@@ -130,8 +156,16 @@ def test_a_routine_rolls_the_needle_through_the_motion_controller():
         "step": "1 ms",
         "duration": "2 s",
         "order": ["routine", "motion", "robot"],
-        "connections": ["routine.* -> motion.*", "motion.* -> routine.*", "motion.drive/* -> robot.*", "robot.* -> motion.sense/*"],
-        "measure": {"turn": {"kind": "final", "of": "robot.needle/turn"}, "done": {"kind": "final", "of": "routine.done"}},
+        "connections": [
+            "routine.* -> motion.*",
+            "motion.* -> routine.*",
+            "motion.drive/* -> robot.*",
+            "robot.* -> motion.sense/*",
+        ],
+        "measure": {
+            "turn": {"kind": "final", "of": "robot.needle/turn"},
+            "done": {"kind": "final", "of": "routine.done"},
+        },
     }
     measured = run_in_process(scenario, participants).measures
     assert measured["done"] == 1

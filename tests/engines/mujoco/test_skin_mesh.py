@@ -20,18 +20,34 @@ def icosphere(radius: float) -> tuple[Vector, NDArray[np.int64]]:
     from scipy.spatial import ConvexHull
 
     golden = (1.0 + np.sqrt(5.0)) / 2.0
-    corners = np.array([p for x in (-1.0, 1.0) for y in (-golden, golden) for p in ((0.0, x, y), (x, y, 0.0), (y, 0.0, x))])
-    sides = [(i, j) for i in range(12) for j in range(i) if np.isclose(np.linalg.norm(corners[i] - corners[j]), 2.0)]
+    corners = np.array(
+        [p for x in (-1.0, 1.0) for y in (-golden, golden) for p in ((0.0, x, y), (x, y, 0.0), (y, 0.0, x))]
+    )
+    sides = [
+        (i, j)
+        for i in range(12)
+        for j in range(i)
+        if np.isclose(np.linalg.norm(corners[i] - corners[j]), 2.0)
+    ]
     nodes = np.concatenate([corners, [(corners[i] + corners[j]) / 2.0 for i, j in sides]])
     nodes *= radius / np.linalg.norm(nodes, axis=1, keepdims=True)
     triangles = ConvexHull(nodes).simplices.astype(np.int64)
-    outward = np.einsum("fi,fi->f", np.cross(*(nodes[triangles[:, i]] - nodes[triangles[:, 0]] for i in (1, 2))), nodes[triangles[:, 0]]) > 0.0
+    outward = (
+        np.einsum(
+            "fi,fi->f",
+            np.cross(*(nodes[triangles[:, i]] - nodes[triangles[:, 0]] for i in (1, 2))),
+            nodes[triangles[:, 0]],
+        )
+        > 0.0
+    )
     return nodes, np.where(outward[:, None], triangles, triangles[:, ::-1])
 
 
 def sides_of(vertices: Vector, faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """All directed sides by the points they join, shape (3 f, 6)."""
-    return np.concatenate([np.concatenate([vertices[faces[:, i]], vertices[faces[:, (i + 1) % 3]]], axis=1) for i in range(3)])
+    return np.concatenate(
+        [np.concatenate([vertices[faces[:, i]], vertices[faces[:, (i + 1) % 3]]], axis=1) for i in range(3)]
+    )
 
 
 def volume(vertices: Vector, faces: NDArray[np.int64]) -> float:
@@ -48,7 +64,8 @@ def test_a_box_keeps_its_sharp_edges_and_flat_sides() -> None:
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     assert np.allclose(np.abs(normals).max(axis=1), 1.0)
-    for vertex in np.unique(skin.faces):  # every vertex belongs to one side of the box, so its normal is that side's
+    # every vertex belongs to one side of the box, so its normal is that side's
+    for vertex in np.unique(skin.faces):
         assert np.ptp(normals[(skin.faces == vertex).any(axis=1)], axis=0).max() < 1e-9
 
 
@@ -59,7 +76,9 @@ def test_there_is_no_gap_however_it_is_bent(seed: int, most: float) -> None:
     skin = SkinMesh(mesh.nodes, mesh.triangles)
     vertices = skin.vertices(mesh.nodes + np.random.default_rng(seed).uniform(-most, most, mesh.nodes.shape))
     sides = np.round(sides_of(vertices, skin.faces), 12) + 0.0
-    forth, back = (set(map(tuple, sides[:, order].tolist())) for order in ([0, 1, 2, 3, 4, 5], [3, 4, 5, 0, 1, 2]))
+    forth, back = (
+        set(map(tuple, sides[:, order].tolist())) for order in ([0, 1, 2, 3, 4, 5], [3, 4, 5, 0, 1, 2])
+    )
     assert forth == back
 
 
@@ -73,7 +92,9 @@ def test_it_moves_with_the_body(seed: int) -> None:
     nodes, triangles = icosphere(0.02)
     nodes = nodes + chance.uniform(-1e-3, 1e-3, nodes.shape)
     skin = SkinMesh(nodes, triangles)
-    assert np.allclose(skin.vertices(nodes @ turn.T + shift), skin.vertices(nodes) @ turn.T + shift, atol=1e-12)
+    assert np.allclose(
+        skin.vertices(nodes @ turn.T + shift), skin.vertices(nodes) @ turn.T + shift, atol=1e-12
+    )
 
 
 def test_a_sphere_becomes_rounder_and_keeps_its_nodes() -> None:
@@ -81,7 +102,8 @@ def test_a_sphere_becomes_rounder_and_keeps_its_nodes() -> None:
     skin = SkinMesh(nodes, triangles)
     vertices = skin.vertices(nodes)
     assert len(skin.faces) == 4**3 * len(triangles)
-    assert len(vertices) == len(skin.faces) / 2 + 2  # Euler, for a closed surface whose vertices are all smooth
+    # Euler, for a closed surface whose vertices are all smooth
+    assert len(vertices) == len(skin.faces) / 2 + 2
     assert set(map(tuple, vertices[:42].tolist())) == set(map(tuple, nodes.tolist()))
     flat = 0.5 * (nodes[triangles] + nodes[np.roll(triangles, -1, axis=1)])
     sag = 0.02 - np.linalg.norm(flat, axis=-1).min()

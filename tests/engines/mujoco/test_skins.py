@@ -50,7 +50,12 @@ def gl() -> str:
 
 def message(nodes: Vector, triangles: NDArray[np.int64] | None = None) -> SoftBodyState:
     faces = np.zeros(0, np.uint32) if triangles is None else triangles.astype(np.uint32).ravel()
-    return SoftBodyState(header=Header(frame_id="world"), body="organ", nodes_m=nodes.astype(np.float32).ravel(), triangles=faces)
+    return SoftBodyState(
+        header=Header(frame_id="world"),
+        body="organ",
+        nodes_m=nodes.astype(np.float32).ravel(),
+        triangles=faces,
+    )
 
 
 def make(**params: Any) -> Endoscope:
@@ -63,7 +68,14 @@ def draw(endoscope: Endoscope, *messages: SoftBodyState | None) -> list[Outputs]
     with endoscope:
         endoscope.configure(Setup(PERIOD_NS, Path.cwd()))
         steps = enumerate(messages)
-        return [dict(endoscope.step(i * PERIOD_NS, PERIOD_NS, Inputs({"qpos": state(endoscope), "organ/nodes": message}))) for i, message in steps]
+        return [
+            dict(
+                endoscope.step(
+                    i * PERIOD_NS, PERIOD_NS, Inputs({"qpos": state(endoscope), "organ/nodes": message})
+                )
+            )
+            for i, message in steps
+        ]
 
 
 def octahedra(points: Vector) -> Vector:
@@ -74,7 +86,8 @@ def test_nodes_are_seen_where_camera_info_projects_them(gl: str) -> None:
     pose = camera_pose()
     points = np.array([(pose @ [x, y, AHEAD, 1.0])[:3] for x, y in SPREAD])
     faces = np.concatenate([FACES + 6 * i for i in range(len(points))])
-    rest = octahedra(points + [[0.0, 0.0, 0.01 * i] for i in range(len(points))])  # the surface comes with another shape than is seen
+    # the surface comes with another shape than is seen
+    rest = octahedra(points + [[0.0, 0.0, 0.01 * i] for i in range(len(points))])
     _, outputs = draw(make(), message(rest, faces), message(octahedra(points)))
     left_in_world = pose.copy()
     left_in_world[:3, 3] -= 0.5 * make().params.baseline * pose[:3, 0]
@@ -89,7 +102,9 @@ def test_nodes_are_seen_where_camera_info_projects_them(gl: str) -> None:
             assert np.linalg.norm(seen - point, axis=1).min() < 0.5
 
 
-def skin_of(nodes: Vector, triangles: NDArray[np.int64], moved: Vector) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def skin_of(
+    nodes: Vector, triangles: NDArray[np.int64], moved: Vector
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Vertices and normals of the scene that MuJoCo makes of a skin, as any of its renderers draws it."""
     body, scene = SoftBody("organ/nodes"), mujoco.MjSpec()
     body.take(message(nodes, triangles))
@@ -100,7 +115,9 @@ def skin_of(nodes: Vector, triangles: NDArray[np.int64], moved: Vector) -> tuple
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     drawn = mujoco.MjvScene(model, 10)
-    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, drawn)
+    mujoco.mjv_updateScene(
+        model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, drawn
+    )
     return drawn.skinvert.reshape(-1, 3).copy(), drawn.skinnormal.reshape(-1, 3).copy()
 
 
@@ -127,7 +144,11 @@ def test_a_dent_turns_the_normals_towards_it() -> None:
 
 
 def test_the_colour_is_that_of_the_tissue_whose_name_the_body_has() -> None:
-    assert SkinParams().rgb("liver") == SkinParams().rgb("upper_liver") == SkinParams.model_validate({"colour": "liver"}).rgb("organ")
+    assert (
+        SkinParams().rgb("liver")
+        == SkinParams().rgb("upper_liver")
+        == SkinParams.model_validate({"colour": "liver"}).rgb("organ")
+    )
     assert SkinParams().rgb("organ") == SkinParams.model_validate({"colour": "tissue"}).rgb("liver")
     assert SkinParams.model_validate({"colour": [0.1, 0.2, 0.3]}).rgb("liver") == (0.1, 0.2, 0.3)
     with pytest.raises(ValueError, match="less than or equal to 1"):
@@ -160,7 +181,11 @@ def test_a_restored_scene_draws_the_same(gl: str) -> None:
     rest = pose[:3, 3] + AHEAD * pose[:3, 2] + 5.0 * OCTAHEDRON
 
     def shoot(endoscope: Endoscope, nodes: Vector) -> NDArray[np.uint8]:
-        return pixels(endoscope.step(0, PERIOD_NS, Inputs({"qpos": state(endoscope), "organ/nodes": message(nodes)}))["left/image_raw"][0])
+        return pixels(
+            endoscope.step(0, PERIOD_NS, Inputs({"qpos": state(endoscope), "organ/nodes": message(nodes)}))[
+                "left/image_raw"
+            ][0]
+        )
 
     with make() as one, make() as other:
         for endoscope in (one, other):
@@ -182,7 +207,9 @@ def test_a_restored_scene_draws_the_same(gl: str) -> None:
         ([message(OCTAHEDRON, FACES), message(OCTAHEDRON[:5])], "5 nodes, but 6 before"),
     ],
 )
-def test_what_cannot_be_a_soft_body_is_refused(monkeypatch: pytest.MonkeyPatch, messages: list[Any], problem: str) -> None:
+def test_what_cannot_be_a_soft_body_is_refused(
+    monkeypatch: pytest.MonkeyPatch, messages: list[Any], problem: str
+) -> None:
     monkeypatch.setattr(opengl, "find", lambda: opengl.OpenGL("", "none"))
     with pytest.raises(SessionError, match=f"input 'organ/nodes': .*{problem}"):
         draw(make(), *messages)

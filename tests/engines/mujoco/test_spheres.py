@@ -28,7 +28,9 @@ class Run:
     def __init__(self, plan=IMPULSE, period=H, jaw=JAW, **arm):
         params = {"arms": {"PSM1": {"instrument": TOOL, "start": START, "jaw": jaw, **arm}}, "looks": False}
         self.engine = MujocoEngine("robot", MujocoParams.model_validate(params))
-        self.outputs = self.engine.configure(Setup(period_ns=period, directory=Path(), bonds={} if plan is None else {"PSM1/contact": plan}))
+        self.outputs = self.engine.configure(
+            Setup(period_ns=period, directory=Path(), bonds={} if plan is None else {"PSM1/contact": plan})
+        )
         self.force = np.zeros(3 * N)
         starts = {port.name: np.array(port.start) for port in self.engine.ports if port.causality == "input"}
         self.inputs = Inputs({**starts, "PSM1/contact/force": self.force})
@@ -88,18 +90,25 @@ def test_velocity_is_the_slope_of_the_position():
 
 @pytest.mark.parametrize("plan", [IMPULSE, LINEARISED])
 def test_work_is_what_the_arm_gains(plan):
-    """Without drives and losses all energy of the arm comes through the bond: power in is the change of energy."""
+    """Without drives and losses all energy of the arm comes through the bond: power in is the change of
+    energy.
+    """
     run = Run(plan)
     model, data = run.model
     model.opt.timestep = 5e-4
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     model.opt.gravity[:] = 0.0
-    model.dof_damping[:] = model.dof_frictionloss[:] = model.tendon_damping[:] = model.tendon_frictionloss[:] = 0.0
+    model.dof_damping[:] = model.dof_frictionloss[:] = model.tendon_damping[:] = model.tendon_frictionloss[
+        :
+    ] = 0.0
     model.actuator_gainprm[:] = model.actuator_biasprm[:] = 0.0
     model.jnt_stiffness[:] = 0.0
     run.inputs = Inputs(
         {
-            **{name: run.inputs[name] for name in ("PSM1/servo_jp", "PSM1/servo_jf", "PSM1/jaw/servo_jp", "PSM1/jaw/servo_jf")},
+            **{
+                name: run.inputs[name]
+                for name in ("PSM1/servo_jp", "PSM1/servo_jf", "PSM1/jaw/servo_jp", "PSM1/jaw/servo_jf")
+            },
             "PSM1/control_mode": np.zeros(2),
             "PSM1/contact/force": run.force,
         }
@@ -131,10 +140,21 @@ def test_forces_on_the_spheres_are_those_that_mujoco_would_apply_there():
     expected, got = np.zeros(model.nv), np.zeros(model.nv)
     for i, sphere in enumerate(instrument(TOOL).spheres):
         site = model.site(f"PSM1/contact/{sphere.name}").id
-        mujoco.mj_applyFT(model, data, run.force[3 * i : 3 * i + 3], np.zeros(3), data.site_xpos[site], model.site_bodyid[site], expected)
+        mujoco.mj_applyFT(
+            model,
+            data,
+            run.force[3 * i : 3 * i + 3],
+            np.zeros(3),
+            data.site_xpos[site],
+            model.site_bodyid[site],
+            expected,
+        )
     for body in range(model.nbody):
-        mujoco.mj_applyFT(model, data, data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:], data.xipos[body], body, got)
-    assert np.allclose(got, expected, rtol=1e-2, atol=1e-4)  # the moments are those of half a millisecond before
+        mujoco.mj_applyFT(
+            model, data, data.xfrc_applied[body, :3], data.xfrc_applied[body, 3:], data.xipos[body], body, got
+        )
+    # the moments are those of half a millisecond before
+    assert np.allclose(got, expected, rtol=1e-2, atol=1e-4)
 
 
 def test_the_tip_feels_force_and_moment_in_the_base_frame():
@@ -146,14 +166,18 @@ def test_the_tip_feels_force_and_moment_in_the_base_frame():
     base, tip = data.site("PSM1/base").xmat.reshape(3, 3), data.site("PSM1/tip").xpos
     force = run.force.reshape(N, 3)
     moment = np.cross(run.output("contact/position").reshape(N, 3) - tip, force)
-    assert np.allclose(run.output("tip_wrench"), [*(base.T @ force.sum(axis=0)), *(base.T @ moment.sum(axis=0))], atol=1e-12)
+    assert np.allclose(
+        run.output("tip_wrench"), [*(base.T @ force.sum(axis=0)), *(base.T @ moment.sum(axis=0))], atol=1e-12
+    )
 
 
 def test_the_tip_of_a_palpation_probe_feels_the_bonds_wrench():
     engine = MujocoEngine("robot", MujocoParams.model_validate({"arms": {"PSM1": TURNED}, "looks": False}))
     engine.configure(Setup(period_ns=H, directory=Path(), bonds={"PSM1/probe": IMPULSE}))
     inputs = {port.name: np.array(port.start) for port in engine.ports if port.causality == "input"}
-    outputs = engine.step(0, H, Inputs({**inputs, "PSM1/probe/wrench": np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0])}))
+    outputs = engine.step(
+        0, H, Inputs({**inputs, "PSM1/probe/wrench": np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0])})
+    )
     assert np.allclose(outputs["PSM1/tip_wrench"], [2.0, 3.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -164,7 +188,9 @@ def test_without_a_bond_the_tip_feels_nothing():
 
 
 def test_effective_mass_is_below_that_of_each_sphere_and_above_a_share_of_it():
-    """The largest eigenvalue of a matrix is at least that of any block on its diagonal, and at most the sum of theirs."""
+    """The largest eigenvalue of a matrix is at least that of any block on its diagonal, and at most the sum
+    of theirs.
+    """
     run = Run()
     model, data = run.model
     single = []
@@ -193,4 +219,8 @@ def test_equal_runs_have_equal_hashes_and_restore_returns_to_the_same_bits(plan)
 
 def test_the_engine_conforms_with_contact_spheres():
     params = {"arms": {"PSM1": {"instrument": TOOL, "jaw": JAW}}, "looks": False}
-    check_engine(lambda: MujocoEngine("robot", MujocoParams.model_validate(params)), period_ns=H, inputs={"PSM1/contact/force": np.full(3 * N, 0.1)})
+    check_engine(
+        lambda: MujocoEngine("robot", MujocoParams.model_validate(params)),
+        period_ns=H,
+        inputs={"PSM1/contact/force": np.full(3 * N, 0.1)},
+    )

@@ -62,7 +62,12 @@ def test_version_and_help(trocar):
 
 
 def test_bad_usage_is_exit_code_2(trocar):
-    for arguments in (["chek"], ["check"], ["check", "palpation", "--no-such-option"], ["recover", "no/such/recording"]):
+    for arguments in (
+        ["chek"],
+        ["check"],
+        ["check", "palpation", "--no-such-option"],
+        ["recover", "no/such/recording"],
+    ):
         code, out, err = trocar(*arguments)
         assert (code, out) == (2, "")
         assert "Usage" in err
@@ -106,7 +111,19 @@ def test_doctor_as_json(trocar):
     assert code == 0
     assert report["works"]
     found = {finding["name"]: finding for finding in report["findings"]}
-    assert {"Python", "Zenoh", "mujoco", "bullet", "fmu", "OpenGL", "OpenHaptics", "LibOVR", "OpenXR", "ROS 1", "ROS 2"} <= set(found)
+    assert {
+        "Python",
+        "Zenoh",
+        "mujoco",
+        "bullet",
+        "fmu",
+        "OpenGL",
+        "OpenHaptics",
+        "LibOVR",
+        "OpenXR",
+        "ROS 1",
+        "ROS 2",
+    } <= set(found)
     assert all(finding["works"] or finding["remedy"] for finding in found.values())
     assert "works" in trocar("doctor")[1]
 
@@ -118,7 +135,10 @@ def test_ls_where_no_hub_is(trocar):
 @pytest.fixture
 def swinging(pendulum, tmp_path):
     file = tmp_path / "session.yaml"
-    file.write_text(SCENARIO.replace("gaol", "goal") + "duration: 20 ms\nmeasure:\n  last_angle: {kind: final, of: two.angle, live: true}\n")
+    file.write_text(
+        SCENARIO.replace("gaol", "goal")
+        + "duration: 20 ms\nmeasure:\n  last_angle: {kind: final, of: two.angle, live: true}\n"
+    )
     return file
 
 
@@ -126,8 +146,16 @@ def test_run_prints_its_summary_as_json_on_stdout_alone(trocar, swinging, tmp_pa
     code, out, err = trocar("run", swinging, "--json", "--record", tmp_path / "recording")
     assert code == 0, err
     summary = json.loads(out)
-    assert {"steps": 20, "sim_time_s": 0.02, "late_steps": 0, "recording": str(tmp_path / "recording"), "state": "done"}.items() <= summary.items()
-    assert {"last_angle", "wall_time_s", "real_time_factor", "state_hash", "energy_residual_j"} <= set(summary)
+    assert {
+        "steps": 20,
+        "sim_time_s": 0.02,
+        "late_steps": 0,
+        "recording": str(tmp_path / "recording"),
+        "state": "done",
+    }.items() <= summary.items()
+    assert {"last_angle", "wall_time_s", "real_time_factor", "state_hash", "energy_residual_j"} <= set(
+        summary
+    )
     assert trocar("run", swinging, "--record", tmp_path / "recording")[0] == 2
     code, out, err = trocar("verify", tmp_path / "recording", "--json")
     assert code == 0, err
@@ -137,7 +165,9 @@ def test_run_prints_its_summary_as_json_on_stdout_alone(trocar, swinging, tmp_pa
 def test_run_shows_people_a_summary_on_stderr(trocar, swinging):
     code, out, err = trocar("run", swinging, "--pace", "realtime")
     assert (code, out) == (0, "")
-    assert {"sim time 0.02 s", "steps 20", "state done"} <= {" ".join(line.split()) for line in err.splitlines()}
+    assert {"sim time 0.02 s", "steps 20", "state done"} <= {
+        " ".join(line.split()) for line in err.splitlines()
+    }
 
 
 def test_a_failing_participant_is_exit_code_1_and_a_clean_message(trocar, swinging):
@@ -150,12 +180,34 @@ def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
     (tmp_path / "session.yaml").write_text(REMOTE)
     endpoint = free_endpoint([0])
     command = [sys.executable, "-P", "-m", "hub.command_line"]
-    hub = subprocess.Popen([*command, "run", "session.yaml", "--listen", endpoint, "--json"], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    hub = subprocess.Popen(
+        [*command, "run", "session.yaml", "--listen", endpoint, "--json"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     with hub:
-        rows = wait_for(lambda: json.loads(subprocess.check_output([*command, "ls", "--json", "--connect", endpoint], text=True)))
+        rows = wait_for(
+            lambda: json.loads(
+                subprocess.check_output([*command, "ls", "--json", "--connect", endpoint], text=True)
+            )
+        )
         assert rows[0]["session"] == "away"
-        assert rows[0]["participants"][0].items() >= {"name": "robot", "role": "engine", "host": "remote/robot", "step": -1}.items()
-        engine = subprocess.run([*command, "engine", "robot", "--connect", endpoint, "--session", "away"], cwd=tmp_path, timeout=60, check=False)
+        assert (
+            rows[0]["participants"][0].items()
+            >= {
+                "name": "robot",
+                "role": "engine",
+                "host": "remote/robot",
+                "step": -1,
+            }.items()
+        )
+        engine = subprocess.run(
+            [*command, "engine", "robot", "--connect", endpoint, "--session", "away"],
+            cwd=tmp_path,
+            timeout=60,
+            check=False,
+        )
         out, _ = hub.communicate(timeout=60)
     assert (engine.returncode, hub.returncode) == (0, 0)
     assert json.loads(out)["steps"] == 50
@@ -164,6 +216,14 @@ def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
 def test_of_a_device_with_many_streams_the_slowest_is_shown():
     row = {"count": 5, "p50_s": 0.001, "p99_s": 0.002, "largest_s": 0.003}
     streams = {f"console.PSM1/{index}": row | {"p99_s": 1e-3 * index} for index in range(9)}
-    rows = list(latency_rows({"grant to state": {"all participants": row}, "device to grant": {"hand.pose": row} | streams}))
-    assert [stream for _, stream, *_ in rows] == ["all participants", "hand.pose", "console, the slowest of 9"]
+    rows = list(
+        latency_rows(
+            {"grant to state": {"all participants": row}, "device to grant": {"hand.pose": row} | streams}
+        )
+    )
+    assert [stream for _, stream, *_ in rows] == [
+        "all participants",
+        "hand.pose",
+        "console, the slowest of 9",
+    ]
     assert rows[-1][4] == "8.000 ms"

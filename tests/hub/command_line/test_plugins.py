@@ -64,10 +64,16 @@ def test_a_sub_app_of_another_package_is_a_command(command_line, install_plugin)
     ],
 )
 def test_a_broken_one_is_left_out_with_the_cause(command_line, install_plugin, caplog, value, cause):
-    install_plugin("scales", {"trocar.commands": {"broken": value, "scale": "scales:app"}}, text=SCALES + "SPEED = 'slow'\n")
+    install_plugin(
+        "scales",
+        {"trocar.commands": {"broken": value, "scale": "scales:app"}},
+        text=SCALES + "SPEED = 'slow'\n",
+    )
     plugins.mount(command_line)
     (record,) = (record for record in caplog.records if "'broken'" in record.message)
-    assert f"command 'broken' of 'scales' ({value}) is left out, it cannot be loaded: {cause}" in record.message
+    assert (
+        f"command 'broken' of 'scales' ({value}) is left out, it cannot be loaded: {cause}" in record.message
+    )
     assert run(command_line, "check").stdout == "checked\n"
     assert run(command_line, "scale", "tare").stdout == "0 kg\n"
     assert run(command_line, "broken").exit_code == 2
@@ -76,13 +82,20 @@ def test_a_broken_one_is_left_out_with_the_cause(command_line, install_plugin, c
 def test_a_name_that_is_taken_stays_with_its_owner(command_line, install_plugin, caplog):
     install_plugin("scales", {"trocar.commands": {"check": "scales:app"}}, text=SCALES)
     plugins.mount(command_line)
-    assert "command 'check' of 'scales' (scales:app) is left out: there is another command of that name" in caplog.text
+    assert (
+        "command 'check' of 'scales' (scales:app) is left out: there is another command of that name"
+        in caplog.text
+    )
     assert run(command_line, "check").stdout == "checked\n"
 
 
 def test_trocar_mounts_them_and_says_on_stderr_what_it_leaves_out(install_plugin, tmp_path):
-    install_plugin("scales", {"trocar.commands": {"broken": "scales:nothing", "scale": "scales:app"}}, text=SCALES)
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site_scales"), os.environ.get("PYTHONPATH", "")])}
+    install_plugin(
+        "scales", {"trocar.commands": {"broken": "scales:nothing", "scale": "scales:app"}}, text=SCALES
+    )
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(tmp_path / "site_scales"), os.environ.get("PYTHONPATH", "")])
+    }
     command = [sys.executable, "-P", "-m", "hub.command_line", "scale", "weigh", "7"]
     ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert ran.stdout == "7.0 kg\n"

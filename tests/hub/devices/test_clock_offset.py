@@ -25,7 +25,14 @@ def test_the_quickest_exchange_of_the_last_ones_counts():
     clocks, chance, offset = ClockOffset(), random.Random(1), 123 * S
     assert clocks.best is None
     for i in range(100):
-        clocks.add(exchange(i * S // 2, offset, 100_000 + round(chance.expovariate(1e-6)), 100_000 + round(chance.expovariate(1e-6))))
+        clocks.add(
+            exchange(
+                i * S // 2,
+                offset,
+                100_000 + round(chance.expovariate(1e-6)),
+                100_000 + round(chance.expovariate(1e-6)),
+            )
+        )
     best = clocks.best
     assert abs(best.offset_ns - offset) < 0.3 * MS
     assert best.round_trip_ns < 1 * MS

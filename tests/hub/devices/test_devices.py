@@ -66,7 +66,18 @@ def test_a_remote_device_may_go_and_come_back(prepare):
     outcome, hosts, fresh_steps = [], [], [0.0]
 
     def join():
-        command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", session.endpoint, "--session", "hand"]
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "hub.command_line",
+            "device",
+            "player",
+            "--connect",
+            session.endpoint,
+            "--session",
+            "hand",
+        ]
         hosts.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
 
     def wait_until(true):
@@ -126,7 +137,9 @@ def test_a_device_is_told_every_event_and_each_value_of_a_signal_once(prepare, t
     session = prepare(TOLD, f"participants.pad.file={file}", f"participants.talker.host={host}")
 
     def lines(port):
-        return [line.partition(" ")[2] for line in file.read_text().splitlines() if line.startswith(f"{port} ")]
+        return [
+            line.partition(" ")[2] for line in file.read_text().splitlines() if line.startswith(f"{port} ")
+        ]
 
     def enough(progress):
         if min(len(lines("words")), len(lines("numbers"))) > 20:
@@ -156,12 +169,16 @@ def test_a_device_that_is_slow_is_told_what_is_new_and_misses_the_rest(prepare):
     summary = prepare(SLOW).run()
     told = summary.latency["state to force"]["mixer.out -> console.numbers"]
     assert told["count"] < summary.steps / 5
-    assert told["largest_s"] < 0.25 * summary.wall_time_s  # in a queue the last would have waited for nearly all of it
+    # in a queue the last would have waited for nearly all of it
+    assert told["largest_s"] < 0.25 * summary.wall_time_s
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])
 def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connected(prepare, tmp_path, host):
-    scenario = SCENARIO.replace("  - player.buttons -> deaf.buttons\n", "") + "  x: {kind: peak-norm, of: player.hand.position}\n"
+    scenario = (
+        SCENARIO.replace("  - player.buttons -> deaf.buttons\n", "")
+        + "  x: {kind: peak-norm, of: player.hand.position}\n"
+    )
     session = prepare(scenario, f"participants.player.host={host}", record=tmp_path / "recording")
     summary = session.run(until(session, lambda steps, fresh, pressed: fresh > 200))
     assert summary.dropped_messages == 0

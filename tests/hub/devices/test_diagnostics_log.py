@@ -21,7 +21,10 @@ TYPE = DiagnosticStatus.ros_type
 class Stylus(Device):
     """Has two conditions."""
 
-    ports = tuple(Port(name=name, causality="output", type=TYPE, variability="event", clock="wall") for name in ("diagnostics", "right/diagnostics"))
+    ports = tuple(
+        Port(name=name, causality="output", type=TYPE, variability="event", clock="wall")
+        for name in ("diagnostics", "right/diagnostics")
+    )
 
     def open(self, directory):
         pass
@@ -35,7 +38,9 @@ class Stylus(Device):
 
 @pytest.fixture
 def wire():
-    """A hub that listens to `far`, which is on another machine, and not to `near`; and a session that says what it wants."""
+    """A hub that listens to `far`, which is on another machine, and not to `near`; and a session that says
+    what it wants.
+    """
     specs = {"far": {"kind": "stylus", "host": "remote"}, "near": {"kind": "stylus", "host": "desk"}}
     plan = make_plan(
         Scenario.model_validate({"name": "s", "step": "1 ms", "duration": "1 s", "participants": specs}),
@@ -43,9 +48,15 @@ def wire():
         dict.fromkeys(specs, "device"),
     )
     endpoint, drops, keys = free_endpoint([0]), Drops(), Keys("s")
-    with open_session("router", listen=[endpoint]) as hub, open_session("client", connect=[endpoint]) as device:
+    with (
+        open_session("router", listen=[endpoint]) as hub,
+        open_session("client", connect=[endpoint]) as device,
+    ):
         complaints = Complaints(plan, keys, hub, drops)
-        yield (lambda source, port, message: device.put(keys.output("device", source, port), encode(message))), drops
+        yield (
+            (lambda source, port, message: device.put(keys.output("device", source, port), encode(message))),
+            drops,
+        )
         complaints.close()
 
 
@@ -67,10 +78,17 @@ def test_the_hub_logs_what_remote_devices_say_of_themselves_once(wire, caplog):
 
     def lines(source):
         records = [record for record in caplog.records if record.name == "hub.devices.diagnostics_log"]
-        return [(record.levelname, record.getMessage()) for record in records if f"'{source}'" in record.getMessage()]
+        return [
+            (record.levelname, record.getMessage())
+            for record in records
+            if f"'{source}'" in record.getMessage()
+        ]
 
     until(lambda: drops.total == 1 and len(lines("far")) == 2 and lines("far/right"))
-    assert lines("far") == [("WARNING", "device 'far' says: absent; plug it in"), ("INFO", "device 'far' says: there")]
+    assert lines("far") == [
+        ("WARNING", "device 'far' says: absent; plug it in"),
+        ("INFO", "device 'far' says: there"),
+    ]
     ((level, message),) = lines("far/right")
     assert (level, message[:34]) == ("WARNING", "device 'far/right' says: warmwarmw")
     assert len(message) < 600

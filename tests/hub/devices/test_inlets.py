@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hub.devices.inlets import Inlets
 from hub.devices import inlets as module
+from hub.devices.inlets import Inlets
 from hub.transport.envelope import Stamp
 from schemas.codec import decode, encode
 from schemas.errors import LateError, MessageError
@@ -15,9 +15,26 @@ FLOAT, JOY = Float64Message.ros_type, Joy.ros_type
 
 
 def inlets(clock="wall", age=0, host="hub"):
-    stylus = Stylus("stylus", out("value", type=FLOAT, clock=clock, max_age_ns=age), out("button", type=JOY, variability="event", clock=clock), out("unused"))
-    engine = Part("engine", into("value", type=FLOAT), into("button", type=JOY, variability="event"), into("knob", size=2, start=(1.0, 2.0)))
-    return Inlets(plan_of(stylus, engine, connections=["stylus.value -> engine.value", "stylus.button -> engine.button"], specs={"stylus": {"host": host}}))
+    stylus = Stylus(
+        "stylus",
+        out("value", type=FLOAT, clock=clock, max_age_ns=age),
+        out("button", type=JOY, variability="event", clock=clock),
+        out("unused"),
+    )
+    engine = Part(
+        "engine",
+        into("value", type=FLOAT),
+        into("button", type=JOY, variability="event"),
+        into("knob", size=2, start=(1.0, 2.0)),
+    )
+    return Inlets(
+        plan_of(
+            stylus,
+            engine,
+            connections=["stylus.value -> engine.value", "stylus.button -> engine.button"],
+            specs={"stylus": {"host": host}},
+        )
+    )
 
 
 def number(value):
@@ -33,12 +50,25 @@ def entering(found):
     rows = []
     for sample in found:
         payload = sample.payload.tobytes()
-        value = None if not payload else decode(Float64Message, payload).data if sample.port == "value" else int(decode(Joy, payload).buttons[0])
+        value = (
+            None
+            if not payload
+            else (
+                decode(Float64Message, payload).data
+                if sample.port == "value"
+                else int(decode(Joy, payload).buttons[0])
+            )
+        )
         rows.append((sample.port, value))
     return rows
 
 
-@given(st.lists(st.one_of(st.just("sample"), st.tuples(st.sampled_from(["value", "button"]), st.integers(0, 9))), max_size=30))
+@given(
+    st.lists(
+        st.one_of(st.just("sample"), st.tuples(st.sampled_from(["value", "button"]), st.integers(0, 9))),
+        max_size=30,
+    )
+)
 def test_streams_keep_the_newest_and_events_all_in_order(actions):
     box, newest, presses = inlets(), None, []
     for now, action in enumerate([*actions, "sample"]):
@@ -59,7 +89,10 @@ def test_silence_is_told_once_and_so_is_its_end(clock):
     box = inlets(clock, age=10)
 
     def sample(now):
-        return [(s.port, s.stale, s.payload.size > 0) for s in (box.sample(now, -1) if clock == "simulated" else box.sample(-1, now))]
+        return [
+            (s.port, s.stale, s.payload.size > 0)
+            for s in (box.sample(now, -1) if clock == "simulated" else box.sample(-1, now))
+        ]
 
     assert sample(0) == []  # stale from the start, as the host knows
     box.offer("stylus", "value", number(1.0), 5)
@@ -128,7 +161,9 @@ def test_what_comes_late_or_twice_is_refused():
     offer(1, value=1.0)
     offer(3, value=3.0)
     for old in (3, 2):
-        with pytest.raises(LateError, match=f"sample {old} of 'stylus.value' comes late: 3 was here before it"):
+        with pytest.raises(
+            LateError, match=f"sample {old} of 'stylus.value' comes late: 3 was here before it"
+        ):
             offer(old)
     offer(1, admission=2, value=7.0)  # the device has joined anew
     with pytest.raises(LateError):

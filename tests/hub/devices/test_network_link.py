@@ -17,7 +17,10 @@ SPECS = st.builds(
     delay=MILLISECONDS,
     jitter=MILLISECONDS,
     loss=st.floats(0.0, 0.9),
-    outages=st.lists(st.fixed_dictionaries({"at": MILLISECONDS, "duration": MILLISECONDS.map(lambda s: s + 0.001)}), max_size=2).map(tuple),
+    outages=st.lists(
+        st.fixed_dictionaries({"at": MILLISECONDS, "duration": MILLISECONDS.map(lambda s: s + 0.001)}),
+        max_size=2,
+    ).map(tuple),
     seed=st.integers(0, 5),
 )
 
@@ -45,7 +48,11 @@ def test_events_all_arrive_in_order(spec):
     assert [message for message, _ in arrived] == list(range(200))
     assert all(arrival - message * MS >= spec.delay for message, arrival in arrived)
     for outage in spec.outages:
-        assert all(arrival >= outage.at + outage.duration + spec.delay for m, arrival in arrived if outage.at <= m * MS < outage.at + outage.duration)
+        assert all(
+            arrival >= outage.at + outage.duration + spec.delay
+            for m, arrival in arrived
+            if outage.at <= m * MS < outage.at + outage.duration
+        )
 
 
 @given(SPECS)
@@ -62,7 +69,8 @@ def test_loss_is_as_frequent_as_it_is_said_to_be():
     assert len(arrived) / n == pytest.approx(0.9, abs=4 * math.sqrt(0.09 / n))
     extra = [(arrival - m * MS - 10 * MS) / (4 * MS) for m, arrival in arrived]
     assert sum(extra) / len(extra) == pytest.approx(0.5, abs=4 * math.sqrt(1 / 12 / n))
-    late = [a - m * 10**9 > 20 * MS for m, a in travel(Link(spec).line(EVENTS), n, period=10**9)]  # sent again
+    # sent again
+    late = [a - m * 10**9 > 20 * MS for m, a in travel(Link(spec).line(EVENTS), n, period=10**9)]
     assert sum(late) / n == pytest.approx(0.1, abs=4 * math.sqrt(0.09 / n))
 
 
@@ -88,7 +96,10 @@ def test_a_link_can_be_changed_while_messages_are_on_their_way():
 
 def test_a_link_in_words():
     assert in_words(LinkSpec()) == ""
-    assert in_words(LinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9) == "70 ms each way, up to 2 ms more, 1 % lost, nothing at all for 3 s"
+    assert (
+        in_words(LinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9)
+        == "70 ms each way, up to 2 ms more, 1 % lost, nothing at all for 3 s"
+    )
 
 
 def test_overlapping_outages_are_one():
@@ -100,10 +111,22 @@ def test_overlapping_outages_are_one():
 def test_what_a_scenario_may_say():
     assert [LinkSpec(preset=f"{ns // MS} ms").delay_ns for ns in PRESETS] == list(PRESETS)
     assert LinkSpec.model_validate({"delay": "7 ms", "jitter": "1 ms"}).delay_ns == 7 * MS
-    with pytest.raises(ValidationError, match="150 ms is no preset, there are 0 ms, 70 ms, 100 ms, 200 ms, 300 ms, 500 ms; any other delay is a 'delay'"):
+    with pytest.raises(
+        ValidationError,
+        match=(
+            "150 ms is no preset, there are 0 ms, 70 ms, 100 ms, 200 ms, 300 ms, 500 ms; any other delay is a"
+            " 'delay'"
+        ),
+    ):
         LinkSpec(preset="150 ms")
     with pytest.raises(ValidationError, match="a preset or a delay, not both"):
         LinkSpec(preset="100 ms", delay="100 ms")
-    for wrong in ({"loss": 1.0}, {"delay": -1}, {"jitter": -1}, {"outages": [{"at": 0, "duration": 0}]}, {"colour": "red"}):
+    for wrong in (
+        {"loss": 1.0},
+        {"delay": -1},
+        {"jitter": -1},
+        {"outages": [{"at": 0, "duration": 0}]},
+        {"colour": "red"},
+    ):
         with pytest.raises(ValidationError):
             LinkSpec.model_validate(wrong)

@@ -1,4 +1,6 @@
-"""Links that are changed while a session runs: of devices in the hub's process, in another one, and in simulated time."""
+"""Links that are changed while a session runs: of devices in the hub's process, in another one, and in
+simulated time.
+"""
 
 import json
 import sys
@@ -38,7 +40,9 @@ def during(session, act):
 
     def console():
         try:
-            while not any(status.state == "running" and status.step > 20 for status in live_sessions([session.endpoint])):
+            while not any(
+                status.state == "running" and status.step > 20 for status in live_sessions([session.endpoint])
+            ):
                 sleep(0.02)
             act()
         except Exception as error:  # noqa: BLE001
@@ -56,7 +60,13 @@ def during(session, act):
 
 
 def relink(session, device="player", **change):
-    return ask_about(device, [session.endpoint], "link", LinkRequest.model_validate({"device": device, **change}), LinkReply).link
+    return ask_about(
+        device,
+        [session.endpoint],
+        "link",
+        LinkRequest.model_validate({"device": device, **change}),
+        LinkReply,
+    ).link
 
 
 def until(look, limit_s=10.0):
@@ -82,11 +92,14 @@ def test_a_link_is_changed_while_the_session_runs(prepare, host):
         assert relink(session, delay="1 ms", jitter="0 ms") == LinkSpec(delay="1 ms")
         with pytest.raises(MessageError, match=r"Input should be less than 1"):
             relink(session, loss=1.5)
-        with pytest.raises(ConnectError, match=r"there is no 'nobody' in any session that runs here; running: hand"):
+        with pytest.raises(
+            ConnectError, match=r"there is no 'nobody' in any session that runs here; running: hand"
+        ):
             relink(session, "nobody")
         if host == "other":
             until(lambda: status().devices[0].round_trip_ns > 0)
-            assert abs(status().devices[0].offset_ns) <= status().devices[0].round_trip_ns  # one machine, one clock
+            # one machine, one clock
+            assert abs(status().devices[0].offset_ns) <= status().devices[0].round_trip_ns
         sleep(0.5)
 
     summary = during(session, act)
@@ -139,7 +152,9 @@ def test_on_the_command_line(prepare, monkeypatch, capfd):
     during(session, act)
     as_json, outage, wrong, refused, listed, shown = seen
     assert json.loads(as_json[1])["link"]["preset"] == "300000000 ns"
-    assert "from now on: 300 ms each way, up to 1 ms more, nothing at all for 3 s" in " ".join(outage[2].split())
+    assert "from now on: 300 ms each way, up to 1 ms more, nothing at all for 3 s" in " ".join(
+        outage[2].split()
+    )
     assert wrong[0] == 2
     assert "150 ms is no preset" in wrong[2]
     assert refused[2].strip() == "error: loss: Input should be less than 1 (got 1.0)"

@@ -1,4 +1,6 @@
-"""Devices that follow the clock and have inputs: the same bits wherever their sources run, whatever a grant covers, and over a link."""
+"""Devices that follow the clock and have inputs: the same bits wherever their sources run, whatever a grant
+covers, and over a link.
+"""
 
 import pytest
 
@@ -41,7 +43,10 @@ def test_the_same_bits_wherever_its_sources_run(prepare):
     assert first != run(prepare, "participants.hand.period=4 ms")
 
 
-LINK = "participants.hand.link={delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}], seed: 3}"
+LINK = (
+    "participants.hand.link={delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}],"
+    " seed: 3}"
+)
 
 
 def test_a_link_gives_the_same_bits_too(prepare):
@@ -63,7 +68,9 @@ def test_what_came_over_a_link_simulates_again(prepare, tmp_path):
 
 @pytest.mark.parametrize("delay", [0, 10])
 def test_how_long_things_take_is_told_in_simulated_time(prepare, delay):
-    overrides = ["participants.hand.period=2 ms"] + ([f"participants.hand.link.delay={delay} ms"] if delay else [])
+    overrides = ["participants.hand.period=2 ms"] + (
+        [f"participants.hand.link.delay={delay} ms"] if delay else []
+    )
     latency = prepare(SCENARIO, *overrides).run().latency
     assert latency["device to grant"]["hand.out"]["p50_s"] == pytest.approx(delay * 1e-3, rel=0.02)
     assert latency["state to force"]["hand.numbers"]["p50_s"] == pytest.approx(delay * 1e-3, rel=0.02)

@@ -44,7 +44,10 @@ def host_of(*parts, **scenario):
 
 def run(host, steps, start=0):
     reports = []
-    host.run(Permission(1, 0, start, start * MS, (start + steps) * MS), lambda member, report: reports.append((member.name, report)))
+    host.run(
+        Permission(1, 0, start, start * MS, (start + steps) * MS),
+        lambda member, report: reports.append((member.name, report)),
+    )
     return reports
 
 
@@ -98,7 +101,10 @@ def test_reports_hold_the_steps_that_each_took():
     host.configure(Path())
     assert [(name, len(report.state_hash)) for name, report in run(host, 4)] == [("one", 4), ("three", 2)]
     assert [(name, len(report.state_hash)) for name, report in run(host, 2, start=4)] == [("one", 2)]
-    assert [(name, len(report.compute_ns)) for name, report in run(host, 1, start=6)] == [("one", 1), ("three", 1)]
+    assert [(name, len(report.compute_ns)) for name, report in run(host, 1, start=6)] == [
+        ("one", 1),
+        ("three", 1),
+    ]
     assert host.due(7, 2) == ["one"]
     assert host.due(7, 3) == ["one", "three"]
 
@@ -165,7 +171,14 @@ def test_each_new_value_of_a_signal_is_one_message_of_an_event_port(algorithm, l
     inbox = Inbox("inbox", unit="s")
     periods = {"ramp": {"period": f"{source_ms} ms"}, "inbox": {"period": f"{target_ms} ms"}}
     run_in_process(
-        {"name": "ramp", "step": "1 ms", "duration": "12 ms", "algorithm": algorithm, "participants": periods, "connections": ["ramp.out -> inbox.in"]},
+        {
+            "name": "ramp",
+            "step": "1 ms",
+            "duration": "12 ms",
+            "algorithm": algorithm,
+            "participants": periods,
+            "connections": ["ramp.out -> inbox.in"],
+        },
         {"ramp": Ramp("ramp"), "inbox": inbox},
     )
     expected, told = [], 0
@@ -187,26 +200,45 @@ def test_a_message_made_of_a_signal_has_stamp_frame_and_names():
     joints = {"type": "sensor_msgs/msg/JointState", "names": ("x", "y")}
     inbox = Inbox("inbox", type=joints["type"], frame="PSM1_base")
     run_in_process(
-        {"name": "arm", "step": "1 ms", "duration": "2 ms", "connections": ["arm.out -> inbox.in"]}, {"arm": Arm("arm", out(**joints)), "inbox": inbox}
+        {"name": "arm", "step": "1 ms", "duration": "2 ms", "connections": ["arm.out -> inbox.in"]},
+        {"arm": Arm("arm", out(**joints)), "inbox": inbox},
     )
-    ((first,), (second,)) = inbox.seen
-    assert (first.name, first.header.frame_id, first.header.stamp.nanosec) == (["x", "y"], "PSM1_base", 1 * MS)
+    (first,), (second,) = inbox.seen
+    assert (first.name, first.header.frame_id, first.header.stamp.nanosec) == (
+        ["x", "y"],
+        "PSM1_base",
+        1 * MS,
+    )
     assert (second.position.tolist(), second.header.stamp.nanosec) == ([1.0, 1e-3], 2 * MS)
 
 
 def test_an_event_port_hears_all_of_its_sources_in_the_order_of_the_connections():
     inbox = Inbox("inbox", unit="s")
-    scenario = {"name": "two", "step": "1 ms", "duration": "2 ms", "connections": ["slow.out -> inbox.in", "quick.out -> inbox.in"]}
+    scenario = {
+        "name": "two",
+        "step": "1 ms",
+        "duration": "2 ms",
+        "connections": ["slow.out -> inbox.in", "quick.out -> inbox.in"],
+    }
     scenario["participants"] = {"slow": {"period": "2 ms"}}
     run_in_process(scenario, {"slow": Ramp("slow"), "quick": Ramp("quick"), "inbox": inbox})
-    assert [[message.data[0] for message in messages] for messages in inbox.seen] == [[pytest.approx(2e-3), pytest.approx(1e-3)], [pytest.approx(2e-3)]]
+    assert [[message.data[0] for message in messages] for messages in inbox.seen] == [
+        [pytest.approx(2e-3), pytest.approx(1e-3)],
+        [pytest.approx(2e-3)],
+    ]
 
 
 @pytest.mark.parametrize(("algorithm", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
 def test_a_neighbour_in_this_process_sees_values_of_the_right_step(algorithm, late):
     probe = Probe("probe")
     run_in_process(
-        {"name": "ramp", "step": "1 ms", "duration": "6 ms", "algorithm": algorithm, "connections": ["ramp.out -> probe.in"]},
+        {
+            "name": "ramp",
+            "step": "1 ms",
+            "duration": "6 ms",
+            "algorithm": algorithm,
+            "connections": ["ramp.out -> probe.in"],
+        },
         {"ramp": Ramp("ramp"), "probe": probe},
     )
     assert [now for now, _ in probe.seen] == pytest.approx([1e-3 * (step + 1 - late) for step in range(6)])
@@ -226,4 +258,5 @@ def test_a_linear_connection_follows_the_source_inside_the_step():
         {"ramp": Ramp("ramp"), "probe": probe},
     )
     exact = [(1e-3 * step, 1e-3 * step + 0.5e-3) for step in range(8)]
-    np.testing.assert_allclose(probe.seen[2:], exact[2:], atol=1e-12)  # before its second value it can only hold
+    # before its second value it can only hold
+    np.testing.assert_allclose(probe.seen[2:], exact[2:], atol=1e-12)

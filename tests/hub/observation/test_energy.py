@@ -14,9 +14,14 @@ from schemas.scenario import Bond
 from tests.strategies import vectors
 
 K = 80.0
-MOTION, FORCE = BondSide(name="tip", side="motion", dof=3), BondSide(name="tip", side="force", dof=3, stiffness=K)
+MOTION, FORCE = (
+    BondSide(name="tip", side="motion", dof=3),
+    BondSide(name="tip", side="force", dof=3, stiffness=K),
+)
 HELD_VELOCITY, HELD = BondPlan("velocity", mean=True), BondPlan("hold", mean=False)
-moves = st.lists(st.tuples(st.floats(1e-4, 0.1), vectors(3).map(np.tanh), vectors(3).map(np.tanh)), min_size=1, max_size=8)
+moves = st.lists(
+    st.tuples(st.floats(1e-4, 0.1), vectors(3).map(np.tanh), vectors(3).map(np.tanh)), min_size=1, max_size=8
+)
 """Steps of h seconds with a position and a velocity at their start."""
 
 
@@ -66,8 +71,13 @@ def test_a_bond_of_two_points_is_two_bonds_of_one(steps, apart):
     for h, x, v in steps:
         positions, velocities = np.tile(x, 2) + apart, np.tile(v, 2) - apart
         both = spring_step(together, h, positions, velocities)
-        each = [spring_step(side, h, positions[i : i + 3], velocities[i : i + 3]) for i, side in zip((0, 3), alone, strict=True)]
-        np.testing.assert_allclose(both["tip/force"], np.concatenate([result["tip/force"] for result in each]), atol=1e-9)
+        each = [
+            spring_step(side, h, positions[i : i + 3], velocities[i : i + 3])
+            for i, side in zip((0, 3), alone, strict=True)
+        ]
+        np.testing.assert_allclose(
+            both["tip/force"], np.concatenate([result["tip/force"] for result in each]), atol=1e-9
+        )
         assert both["tip/work"][0] == pytest.approx(sum(result["tip/work"][0] for result in each), abs=1e-9)
 
 
@@ -97,7 +107,10 @@ def test_the_state_of_a_side_comes_back(side):
         spring_step(side, 0.01, np.ones(3), np.ones(3))
     else:
         side.add(np.ones(3), np.ones(3))
-    saved, other = side.state.copy(), type(side)(FORCE if isinstance(side, ForceSide) else MOTION, HELD_VELOCITY)
+    saved, other = (
+        side.state.copy(),
+        type(side)(FORCE if isinstance(side, ForceSide) else MOTION, HELD_VELOCITY),
+    )
     other.state = saved
     np.testing.assert_array_equal(other.state, saved)
     if isinstance(side, ForceSide):
@@ -110,13 +123,22 @@ def test_the_books_take_the_columns_of_each_participant_in_declared_order():
     first = Bond.model_validate({"motion": "robot.left", "force": "tissue.left"})
     second = Bond.model_validate({"motion": "robot.right", "force": "other.right"})
     sides = BondSide(name="tip", side="motion"), BondSide(name="tip", side="force")
-    plan = Plan.model_construct(bonds=tuple(PlannedBond(bond=bond, motion=sides[0], force=sides[1]) for bond in (first, second)))
+    plan = Plan.model_construct(
+        bonds=tuple(PlannedBond(bond=bond, motion=sides[0], force=sides[1]) for bond in (first, second))
+    )
     books = EnergyBooks(plan)
-    books.take("robot", Report(0, 0, 0, [1, 2], [1, 2], [9.0, 9.0, 1.0, 2.0]))  # two steps, two bonds: the last step counts
+    # two steps, two bonds: the last step counts
+    books.take("robot", Report(0, 0, 0, [1, 2], [1, 2], [9.0, 9.0, 1.0, 2.0]))
     books.take("tissue", Report(0, 0, 0, [1], [1], [1.5]))
     books.take("other", Report(0, 0, 0, [1], [1], [1.75]))
     books.take("camera", Report(0, 0, 0, [1], [1], []))
     assert books.residual_j == pytest.approx(0.5 - 0.25)
     left, right = books.messages(7)
-    assert (left.bond, left.motion_work_j, left.force_work_j, left.residual_j, left.header.stamp.ns) == ("robot/left", 1.0, 1.5, 0.5, 7)
+    assert (left.bond, left.motion_work_j, left.force_work_j, left.residual_j, left.header.stamp.ns) == (
+        "robot/left",
+        1.0,
+        1.5,
+        0.5,
+        7,
+    )
     assert (right.bond, right.residual_j) == ("robot/right", -0.25)

@@ -44,4 +44,9 @@ def test_streams_are_told_by_way_and_name():
         latencies.add("device to grant", stream, time)
     rows = by_way(latencies.messages())
     assert list(rows["device to grant"]) == ["a.out", "b.out"]
-    assert rows["device to grant"]["a.out"] == {"count": 2, "p50_s": pytest.approx(1e-3, rel=0.02), "p99_s": pytest.approx(1e-3, rel=0.02), "largest_s": 1e-3}
+    assert rows["device to grant"]["a.out"] == {
+        "count": 2,
+        "p50_s": pytest.approx(1e-3, rel=0.02),
+        "p99_s": pytest.approx(1e-3, rel=0.02),
+        "largest_s": 1e-3,
+    }

@@ -14,8 +14,13 @@ KINDS = ("peak", "peak-norm", "least", "mean", "final", "drop", "swing")
 
 
 def measures(of, part):
-    measure = {kind.replace("-", "_"): {"kind": kind, "of": of, "live": kind == "final", "unit": "N"} for kind in KINDS}
-    scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
+    measure = {
+        kind.replace("-", "_"): {"kind": kind, "of": of, "live": kind == "final", "unit": "N"}
+        for kind in KINDS
+    }
+    scenario = Scenario.model_validate(
+        {"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure}
+    )
     return Measures(scenario, plan_of(part, measure=measure))
 
 
@@ -27,7 +32,15 @@ def test_of_a_field_of_several_numbers_the_norm_is_measured(values):
     norms = [np.linalg.norm(value[:3]) for value in values]
     drop = max(norms) - min(norms[np.argmax(norms) :])
     swing = np.ptp([value[:3] for value in values], axis=0).max()
-    expected = {"peak": max(norms), "peak_norm": max(norms), "least": min(norms), "mean": np.mean(norms), "final": norms[-1], "drop": drop, "swing": swing}
+    expected = {
+        "peak": max(norms),
+        "peak_norm": max(norms),
+        "least": min(norms),
+        "mean": np.mean(norms),
+        "final": norms[-1],
+        "drop": drop,
+        "swing": swing,
+    }
     assert found.results() == pytest.approx(expected)
     assert found.live() == {"final": (pytest.approx(norms[-1]), "N")}
 
@@ -38,7 +51,13 @@ def test_a_single_number_keeps_its_sign_unless_the_norm_is_asked_for(values):
     for value in values:
         found.take("a", "out", value, 0)
     numbers = np.concatenate(values)
-    expected = {"peak": numbers.max(), "peak_norm": np.abs(numbers).max(), "least": numbers.min(), "mean": numbers.mean(), "final": numbers[-1]}
+    expected = {
+        "peak": numbers.max(),
+        "peak_norm": np.abs(numbers).max(),
+        "least": numbers.min(),
+        "mean": numbers.mean(),
+        "final": numbers[-1],
+    }
     expected |= {"swing": np.ptp(numbers)}
     expected["drop"] = numbers.max() - numbers[numbers.argmax() :].min()
     assert found.results() == pytest.approx(expected)
@@ -47,7 +66,9 @@ def test_a_single_number_keeps_its_sign_unless_the_norm_is_asked_for(values):
 def test_the_time_above_a_level_is_that_of_the_longest_stretch():
     measure = {"held_s": {"kind": "time-above", "of": "a.out", "level": 0.5}}
     part = Part("a", out(period_ns=4_000_000))
-    scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
+    scenario = Scenario.model_validate(
+        {"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure}
+    )
     found = Measures(scenario, plan_of(part, measure=measure))
     for value in (0.6, 0.6, 0.4, 0.5, 0.6, 0.7, 0.1):
         found.take("a", "out", np.array([value]), 0)
@@ -55,8 +76,13 @@ def test_the_time_above_a_level_is_that_of_the_longest_stretch():
 
 
 def test_values_before_a_time_do_not_count():
-    measure = {"late": {"kind": "peak", "of": "a.out", "after": "2 s"}, "never": {"kind": "mean", "of": "a.out", "after": "9 s"}}
-    scenario = Scenario.model_validate({"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure})
+    measure = {
+        "late": {"kind": "peak", "of": "a.out", "after": "2 s"},
+        "never": {"kind": "mean", "of": "a.out", "after": "9 s"},
+    }
+    scenario = Scenario.model_validate(
+        {"name": "m", "step": "1 ms", "participants": {"a": {"kind": "part"}}, "measure": measure}
+    )
     found = Measures(scenario, plan_of(Part("a", out()), measure=measure))
     for second, value in enumerate((5.0, 4.0, 3.0, 1.0, 2.0)):
         found.take("a", "out", np.array([value]), second * 10**9)

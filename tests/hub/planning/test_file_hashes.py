@@ -36,7 +36,11 @@ def directory(tmp_path):
 
 
 def test_every_path_among_the_parameters_is_hashed_once(directory):
-    params = Models(model=Path("a.txt"), meshes={"one": Mesh(file=directory / "b.txt")}, more=[Path("bag"), Path("./a.txt"), Path("missing.txt")])
+    params = Models(
+        model=Path("a.txt"),
+        meshes={"one": Mesh(file=directory / "b.txt")},
+        more=[Path("bag"), Path("./a.txt"), Path("missing.txt")],
+    )
     expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c")}
     assert file_hashes([params, params], directory) == expected
     assert changed_files(expected) == []
@@ -80,7 +84,9 @@ class Reader(Stepped):
 
 def test_a_verification_tells_which_file_is_another_one_by_now(install_plugin, directory, caplog):
     install_plugin("library", {"trocar.engines": {"reader": "library:Reader"}}, text=PLUGIN)
-    (directory / "session.yaml").write_text("{name: reading, step: 1 ms, duration: 3 ms, participants: {reader: {kind: reader, file: a.txt}}}")
+    (directory / "session.yaml").write_text(
+        "{name: reading, step: 1 ms, duration: 3 ms, participants: {reader: {kind: reader, file: a.txt}}}"
+    )
     launch(load(str(directory / "session.yaml")), record=directory / "recording").run()
     recording = Recording(directory / "recording")
     assert recording.files() == {str(directory / "a.txt"): sha256("a")}

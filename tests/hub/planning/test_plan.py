@@ -20,12 +20,24 @@ def force(**rest):
 @pytest.mark.parametrize(
     ("source", "target", "message"),
     [
-        (out(type=POSE), into(), "'a.out' gives geometry_msgs/msg/PoseStamped, 'b.in' takes std_msgs/msg/Float64MultiArray"),
+        (
+            out(type=POSE),
+            into(),
+            "'a.out' gives geometry_msgs/msg/PoseStamped, 'b.in' takes std_msgs/msg/Float64MultiArray",
+        ),
         (out(variability="event", type=TEXT), into(type=TEXT), "'a.out' gives events, 'b.in' takes a signal"),
         (out(unit="mm"), into(unit="m"), "'a.out' is in 'mm', 'b.in' takes 'm'"),
-        (out(type=POSE, frame="PSM1_base"), into(type=POSE, frame="world"), "frame 'PSM1_base', 'b.in' takes frame 'world'"),
+        (
+            out(type=POSE, frame="PSM1_base"),
+            into(type=POSE, frame="world"),
+            "frame 'PSM1_base', 'b.in' takes frame 'world'",
+        ),
         (out(size=3), into(size=4), "'a.out' has 3 numbers, 'b.in' takes 4"),
-        (out(type=JOINTS, names=("x", "y")), into(type=JOINTS, names=("y", "x")), "'a.out' names x, y; 'b.in' takes y, x"),
+        (
+            out(type=JOINTS, names=("x", "y")),
+            into(type=JOINTS, names=("y", "x")),
+            "'a.out' names x, y; 'b.in' takes y, x",
+        ),
         (into("out"), into(), "'a.out' is an input, here an output is wanted"),
         (out(), out("in"), "'b.in' is an output, here an input is wanted"),
     ],
@@ -55,7 +67,9 @@ def test_names_that_are_not_there(connection, message):
 
 def test_an_input_is_fed_once():
     with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.other'"):
-        plan_of(Part("a", out(), out("other")), Part("b", into()), connections=[*FROM_A_TO_B, "a.other -> b.in"])
+        plan_of(
+            Part("a", out(), out("other")), Part("b", into()), connections=[*FROM_A_TO_B, "a.other -> b.in"]
+        )
 
 
 def test_a_queue_of_events_may_have_several_sources():
@@ -67,7 +81,9 @@ def test_a_queue_of_events_may_have_several_sources():
 
 
 def test_a_connection_is_named_once():
-    with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'") as raised:
+    with pytest.raises(
+        ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'"
+    ) as raised:
         plan_of(Part("a", out()), Part("b", into()), connections=FROM_A_TO_B * 2)
     assert raised.value.path == ("connections", 1)
 
@@ -75,7 +91,9 @@ def test_a_connection_is_named_once():
 def drives(*inputs):
     """A controller that drives two arms and shows a state, and a robot with `inputs`."""
     outputs = (out("state"), out("drive/PSM1/servo_jp"), out("drive/PSM1/jaw"), out("drive/PSM2/servo_jp"))
-    return Part("motion", *outputs), Part("robot", *(into(name, start=(0.0,)) for name in inputs), out("PSM1/jaw"))
+    return Part("motion", *outputs), Part(
+        "robot", *(into(name, start=(0.0,)) for name in inputs), out("PSM1/jaw")
+    )
 
 
 def test_a_wildcard_joins_what_has_the_same_rest_of_the_name():
@@ -86,16 +104,20 @@ def test_a_wildcard_joins_what_has_the_same_rest_of_the_name():
         ("drive/PSM2/servo_jp", "PSM2/servo_jp"),
     ]
     plan = plan_of(*parts, connections=["motion.drive/PSM1/* -> robot.PSM2/*", "motion.* -> robot.*"])
-    assert [(link.source_port, link.target_port) for link in plan.links] == [("drive/PSM1/servo_jp", "PSM2/servo_jp"), ("state", "state")]
+    assert [(link.source_port, link.target_port) for link in plan.links] == [
+        ("drive/PSM1/servo_jp", "PSM2/servo_jp"),
+        ("state", "state"),
+    ]
 
 
 def test_a_wildcard_that_joins_nothing_names_what_there_is():
     with pytest.raises(ScenarioError) as raised:
         plan_of(*drives("PSM3/servo_jp"), connections=["motion.drive/* -> robot.*"])
     assert raised.value.path == ("connections", 0)
-    assert str(raised.value) == (
-        "'motion.drive/* -> robot.*' joins nothing (outputs of 'motion': state, drive/PSM1/servo_jp, drive/PSM1/jaw, drive/PSM2/servo_jp; "
-        "inputs of 'robot': PSM3/servo_jp)"
+    assert (
+        str(raised.value)
+        == "'motion.drive/* -> robot.*' joins nothing (outputs of 'motion': state, drive/PSM1/servo_jp,"
+        " drive/PSM1/jaw, drive/PSM2/servo_jp; inputs of 'robot': PSM3/servo_jp)"
     )
 
 
@@ -103,11 +125,20 @@ def test_what_a_wildcard_joins_is_checked_like_any_connection():
     parts = drives("PSM1/servo_jp")
     with pytest.raises(ScenarioError, match=r"unknown participant 'robt'"):
         plan_of(*parts, connections=["motion.drive/* -> robt.*"])
-    with pytest.raises(ScenarioError, match=r"input 'robot.PSM1/servo_jp' is fed twice, by 'motion.state' and by 'motion.drive/PSM1/servo_jp'") as raised:
+    with pytest.raises(
+        ScenarioError,
+        match=(
+            r"input 'robot.PSM1/servo_jp' is fed twice, by 'motion.state' and by 'motion.drive/PSM1/servo_jp'"
+        ),
+    ) as raised:
         plan_of(*parts, connections=["motion.state -> robot.PSM1/servo_jp", "motion.drive/* -> robot.*"])
     assert raised.value.path == ("connections", 1)
-    with pytest.raises(ScenarioError, match=r"'motion.drive/PSM1/servo_jp' has 1 numbers, 'robot.PSM1/servo_jp' takes 2"):
-        plan_of(parts[0], Part("robot", into("PSM1/servo_jp", size=2)), connections=["motion.drive/* -> robot.*"])
+    with pytest.raises(
+        ScenarioError, match=r"'motion.drive/PSM1/servo_jp' has 1 numbers, 'robot.PSM1/servo_jp' takes 2"
+    ):
+        plan_of(
+            parts[0], Part("robot", into("PSM1/servo_jp", size=2)), connections=["motion.drive/* -> robot.*"]
+        )
 
 
 def test_a_signal_may_feed_an_event_port_whatever_its_size():
@@ -115,24 +146,37 @@ def test_a_signal_may_feed_an_event_port_whatever_its_size():
     plan = plan_of(Part("a", out(type=JOINTS, names=("x", "y"))), Part("b", target), connections=FROM_A_TO_B)
     assert [link.target_port for link in plan.links] == ["in"]
     with pytest.raises(ScenarioError, match=r"events cannot be extrapolated, as 'a.out -> b.in' would"):
-        plan_of(Part("a", out(type=JOINTS)), Part("b", target), connections=[{"source": "a.out", "target": "b.in", "extrapolation": "linear"}])
+        plan_of(
+            Part("a", out(type=JOINTS)),
+            Part("b", target),
+            connections=[{"source": "a.out", "target": "b.in", "extrapolation": "linear"}],
+        )
 
 
 def test_an_input_without_a_source_needs_a_start_value():
-    with pytest.raises(ScenarioError, match=r"input 'b.in' .* is not connected and has no start value") as raised:
+    with pytest.raises(
+        ScenarioError, match=r"input 'b.in' .* is not connected and has no start value"
+    ) as raised:
         plan_of(Part("b", into()))
     assert raised.value.path == ("participants", "b")
-    assert plan_of(Part("b", into(start=(0.0,)), into("words", type=TEXT, variability="event"))).order == ("b",)
+    assert plan_of(Part("b", into(start=(0.0,)), into("words", type=TEXT, variability="event"))).order == (
+        "b",
+    )
 
 
 def ring(*names):
     parts = [Part(name, out(), into()) for name in names]
-    return parts, [f"{name}.out -> {following}.in" for name, following in zip(names, (*names[1:], names[0]), strict=True)]
+    return parts, [
+        f"{name}.out -> {following}.in" for name, following in zip(names, (*names[1:], names[0]), strict=True)
+    ]
 
 
 def test_a_cycle_needs_an_order():
     parts, connections = ring("a", "b", "c")
-    with pytest.raises(ScenarioError, match="form a cycle among a, b, c: say in which order they step, such as 'order: \\[a, b, c\\]'"):
+    with pytest.raises(
+        ScenarioError,
+        match="form a cycle among a, b, c: say in which order they step, such as 'order: \\[a, b, c\\]'",
+    ):
         plan_of(*parts, connections=connections)
     with pytest.raises(ScenarioError, match="cycle"):
         plan_of(*parts, connections=connections, order=["b"])
@@ -143,7 +187,9 @@ def test_an_order_says_who_sees_whom_within_the_step(order):
     parts, connections = ring("a", "b", "c")
     plan = plan_of(*parts, connections=connections, order=order)
     assert plan.order == tuple(order)
-    assert [link.fresh for link in plan.links] == [order.index(link.source) < order.index(link.target) for link in plan.links]
+    assert [link.fresh for link in plan.links] == [
+        order.index(link.source) < order.index(link.target) for link in plan.links
+    ]
 
 
 def test_jacobi_makes_everything_late():
@@ -154,7 +200,11 @@ def test_jacobi_makes_everything_late():
 
 
 def test_without_a_cycle_the_order_follows_the_connections_and_oneself_is_never_fresh():
-    plan = plan_of(Part("last", into()), Part("first", out(), into("own")), connections=["first.out -> last.in", "first.out -> first.own"])
+    plan = plan_of(
+        Part("last", into()),
+        Part("first", out(), into("own")),
+        connections=["first.out -> last.in", "first.out -> first.own"],
+    )
     assert plan.order == ("first", "last")
     assert [link.fresh for link in plan.links] == [True, False]
 
@@ -169,8 +219,13 @@ def test_devices():
     age, tighter = 50_000_000, 20_000_000
     stylus = Stylus("stylus", out("pose", type=POSE, max_age_ns=age, clock="wall"), into("force", type=POSE))
     engine = Part("a", into(type=POSE, max_age_ns=tighter), into("other", type=POSE), out(type=POSE))
-    plan = plan_of(stylus, engine, connections=["stylus.pose -> a.in", "stylus.pose -> a.other", "a.out -> stylus.force"])
-    assert [(inlet.target_port, inlet.max_age_ns) for inlet in plan.inlets] == [("in", tighter), ("other", age)]
+    plan = plan_of(
+        stylus, engine, connections=["stylus.pose -> a.in", "stylus.pose -> a.other", "a.out -> stylus.force"]
+    )
+    assert [(inlet.target_port, inlet.max_age_ns) for inlet in plan.inlets] == [
+        ("in", tighter),
+        ("other", age),
+    ]
     assert [(outlet.source, outlet.device_port) for outlet in plan.outlets] == [("a", "force")]
     assert plan.links == plan.meetings() == ()
     assert plan.order == ("a",)
@@ -182,13 +237,22 @@ def test_simulated_time_is_the_hubs():
     with pytest.raises(ScenarioError, match="device 's' plays in simulated time") as raised:
         plan_of(Stylus("s", out()), specs={"s": {"host": "remote"}})
     assert raised.value.path == ("participants", "s", "host")
-    plan = plan_of(Stylus("s", out(), out("other", clock="wall")), Stylus("t", out()), Stylus("u", into()), specs={"s": {"host": "remote"}})
+    plan = plan_of(
+        Stylus("s", out(), out("other", clock="wall")),
+        Stylus("t", out()),
+        Stylus("u", into()),
+        specs={"s": {"host": "remote"}},
+    )
     assert [plan.members[name].follows_clock for name in "stu"] == [False, True, False]
 
 
 def test_only_vectors_are_extrapolated():
     with pytest.raises(ScenarioError, match="values of std_msgs/msg/String cannot be extrapolated"):
-        plan_of(Part("a", out(type=TEXT)), Part("b", into(type=TEXT)), connections=[{"source": "a.out", "target": "b.in", "extrapolation": "linear"}])
+        plan_of(
+            Part("a", out(type=TEXT)),
+            Part("b", into(type=TEXT)),
+            connections=[{"source": "a.out", "target": "b.in", "extrapolation": "linear"}],
+        )
 
 
 @pytest.mark.parametrize("period", ["1.5 ms", "0.5 ms"])
@@ -199,7 +263,9 @@ def test_periods_are_multiples_of_the_step(period):
 
 
 def test_the_period_of_an_output_is_a_multiple_of_the_participants():
-    with pytest.raises(ScenarioError, match="output 'out' has a period of 3 ms, no multiple of the participant's 2 ms"):
+    with pytest.raises(
+        ScenarioError, match="output 'out' has a period of 3 ms, no multiple of the participant's 2 ms"
+    ):
         plan_of(Part("a", out(period_ns=3_000_000)), specs={"a": {"period": "2 ms"}})
     plan = plan_of(Part("a", out(period_ns=6_000_000), out("each")), specs={"a": {"period": "2 ms"}})
     assert (plan.stride("a", "out"), plan.stride("a", "each")) == (6, 2)
@@ -213,10 +279,22 @@ def test_the_period_of_an_output_is_a_multiple_of_the_participants():
         ((motion(), force()), {"motion": "b.tip"}, "'b.tip' is a force side, here the motion side is wanted"),
         ((motion(dof=3), force(dof=1)), {}, "'a.tip' has 3 degrees of freedom, 'b.tip' has 1"),
         ((motion(dof=3, points=4), force(dof=3)), {}, "'a.tip' bonds 4 points, 'b.tip' bonds 1"),
-        ((motion(frame="world"), force(frame="base")), {}, "'a.tip' is in frame 'world', 'b.tip' in frame 'base'"),
-        ((motion(), force()), {"algorithm": "gauss-seidel"}, "needs the order of its two participants, such as 'order: \\[a, b\\]'"),
+        (
+            (motion(frame="world"), force(frame="base")),
+            {},
+            "'a.tip' is in frame 'world', 'b.tip' in frame 'base'",
+        ),
+        (
+            (motion(), force()),
+            {"algorithm": "gauss-seidel"},
+            "needs the order of its two participants, such as 'order: \\[a, b\\]'",
+        ),
         ((motion(), force()), {"algorithm": "gauss-seidel", "order": ["a", "c"]}, "needs the order"),
-        ((motion(), force()), {"algorithm": "impulse-linearised"}, "needs stiffness, damping and proxy mass, which 'b.tip' does not state"),
+        (
+            (motion(), force()),
+            {"algorithm": "impulse-linearised"},
+            "needs stiffness, damping and proxy mass, which 'b.tip' does not state",
+        ),
     ],
 )
 def test_bonds_that_do_not_fit(parts, bond, message):
@@ -231,7 +309,11 @@ def test_the_force_side_takes_whole_steps_of_the_motion_side():
         plan_of(motion(), force(), specs={"a": {"period": "2 ms"}, "b": {"period": "3 ms"}}, bonds=bonds)
     plan = plan_of(motion(), force(), specs={"b": {"period": "3 ms"}}, bonds=bonds)
     assert plan.order == ("b", "a")
-    assert [(link.source_port, link.fresh) for link in plan.links] == [("tip/pose", False), ("tip/twist", False), ("tip/wrench", True)]
+    assert [(link.source_port, link.fresh) for link in plan.links] == [
+        ("tip/pose", False),
+        ("tip/twist", False),
+        ("tip/wrench", True),
+    ]
     assert {port.name for port in plan.members["a"].ports} == {"tip/pose", "tip/twist", "tip/wrench"}
 
 
@@ -251,13 +333,28 @@ def test_measures_are_of_outputs(of, message):
 
 
 def test_a_plan_survives_json():
-    plan = plan_of(motion(), force(), Stylus("s", out()), Part("c", into()), connections=["s.out -> c.in"], bonds=[{"motion": "a.tip", "force": "b.tip"}])
+    plan = plan_of(
+        motion(),
+        force(),
+        Stylus("s", out()),
+        Part("c", into()),
+        connections=["s.out -> c.in"],
+        bonds=[{"motion": "a.tip", "force": "b.tip"}],
+    )
     assert Plan.model_validate_json(plan.model_dump_json()) == plan
 
 
 def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
-    stylus, scripted = Stylus("stylus", out("pose", type=POSE), into("force", type=POSE)), Stylus("scripted", out("pose", type=POSE))
-    plan = plan_of(stylus, scripted, Part("a", into(type=POSE), out(type=POSE)), connections=["stylus.pose -> a.in", "a.out -> stylus.force"])
+    stylus, scripted = (
+        Stylus("stylus", out("pose", type=POSE), into("force", type=POSE)),
+        Stylus("scripted", out("pose", type=POSE)),
+    )
+    plan = plan_of(
+        stylus,
+        scripted,
+        Part("a", into(type=POSE), out(type=POSE)),
+        connections=["stylus.pose -> a.in", "a.out -> stylus.force"],
+    )
     assert plan.outlets == ()
     assert [(link.source, link.target, link.fresh) for link in plan.links] == [("a", "stylus", False)]
     assert [member.name for member in plan.meetings()] == ["stylus"]
@@ -267,7 +364,11 @@ def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
 def test_nothing_is_extrapolated_for_a_device():
     stylus, engine = Stylus("stylus", out("pose", type=POSE), into("force", size=3)), Part("a", out(size=3))
     with pytest.raises(ScenarioError, match="'stylus' is a device, which is written what is there"):
-        plan_of(stylus, engine, connections=[{"source": "a.out", "target": "stylus.force", "extrapolation": "linear"}])
+        plan_of(
+            stylus,
+            engine,
+            connections=[{"source": "a.out", "target": "stylus.force", "extrapolation": "linear"}],
+        )
 
 
 def test_a_device_in_wall_time_is_read_at_a_rate_of_its_own():

@@ -52,23 +52,54 @@ def test_a_good_scenario(good, tmp_path):
 
 
 def test_every_problem_is_one_line_with_its_place(problems):
-    text = GOOD.replace("step: 1 ms", "stepp: 1 ms").replace("length: 0.5", "length: 5 kg\n    sover: euler").replace("->", "=>")
+    text = (
+        GOOD.replace("step: 1 ms", "stepp: 1 ms")
+        .replace("length: 0.5", "length: 5 kg\n    sover: euler")
+        .replace("->", "=>")
+    )
     assert problems(text) == [
         "2:1: step: is required but not given",
         "12:5: connections.0: 'one.angle => two.goal' is no 'participant.port -> participant.port'",
-        "3:1: stepp: there is no 'stepp' here. Did you mean 'step'? Known: algorithm, answer_limit, bonds, connections, description, duration, "
-        "join_limit, measure, name, order, pace, participants, step, window.",
-        "9:13: participants.two.length: '5 kg' is no quantity in m (Cannot convert from 'kilogram' ([mass]) to 'meter' ([length]))",
-        "10:5: participants.two.sover: there is no 'sover' here. Did you mean 'solver'? Known: length, solver, springs.",
+        (
+            "3:1: stepp: there is no 'stepp' here. Did you mean 'step'? Known: algorithm, answer_limit,"
+            " bonds, connections, description, duration, join_limit, measure, name, order, pace,"
+            " participants, step, window."
+        ),
+        (
+            "9:13: participants.two.length: '5 kg' is no quantity in m (Cannot convert from 'kilogram'"
+            " ([mass]) to 'meter' ([length]))"
+        ),
+        (
+            "10:5: participants.two.sover: there is no 'sover' here. Did you mean 'solver'? Known: length,"
+            " solver, springs."
+        ),
     ]
 
 
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("kind: pendulum\n", "kind: pendulm\n", "7:11: participants.two.kind: unknown kind 'pendulm'. Did you mean 'pendulum'?"),
-        ("0.5", "0.5\n    solver: eulr", "10:13: participants.two.solver: 'eulr' is not allowed. Did you mean 'euler'? Known: euler, verlet."),
-        ("0.5", "0.5\n    springs: {a: {stiffnes: 3}}", "10:19: participants.two.springs.a.stiffnes: there is no 'stiffnes' here. Did you mean 'stiffness'?"),
+        (
+            "kind: pendulum\n",
+            "kind: pendulm\n",
+            "7:11: participants.two.kind: unknown kind 'pendulm'. Did you mean 'pendulum'?",
+        ),
+        (
+            "0.5",
+            "0.5\n    solver: eulr",
+            (
+                "10:13: participants.two.solver: 'eulr' is not allowed. Did you mean 'euler'? Known: euler,"
+                " verlet."
+            ),
+        ),
+        (
+            "0.5",
+            "0.5\n    springs: {a: {stiffnes: 3}}",
+            (
+                "10:19: participants.two.springs.a.stiffnes: there is no 'stiffnes' here. Did you mean"
+                " 'stiffness'?"
+            ),
+        ),
         ("0.5", "-1", "9:13: participants.two.length: Input should be greater than 0 (got -1.0)"),
         ("  two:", "  2nd:", "6:3: participants.2nd: '2nd' is no name"),
         ("host: other", "host: a/b", "8:11: participants.two.host: 'a/b' is no name"),
@@ -76,7 +107,11 @@ def test_every_problem_is_one_line_with_its_place(problems):
         ("    host: other\n", "    kind: pendulum\n", '8:5: not valid YAML: found duplicate key "kind"'),
         ("one: {kind", "one: {{kind", "not valid YAML"),
         (GOOD, "", "1:1: a scenario is a mapping"),
-        ("  one: {kind: pendulum, length: 80 mm}", "  one:", "5:3: participants.one: expected a mapping, got None"),
+        (
+            "  one: {kind: pendulum, length: 80 mm}",
+            "  one:",
+            "5:3: participants.one: expected a mapping, got None",
+        ),
     ],
 )
 def test_what_was_wrong_where_and_what_was_allowed(problems, old, new, expected):
@@ -85,7 +120,15 @@ def test_what_was_wrong_where_and_what_was_allowed(problems, old, new, expected)
 
 
 def test_overrides(good):
-    loaded = load(good, ["step=2 ms", "participants.one.length=3", "participants.two.springs.a.stiffness=4", "connections.0=two.angle -> one.goal"])
+    loaded = load(
+        good,
+        [
+            "step=2 ms",
+            "participants.one.length=3",
+            "participants.two.springs.a.stiffness=4",
+            "connections.0=two.angle -> one.goal",
+        ],
+    )
     assert loaded.scenario.step == 2_000_000
     assert loaded.params["one"].length == 3.0
     assert loaded.params["two"].springs["a"].stiffness == 4.0
@@ -96,9 +139,18 @@ def test_overrides(good):
     ("override", "expected"),
     [
         ("stepp=2 ms", "--set stepp=2 ms: stepp: there is no 'stepp' here. Did you mean 'step'?"),
-        ("participants.one.length=-3", "--set participants.one.length=-3: participants.one.length: Input should be greater than 0"),
-        ("participants.one.springs.a.k=4", "--set participants.one.springs.a.k=4: participants.one.springs.a.stiffness: is required"),
-        ("connections.1=x", "--set connections.1=x: connections is a list of 1, counted from 0; there is no '1' in it"),
+        (
+            "participants.one.length=-3",
+            "--set participants.one.length=-3: participants.one.length: Input should be greater than 0",
+        ),
+        (
+            "participants.one.springs.a.k=4",
+            "--set participants.one.springs.a.k=4: participants.one.springs.a.stiffness: is required",
+        ),
+        (
+            "connections.1=x",
+            "--set connections.1=x: connections is a list of 1, counted from 0; there is no '1' in it",
+        ),
         ("name.x=1", "--set name.x=1: name is 'swinging', which has no parts"),
         ("step", "--set step: expected a.b.c=value"),
         ("step={", "--set step={: the value is not valid YAML"),
@@ -145,13 +197,28 @@ def test_an_override_changes_what_it_names_and_no_other_that_merges_it(merged):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("stiffness: 3", "stifness: 3", [f"8:21: participants.{name}.springs.a.stifness: there is no 'stifness'" for name in ("one", "two", "three")]),
+        (
+            "stiffness: 3",
+            "stifness: 3",
+            [
+                f"8:21: participants.{name}.springs.a.stifness: there is no 'stifness'"
+                for name in ("one", "two", "three")
+            ],
+        ),
         ("80 mm", "80 kg", ["7:15: participants.one.length: '80 kg' is no quantity in m"]),
         ("0.5", "-0.5", ["9:45: participants.two.length: Input should be greater than 0"]),
         ("length: 2", "length: -2", ["11:19: participants.three.length: Input should be greater than 0"]),
-        ("[{length: 2}, *shape]", "3", ["11:9: not valid YAML: expected a mapping or list of mappings for merging"]),
+        (
+            "[{length: 2}, *shape]",
+            "3",
+            ["11:9: not valid YAML: expected a mapping or list of mappings for merging"],
+        ),
         ("*shape]", "*shpe]", ["11:23: not valid YAML: found undefined alias 'shpe'"]),
-        ("springs: {a:", "springs: &s {b: *s, a:", ["nested too deeply: does an alias (*name) stand inside what it is an alias of?"]),
+        (
+            "springs: {a:",
+            "springs: &s {b: *s, a:",
+            ["nested too deeply: does an alias (*name) stand inside what it is an alias of?"],
+        ),
     ],
 )
 def test_a_mistake_in_what_is_merged_is_shown_where_it_is_written(problems, old, new, expected):

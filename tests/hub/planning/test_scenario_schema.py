@@ -32,11 +32,18 @@ def test_installed_scenarios_fit_the_schema(validator, file: Path):
         ({"stepp": "1 ms"}, []),
         ({"pace": "fats"}, ["pace"]),
         ({"participants": {"tissue": {"kind": "bulet"}}}, ["participants", "tissue", "kind"]),
-        ({"participants": {"tissue": {"kind": "bullet", "organs": {"a": {"sise": [1, 2, 3]}}}}}, ["participants", "tissue", "organs", "a"]),
+        (
+            {"participants": {"tissue": {"kind": "bullet", "organs": {"a": {"sise": [1, 2, 3]}}}}},
+            ["participants", "tissue", "organs", "a"],
+        ),
         ({"participants": {"tissue": {"kind": "bullet", "organ": {}}}}, ["participants", "tissue"]),
         ({"connections": ["a.b => c.d"]}, ["connections", 0]),
     ],
 )
 def test_the_schema_points_at_mistakes(validator, change, path):
-    scenario = {"name": "a", "step": "1 ms", "participants": {"stylus": {"kind": "scripted", "samples": "x"}}} | change
+    scenario = {
+        "name": "a",
+        "step": "1 ms",
+        "participants": {"stylus": {"kind": "scripted", "samples": "x"}},
+    } | change
     assert path in [list(error.absolute_path) for error in validator.iter_errors(scenario)]

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
+from hub.recording import recorder as recorder_module
 from hub.recording.bag import Bag, located_messages
 from hub.recording.mcap_file import chunk_data
 from hub.recording.recorder import Recorder
-from hub.recording import recorder as recorder_module
 from hub.recording.recover import recover
 from schemas.codec import decode, encode
 from schemas.errors import RecordingError
@@ -35,7 +35,9 @@ def _pose(time_ns: int) -> bytes:
 
 
 def test_a_recording_reads_back_in_order(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "run", attachments={"scenario.yaml": b"name: x\n", "versions.json": b"{}"}) as recorder:
+    with Recorder(
+        tmp_path / "run", attachments={"scenario.yaml": b"name: x\n", "versions.json": b"{}"}
+    ) as recorder:
         pose = recorder.channel("/engine/robot/out/tip", POSE)
         given = [(pose, t * 1000, _pose(t * 1000)) for t in range(3000)]
         for message in given[:1500]:
@@ -63,25 +65,38 @@ def test_ros_tools_open_it(tmp_path: Path) -> None:
             recorder.write(number, t, encode(Float64Message(data=t / 7)))
     with AnyReader([tmp_path / "run"]) as reader:
         assert reader.message_count == 4000
-        assert {c.topic: c.msgtype for c in reader.connections} == {"/pose": POSE, "/number": "std_msgs/msg/Float64"}
-        numbers = [reader.deserialize(raw, c.msgtype).data for c, _, raw in reader.messages() if c.topic == "/number"]
+        assert {c.topic: c.msgtype for c in reader.connections} == {
+            "/pose": POSE,
+            "/number": "std_msgs/msg/Float64",
+        }
+        numbers = [
+            reader.deserialize(raw, c.msgtype).data for c, _, raw in reader.messages() if c.topic == "/number"
+        ]
         assert numbers == [t / 7 for t in range(2000)]
     with (tmp_path / "run" / "run_0.mcap").open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         assert reader.get_header().profile == "ros2"
         messages = list(reader.iter_messages())
-        assert [(s.name, s.encoding, c.message_encoding) for s, c, _ in messages[:1] if s] == [(POSE, "ros2msg", "cdr")]
+        assert [(s.name, s.encoding, c.message_encoding) for s, c, _ in messages[:1] if s] == [
+            (POSE, "ros2msg", "cdr")
+        ]
         assert [m.log_time for _, _, m in messages] == sorted(2 * list(range(2000)))
         assert all(m.log_time == m.publish_time for _, _, m in messages)
         summary = reader.get_summary()
         assert summary is not None
         assert all(c.uncompressed_size <= 256 * 2**10 for c in summary.chunk_indexes)
         assert [a.name for a in reader.iter_attachments()] == ["a.json"]
-        middle = [m.log_time for _, _, m in reader.iter_messages("/number", starting_at=500, ending_before=600)]
+        middle = [
+            m.log_time for _, _, m in reader.iter_messages("/number", starting_at=500, ending_before=600)
+        ]
         assert middle == list(range(500, 600))
 
 
-@given(st.lists(st.tuples(st.integers(1, 9), st.integers(0, 2**62), st.binary(max_size=40)), min_size=1, max_size=50))
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 9), st.integers(0, 2**62), st.binary(max_size=40)), min_size=1, max_size=50
+    )
+)
 def test_chunk_layout_round_trips(messages: list[tuple[int, int, bytes]]) -> None:
     data = chunk_data(messages)
     located = list(located_messages(data.records))
@@ -128,7 +143,13 @@ def test_an_empty_recording_is_a_recording(tmp_path: Path) -> None:
 def test_a_channel_is_registered_once(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
         assert recorder.channel("/pose", POSE) == recorder.channel("/pose", POSE)
-        with pytest.raises(RecordingError, match=r"unknown message type 'geometry_msgs/msg/PoseStampd'\. Did you mean 'geometry_msgs/msg/PoseStamped'"):
+        with pytest.raises(
+            RecordingError,
+            match=(
+                r"unknown message type 'geometry_msgs/msg/PoseStampd'\. Did you mean"
+                r" 'geometry_msgs/msg/PoseStamped'"
+            ),
+        ):
             recorder.channel("/other", "geometry_msgs/msg/PoseStampd")
 
 
@@ -140,13 +161,17 @@ def test_close_twice_and_write_after_close(tmp_path: Path, caplog: pytest.LogCap
     assert recorder.close() == first
     recorder.write(channel, 1, _pose(1))
     recorder.write(channel, 2, _pose(2))
-    assert [r.message for r in caplog.records] == [f"recorder of '{tmp_path / 'run'}' drops messages, because it is closed: the recording is incomplete"]
+    assert [r.message for r in caplog.records] == [
+        f"recorder of '{tmp_path / 'run'}' drops messages, because it is closed: the recording is incomplete"
+    ]
 
 
 def test_overwrites_nothing(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.txt").write_text("all I have")
-    with pytest.raises(RecordingError, match="is not empty, and a recording overwrites nothing: name a new directory"):
+    with pytest.raises(
+        RecordingError, match="is not empty, and a recording overwrites nothing: name a new directory"
+    ):
         Recorder(tmp_path / "run", attachments={})
 
 
@@ -156,7 +181,9 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
         Recorder(tmp_path / "file" / "run", attachments={})
 
 
-def test_a_full_queue_drops_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_full_queue_drops_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     gate = threading.Event()
     monkeypatch.setattr(recorder_module, "MAX_QUEUED_MESSAGES", 1000)
     recorder = Recorder(tmp_path / "run", attachments={})
@@ -205,7 +232,9 @@ print(json.dumps([s.complete, s.messages, s.dropped, s.error, s.bytes]))
 """
 
 
-def _check_full_disk(directory: Path, output: Path, limit: int, run: "subprocess.CompletedProcess[str]", error: str) -> None:
+def _check_full_disk(
+    directory: Path, output: Path, limit: int, run: "subprocess.CompletedProcess[str]", error: str
+) -> None:
     complete, messages, dropped, said, size = json.loads(run.stdout)
     assert (complete, said) == (False, error)
     assert messages + dropped == 2000
@@ -234,7 +263,13 @@ def test_a_file_that_may_not_grow(tmp_path: Path) -> None:
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     disk = tmp_path / "disk"
     disk.mkdir()
-    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=800k", "tmpfs", disk], check=False, capture_output=True).returncode == 0
+    mounted = (
+        os.geteuid() == 0
+        and subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=800k", "tmpfs", disk], check=False, capture_output=True
+        ).returncode
+        == 0
+    )
     if not mounted:
         pytest.skip("a small disk can be mounted by root only")
     yield disk
@@ -242,7 +277,9 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_a_full_disk(tmp_path: Path, small_disk: Path) -> None:
-    run = subprocess.run([sys.executable, "-c", FULL_DISK, small_disk / "run"], capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, small_disk / "run"], capture_output=True, text=True, check=True
+    )
     _check_full_disk(small_disk / "run", tmp_path / "saved", 800 * 2**10, run, "No space left on device")
 
 
@@ -262,7 +299,9 @@ while True:
     t += 1
     recorder.write(channel, t, bytes(100))
 """
-    process = subprocess.Popen([sys.executable, "-c", code, tmp_path / "run"], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, tmp_path / "run"], stdout=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "recorded\n"
     time.sleep(0.3)

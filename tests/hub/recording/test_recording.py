@@ -55,7 +55,12 @@ def test_series_are_what_was_written(session: Path) -> None:
     assert wrench.shape == (500, 6)
     assert np.allclose(times, np.arange(1, 501) * 1e-3)
     assert 1.0 < wrench[:, 2].max() < 3.0
-    with pytest.raises(RecordingError, match=r"has no topic '/engine/tissue/out/probe/wrenh'\. Did you mean '/engine/tissue/out/probe/wrench'"):
+    with pytest.raises(
+        RecordingError,
+        match=(
+            r"has no topic '/engine/tissue/out/probe/wrenh'\. Did you mean '/engine/tissue/out/probe/wrench'"
+        ),
+    ):
         recording.series("/engine/tissue/out/probe/wrenh")
     with pytest.raises(RecordingError, match="has no vector form"):
         recording.series("/hub/grant")
@@ -64,9 +69,20 @@ def test_series_are_what_was_written(session: Path) -> None:
 def test_series_of_joints_and_arrays(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
         joints = recorder.channel("/joints", JointState.ros_type)
-        recorder.write(joints, 0, encode(JointState(name=["a", "b"], position=np.array([1.0, 2.0]), effort=np.array([3.0, 4.0]))))
-        recorder.write(joints, 1, encode(JointState(name=["b", "a"], position=np.array([2.5, 1.5]), effort=np.array([4.5, 3.5]))))
-        array, number, text = (recorder.channel(f"/{m.__name__}", m.ros_type) for m in (Float64MultiArray, Float64Message, StringMessage))
+        recorder.write(
+            joints,
+            0,
+            encode(JointState(name=["a", "b"], position=np.array([1.0, 2.0]), effort=np.array([3.0, 4.0]))),
+        )
+        recorder.write(
+            joints,
+            1,
+            encode(JointState(name=["b", "a"], position=np.array([2.5, 1.5]), effort=np.array([4.5, 3.5]))),
+        )
+        array, number, text = (
+            recorder.channel(f"/{m.__name__}", m.ros_type)
+            for m in (Float64MultiArray, Float64Message, StringMessage)
+        )
         recorder.write(array, 0, encode(Float64MultiArray(data=np.arange(3.0))))
         recorder.write(number, 0, encode(Float64Message(data=7.0)))
         recorder.write(text, 0, encode(StringMessage(data="x")))
@@ -87,9 +103,15 @@ def test_a_series_without_messages_is_empty(tmp_path: Path) -> None:
 def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
         recorder.write(recorder.channel("/hub/grant", "trocar_msgs/msg/Grant"), 3, b"no grant")
-        recorder.write(recorder.channel("/number", Float64Message.ros_type), 3, encode(Float64Message())[:4] + np.array([np.nan]).tobytes())
+        recorder.write(
+            recorder.channel("/number", Float64Message.ros_type),
+            3,
+            encode(Float64Message())[:4] + np.array([np.nan]).tobytes(),
+        )
     recording = Recording(tmp_path / "run")
-    with pytest.raises(RecordingError, match="topic '/hub/grant' at 3 ns: trocar_msgs/msg/Grant: 8 bytes are no such message"):
+    with pytest.raises(
+        RecordingError, match="topic '/hub/grant' at 3 ns: trocar_msgs/msg/Grant: 8 bytes are no such message"
+    ):
         list(recording.grants())
     with pytest.raises(RecordingError, match=r"topic '/number' at 3 ns: .*finite"):
         recording.series("/number")
@@ -100,10 +122,15 @@ def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     [
         ({}, "holds no scenario: it was not recorded by `trocar run`"),
         ({"scenario.json": b"{"}, "the scenario in it is none that this version reads"),
-        ({"scenario.json": json.dumps({"name": "x", "step": "soon", "participants": {}}).encode()}, "none that this version reads: step"),
+        (
+            {"scenario.json": json.dumps({"name": "x", "step": "soon", "participants": {}}).encode()},
+            "none that this version reads: step",
+        ),
     ],
 )
-def test_a_recording_without_a_readable_scenario(tmp_path: Path, attachments: dict[str, bytes], problem: str) -> None:
+def test_a_recording_without_a_readable_scenario(
+    tmp_path: Path, attachments: dict[str, bytes], problem: str
+) -> None:
     Recorder(tmp_path / "run", attachments=attachments).close()
     with pytest.raises(RecordingError, match=problem):
         Recording(tmp_path / "run").scenario()
@@ -138,7 +165,9 @@ def test_messages_that_are_not_cdr(tmp_path: Path) -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
-def test_a_damaged_file_is_refused_or_read_never_more(session: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+def test_a_damaged_file_is_refused_or_read_never_more(
+    session: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
     whole = (session / "run_0.mcap").read_bytes()
     damaged = bytearray(whole)
     for _ in range(data.draw(st.integers(1, 3))):

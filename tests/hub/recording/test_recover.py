@@ -86,7 +86,9 @@ def test_files_of_other_writers_keep_their_channels(tmp_path: Path) -> None:
     with (tmp_path / "x.mcap").open("wb") as stream:
         writer = Writer(stream, chunk_size=1000)
         writer.start("ros2")
-        schema = writer.register_schema(Float64Message.ros_type, "ros2msg", ros2msg_definition(Float64Message.ros_type).encode())
+        schema = writer.register_schema(
+            Float64Message.ros_type, "ros2msg", ros2msg_definition(Float64Message.ros_type).encode()
+        )
         channel = writer.register_channel("/x", "cdr", schema)
         for t in range(100):
             writer.add_message(channel, t, encode(Float64Message(data=t)), t)

@@ -29,7 +29,8 @@ def _collect(play: Callable[[zenoh.Session], ReplaySummary]) -> tuple[ReplaySumm
     """Let `play` publish, and return its result with what a subscriber got."""
     with open_session("peer") as publisher:
         got: queue.Queue[zenoh.Sample] = queue.Queue()
-        subscriber = publisher.declare_subscriber("trocar/**", Callback(got.put, indirect=False))  # called within put()
+        # called within put()
+        subscriber = publisher.declare_subscriber("trocar/**", Callback(got.put, indirect=False))
         result = play(publisher)
         subscriber.undeclare()
     return result, list(got.queue)
@@ -38,7 +39,9 @@ def _collect(play: Callable[[zenoh.Session], ReplaySummary]) -> tuple[ReplaySumm
 def test_consoles_get_every_output_in_order_and_no_grant(recording: Recording) -> None:
     result, samples = _collect(lambda session: replay(recording, session, 0))
     expected = [m for m in recording.messages() if is_replayed(m.topic)]
-    assert [(f"trocar/palpation{m.topic}", m.payload) for m in expected] == [(str(s.key_expr), s.payload.to_bytes()) for s in samples]
+    assert [(f"trocar/palpation{m.topic}", m.payload) for m in expected] == [
+        (str(s.key_expr), s.payload.to_bytes()) for s in samples
+    ]
     assert not [s for s in samples if str(s.key_expr).endswith(("/grant", "/ack"))]
     assert result.messages == len(expected) == 852
     assert result.by_topic == Counter(m.topic for m in expected)

@@ -56,7 +56,12 @@ def text(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_one_page_that_loads_nothing(text: str) -> None:
     page = Page(text)
     assert not [tag for tag, _ in page.tags if tag in ("script", "link", "img", "iframe", "object")]
-    fetched = [value for _, attrs in page.tags for name, value in attrs.items() if name in ("src", "href", "xlink:href", "srcset") and value]
+    fetched = [
+        value
+        for _, attrs in page.tags
+        for name, value in attrs.items()
+        if name in ("src", "href", "xlink:href", "srcset") and value
+    ]
     assert all(value.startswith("#") for value in fetched)
     assert "@import" not in text
     assert re.findall(r"url\((?!#)", text) == []
@@ -64,11 +69,22 @@ def test_one_page_that_loads_nothing(text: str) -> None:
 
 def test_numbers_and_plots(text: str) -> None:
     page = Page(text)
-    for word in ("palpation", "0.500 s", "peak force, robot/PSM1/probe", "energy residual", "mujoco", "4.0.0", "/engine/robot/ack"):
+    for word in (
+        "palpation",
+        "0.500 s",
+        "peak force, robot/PSM1/probe",
+        "energy residual",
+        "mujoco",
+        "4.0.0",
+        "/engine/robot/ack",
+    ):
         assert word in page.words
     images = [attrs for tag, attrs in page.tags if tag == "svg"]
     assert len(images) == 8
-    assert all(attrs["role"] == "img" and attrs["aria-label"] and attrs["viewbox"] and "width" not in attrs for attrs in images)
+    assert all(
+        attrs["role"] == "img" and attrs["aria-label"] and attrs["viewbox"] and "width" not in attrs
+        for attrs in images
+    )
     assert "3 contacts" in page.words
 
 
@@ -126,7 +142,12 @@ def test_depth_is_measured_from_first_contact_against_the_force(seed: int) -> No
     normal /= np.linalg.norm(normal)
     start = numbers.normal(size=3)
     height = np.concatenate([np.linspace(3, -5, 81), np.linspace(-5, 3, 81)]) * 1e-3
-    trace = BondTrace("x", np.arange(162) * 1e-3, start + height[:, None] * normal, np.maximum(0, -height)[:, None] * 100 * normal)
+    trace = BondTrace(
+        "x",
+        np.arange(162) * 1e-3,
+        start + height[:, None] * normal,
+        np.maximum(0, -height)[:, None] * 100 * normal,
+    )
     first = height[np.argmax(trace.contact)]
     assert np.allclose(trace.depth, first - height, atol=1e-12)
     assert [s.start for s in trace.episodes()] == [int(np.argmax(trace.contact))]

@@ -1,4 +1,6 @@
-"""What a device host that stays does when the hub or the network goes, and what a session does without its device: real processes."""
+"""What a device host that stays does when the hub or the network goes, and what a session does without its
+device: real processes.
+"""
 
 import subprocess
 import sys
@@ -40,7 +42,9 @@ class Running:
 
     def _run(self):
         try:
-            self.summary = self.session.run(lambda progress: setattr(self, "fresh", progress.live["fresh_steps"][0]))
+            self.summary = self.session.run(
+                lambda progress: setattr(self, "fresh", progress.live["fresh_steps"][0])
+            )
         except Exception as error:  # noqa: BLE001
             self.failure = error
 
@@ -73,7 +77,19 @@ def until(look, limit_s=15.0):
 @contextmanager
 def player(endpoint, file, *more):
     """Start `trocar device player`; its messages go to a file."""
-    command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", endpoint, "--session", "hand", *more]
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "hub.command_line",
+        "device",
+        "player",
+        "--connect",
+        endpoint,
+        "--session",
+        "hand",
+        *more,
+    ]
     with file.open("w") as log, subprocess.Popen(command, stderr=log) as process:
         try:
             yield process
@@ -100,7 +116,10 @@ def test_a_host_outlives_the_hub_and_joins_the_next_session_of_its_name(prepare,
         until(lambda: second.is_followed())
         second.end()
     said = " ".join((tmp_path / "player.log").read_text().split())
-    assert "device 'player': the hub is gone; nothing is written to it any more, and it joins again when the hub is back" in said
+    assert (
+        "device 'player': the hub is gone; nothing is written to it any more, and it joins again when the hub"
+        " is back" in said
+    )
     assert said.count("takes part in session 'hand'") == 2
 
 
@@ -109,10 +128,23 @@ def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
     until(lambda: running.status)
     with player(running.session.endpoint, tmp_path / "player.log") as process:
         until(lambda: running.is_followed())
-        command = [sys.executable, "-P", "-m", "hub.command_line", "device", "player", "--connect", running.session.endpoint, "--session", "hand"]
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "hub.command_line",
+            "device",
+            "player",
+            "--connect",
+            running.session.endpoint,
+            "--session",
+            "hand",
+        ]
         second = subprocess.run(command, capture_output=True, text=True, timeout=30)
         assert second.returncode == 1
-        assert f"host 'remote/player' is here already, as process {process.pid}: end that one" in " ".join(second.stderr.split())
+        assert f"host 'remote/player' is here already, as process {process.pid}: end that one" in " ".join(
+            second.stderr.split()
+        )
         assert running.is_followed()
         running.end()
     assert running.summary.dropped_messages == 1  # the request to join
@@ -121,7 +153,10 @@ def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
 def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
     running = Running(prepare(SCENARIO))
     until(lambda: running.status)
-    with Proxy(port(running.session.endpoint)) as proxy, player(f"tcp/127.0.0.1:{proxy.port}", tmp_path / "player.log") as process:
+    with (
+        Proxy(port(running.session.endpoint)) as proxy,
+        player(f"tcp/127.0.0.1:{proxy.port}", tmp_path / "player.log") as process,
+    ):
         until(lambda: running.is_followed())
         proxy.hold()
         sleep(0.3)
@@ -136,14 +171,18 @@ def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
         process.wait(10)
         until(lambda: running.status.participants[0].pid == 0)
         running.end()
-    assert running.summary.latency["state to force"]["loud.out -> player.noise"]["count"] > 100  # though the device is gone
+    # though the device is gone
+    assert running.summary.latency["state to force"]["loud.out -> player.noise"]["count"] > 100
     assert (tmp_path / "player.log").read_text().count("takes part") == 1
 
 
 def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
     running = Running(prepare(SCENARIO))
     until(lambda: running.status)
-    with Proxy(port(running.session.endpoint)) as proxy, player(f"tcp/127.0.0.1:{proxy.port}", tmp_path / "player.log"):
+    with (
+        Proxy(port(running.session.endpoint)) as proxy,
+        player(f"tcp/127.0.0.1:{proxy.port}", tmp_path / "player.log"),
+    ):
         until(lambda: running.is_followed())
         proxy.cut()
         until(lambda: running.status.participants[0].pid == 0)
@@ -153,17 +192,33 @@ def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
         until(lambda: running.is_followed())
         assert [device.device for device in until(lambda: running.status.devices)] == ["player"]
         running.end()
-    assert "device 'player' is gone, what it leads holds: start 'trocar device player' again, or mend the network" in caplog.text
+    assert (
+        "device 'player' is gone, what it leads holds: start 'trocar device player' again, or mend the"
+        " network" in caplog.text
+    )
     assert (tmp_path / "player.log").read_text().count("takes part") == 2
 
 
 def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
     (tmp_path / "session.yaml").write_text(SCENARIO)
     endpoint = free_endpoint(range(1))
-    command = [sys.executable, "-P", "-m", "hub.command_line", "run", str(tmp_path / "session.yaml"), "--listen", endpoint]
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "hub.command_line",
+        "run",
+        str(tmp_path / "session.yaml"),
+        "--listen",
+        endpoint,
+    ]
 
     def is_followed():
-        return any(one.stream == "player.hand" and one.count > 50 for status in live_sessions([endpoint]) for one in status.latencies)
+        return any(
+            one.stream == "player.hand" and one.count > 50
+            for status in live_sessions([endpoint])
+            for one in status.latencies
+        )
 
     with ExitStack() as stack:
         for signal in (SIGKILL, SIGTERM):

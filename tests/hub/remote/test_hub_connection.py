@@ -59,27 +59,44 @@ def test_a_server_that_is_no_hub_is_left_alone(authority, tmp_path, monkeypatch)
         certs.renew(authority.directory, ["127.0.0.1"], 1)
     port = free_port()
     with (
-        open_session("router", listen=[f"tls/127.0.0.1:{port}"], security=load("www.example", authority.directory).listening()),
-        pytest.raises(ConnectError, match=r"is no hub of the authority of .*touch\.pem: it shows that of www\.example"),
+        open_session(
+            "router",
+            listen=[f"tls/127.0.0.1:{port}"],
+            security=load("www.example", authority.directory).listening(),
+        ),
+        pytest.raises(
+            ConnectError, match=r"is no hub of the authority of .*touch\.pem: it shows that of www\.example"
+        ),
     ):
         reach(f"tls/127.0.0.1:{port}", "touch", authority.issued("touch").file)
 
 
 def test_the_hub_has_another_name(authority, port):
-    assert re.search(r"not for the name 'localhost'.*trocar certs renew", obstacle("localhost", port, authority.issued("touch")))
+    assert re.search(
+        r"not for the name 'localhost'.*trocar certs renew",
+        obstacle("localhost", port, authority.issued("touch")),
+    )
 
 
 def test_the_hub_is_of_another_authority(stranger, port):
-    assert re.search(r"of another authority than .*touch\.pem.*trocar certs issue touch", obstacle("127.0.0.1", port, stranger.issued("touch")))
+    assert re.search(
+        r"of another authority than .*touch\.pem.*trocar certs issue touch",
+        obstacle("127.0.0.1", port, stranger.issued("touch")),
+    )
 
 
 def test_the_hub_does_not_accept_the_certificate(authority, stranger, port, tmp_path):
     foreign, file = stranger.issued("touch"), tmp_path / "touch.pem"
     mixed = Credentials(file, foreign.key, foreign.certificate, authority.hub.authority)
     file.write_text(mixed.key + mixed.certificate + mixed.authority)
-    assert re.search(r"touch\.pem is of another authority than the hub's.*trocar certs issue touch", obstacle("127.0.0.1", port, mixed))
+    assert re.search(
+        r"touch\.pem is of another authority than the hub's.*trocar certs issue touch",
+        obstacle("127.0.0.1", port, mixed),
+    )
     expired = authority.issued("touch", days=-0.01)
-    assert re.search(r"touch\.pem has expired.*trocar certs issue touch", obstacle("127.0.0.1", port, expired))
+    assert re.search(
+        r"touch\.pem has expired.*trocar certs issue touch", obstacle("127.0.0.1", port, expired)
+    )
     authority.issued("touch")
 
 
@@ -90,14 +107,18 @@ def test_the_hubs_certificate_has_expired(inside, tmp_path):
     gate = Gate([f"tls/127.0.0.1:{port}"], authority.hub.listening() | access_settings(PLAN, "s"))
     gate.open(inside)
     try:
-        assert re.search(r"its certificate has expired.*trocar certs renew", obstacle("127.0.0.1", port, touch))
+        assert re.search(
+            r"its certificate has expired.*trocar certs renew", obstacle("127.0.0.1", port, touch)
+        )
     finally:
         gate.close()
 
 
 def test_no_hub_is_there(authority):
     assert "nobody listens there" in obstacle("127.0.0.1", free_port(), authority.issued("touch"))
-    assert "no name that this machine knows" in obstacle("no-such-hub.invalid", 7447, authority.issued("touch"))
+    assert "no name that this machine knows" in obstacle(
+        "no-such-hub.invalid", 7447, authority.issued("touch")
+    )
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(5)
 
@@ -109,7 +130,9 @@ def test_no_hub_is_there(authority):
 
         thread = threading.Thread(target=hang_up)
         thread.start()
-        assert "does not speak TLS as a hub does" in obstacle("127.0.0.1", server.getsockname()[1], authority.issued("touch"))
+        assert "does not speak TLS as a hub does" in obstacle(
+            "127.0.0.1", server.getsockname()[1], authority.issued("touch")
+        )
         thread.join()
 
 
@@ -121,15 +144,24 @@ def test_a_hub_elsewhere_is_reached_by_tls_and_with_a_certificate_only(authority
 
 
 def test_a_certificate_is_not_lent(authority):
-    with pytest.raises(ConnectError, match=r"touch\.pem is the certificate of 'touch', with which nobody can join as 'head'"):
+    with pytest.raises(
+        ConnectError, match=r"touch\.pem is the certificate of 'touch', with which nobody can join as 'head'"
+    ):
         reach("tls/127.0.0.1:7447", "head", authority.issued("touch").file)
 
 
 def test_the_way_to_mend_it_comes_with_the_error(authority):
-    with pytest.raises(ConnectError, match=r"cannot reach the hub at tls/127\.0\.0\.1:\d+: nobody listens there"):
+    with pytest.raises(
+        ConnectError, match=r"cannot reach the hub at tls/127\.0\.0\.1:\d+: nobody listens there"
+    ):
         reach(f"tls/127.0.0.1:{free_port()}", "touch", authority.issued("touch").file)
 
 
 def test_a_hub_of_this_machine_that_does_not_run_is_said_to_be_none():
-    with pytest.raises(ConnectError, match=r"cannot reach the hub at tcp/127\.0\.0\.1:\d+: nobody listens there\. Is it running\? trocar ls"):
+    with pytest.raises(
+        ConnectError,
+        match=(
+            r"cannot reach the hub at tcp/127\.0\.0\.1:\d+: nobody listens there\. Is it running\? trocar ls"
+        ),
+    ):
         reach(f"tcp/127.0.0.1:{free_port()}", "touch")

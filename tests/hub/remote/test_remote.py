@@ -73,7 +73,12 @@ class Site:
         self.told = directory / "told.txt"
         file = directory / "session.yaml"
         file.write_text(SCENARIO.replace("FILE", str(self.told)))
-        self.session = launch(load_scenario(str(file), ()), endpoint=free_endpoint(range(1)), outside=[self.endpoint], certificates=self.authority.directory)
+        self.session = launch(
+            load_scenario(str(file), ()),
+            endpoint=free_endpoint(range(1)),
+            outside=[self.endpoint],
+            certificates=self.authority.directory,
+        )
 
     def cut(self):
         """Take the network between both machines away."""
@@ -86,7 +91,14 @@ class Site:
     def start(self, *words, **options):
         """Start a Python process in the other namespace."""
         command = ["ip", "netns", "exec", self._namespace, sys.executable, "-P", *map(str, words)]
-        return subprocess.Popen(command, cwd=self._directory, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
+        return subprocess.Popen(
+            command,
+            cwd=self._directory,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            **options,
+        )
 
     def device(self, name, certificates=None):
         """Start a device's host there, with nothing but its own certificate."""
@@ -94,7 +106,9 @@ class Site:
         carried = self._directory / f"{name}-machine" / f"{name}.pem"
         carried.parent.mkdir(exist_ok=True)
         shutil.copy(file, carried)
-        return self.start("-m", "hub.command_line", "device", name, "--connect", self.endpoint, "--certs", carried.parent)
+        return self.start(
+            "-m", "hub.command_line", "device", name, "--connect", self.endpoint, "--certs", carried.parent
+        )
 
 
 @pytest.fixture
@@ -174,7 +188,11 @@ except ConnectError:
 
 def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(site, tmp_path, caplog):
     caplog.set_level("INFO")
-    own, foreign, mixed = site.authority.issued("pad"), Authority.founded(tmp_path / "foreign").issued("player"), tmp_path / "mixed.pem"
+    own, foreign, mixed = (
+        site.authority.issued("pad"),
+        Authority.founded(tmp_path / "foreign").issued("player"),
+        tmp_path / "mixed.pem",
+    )
     mixed.write_text(foreign.key + foreign.certificate + own.authority)
     keys = ["trocar/hand/device/player/out/hand", "trocar/hand/engine/deaf/ack", "trocar/hand/hub/grant"]
     asked = ["trocar/hand/control/shutdown", "trocar/*/control/join/remote/player", "trocar/hand/hub/status"]
@@ -190,10 +208,14 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
         try:
             hosts = [site.device("player"), site.device("pad")]
             until = monotonic() + 30
-            while monotonic() < until and not [s for s in live_sessions([site.session.endpoint]) if s.step > 50]:
+            while monotonic() < until and not [
+                s for s in live_sessions([site.session.endpoint]) if s.step > 50
+            ]:
                 sleep(0.1)
             for way, (endpoint, file, bare) in ways.items():
-                done = site.start("-c", STRANGER, json.dumps([endpoint, str(file), bare, keys, asked])).communicate(timeout=30)[0]
+                done = site.start(
+                    "-c", STRANGER, json.dumps([endpoint, str(file), bare, keys, asked])
+                ).communicate(timeout=30)[0]
                 found[way] = json.loads(done.splitlines()[-1])
             for host in hosts:
                 host.terminate()
@@ -210,7 +232,11 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
     assert summary.state == "done"
     assert summary.dropped_messages == 0
     log = "\n".join(caplog.messages)
-    for words in ("it shows no certificate", "its certificate is of another authority", "it does not speak TLS"):
+    for words in (
+        "it shows no certificate",
+        "its certificate is of another authority",
+        "it does not speak TLS",
+    ):
         assert f"gate: refused a connection: {words}" in log
     assert re.search(rf"gate: the connection from {OTHER_ADDRESS}:\d+ was not let in", log)
     for key in keys:

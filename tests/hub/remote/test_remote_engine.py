@@ -42,14 +42,33 @@ def loaded(toys, tmp_path):
     return load_it
 
 
-ALONE = "\n".join(line for line in SCENARIO.splitlines() if "hand" not in line and "deaf" not in line) + "\norder: [near, far]\n"
+ALONE = (
+    "\n".join(line for line in SCENARIO.splitlines() if "hand" not in line and "deaf" not in line)
+    + "\norder: [near, far]\n"
+)
 
 
 def test_its_hashes_are_the_same(loaded, tmp_path):
     expected = launch(loaded(text=ALONE), endpoint=free_endpoint(range(1))).run()
     authority, endpoint = Authority.founded(tmp_path / "certs"), f"tls/127.0.0.1:{free_port()}"
-    session = launch(loaded("participants.far.host=remote", text=ALONE), endpoint=free_endpoint(range(1)), outside=[endpoint], certificates=authority.directory)
-    command = [sys.executable, "-P", "-m", "hub.command_line", "engine", "far", "--connect", endpoint, "--certs", authority.issued("far").file]
+    session = launch(
+        loaded("participants.far.host=remote", text=ALONE),
+        endpoint=free_endpoint(range(1)),
+        outside=[endpoint],
+        certificates=authority.directory,
+    )
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "hub.command_line",
+        "engine",
+        "far",
+        "--connect",
+        endpoint,
+        "--certs",
+        authority.issued("far").file,
+    ]
     starter = _Starter(session, command)
     summary = session.run()
     assert starter.process.wait(10) == 0
@@ -78,7 +97,9 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     assert set(seen.members) == {"hand", "deaf"}
     assert [port.name for port in seen.members["deaf"].ports] == ["hand"]
     assert (seen.links, len(seen.inlets)) == ((), 1)
-    membership = Membership(file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None)
+    membership = Membership(
+        file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None
+    )
     reply = membership.join(JoinRequest(host="remote/hand", pid=1))
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])
     assert reply.plan == seen
@@ -104,15 +125,31 @@ def test_rules_are_for_remote_participants_and_the_observer(loaded):
     assert names == ["hand", "observer"]
     rules = {rule["id"]: rule for rule in access["rules"]}
     assert set(rules) == {name for policy in access["policies"] for name in policy["rules"]}
-    of_hand = [rules[name] for policy in access["policies"] if policy["subjects"] == ["hand"] for name in policy["rules"]]
-    assert [rule["key_exprs"] for rule in of_hand if "put" in rule["messages"] and "ingress" in rule["flows"]] == [["trocar/apart/device/hand/**"]]
-    assert not [key for rule in of_hand for key in rule["key_exprs"] if "near" in key or "far" in key or key.endswith("hub/grant")]
+    of_hand = [
+        rules[name]
+        for policy in access["policies"]
+        if policy["subjects"] == ["hand"]
+        for name in policy["rules"]
+    ]
+    assert [
+        rule["key_exprs"] for rule in of_hand if "put" in rule["messages"] and "ingress" in rule["flows"]
+    ] == [["trocar/apart/device/hand/**"]]
+    assert not [
+        key
+        for rule in of_hand
+        for key in rule["key_exprs"]
+        if "near" in key or "far" in key or key.endswith("hub/grant")
+    ]
 
 
 def test_a_hub_without_a_certificate_does_not_listen_to_other_machines(loaded, tmp_path):
-    with pytest.raises(ConnectError, match=r"there is no certificate .*hub\.pem.*To make it: trocar certs init"):
+    with pytest.raises(
+        ConnectError, match=r"there is no certificate .*hub\.pem.*To make it: trocar certs init"
+    ):
         launch(loaded(), outside=["tls/0.0.0.0:7447"], certificates=tmp_path)
     authority = Authority.founded(tmp_path / "certs")
     authority.renewed(-0.01)
-    with pytest.raises(ConnectError, match=r"hub\.pem is not valid: certificate has expired.*trocar certs renew"):
+    with pytest.raises(
+        ConnectError, match=r"hub\.pem is not valid: certificate has expired.*trocar certs renew"
+    ):
         launch(loaded(), outside=["tls/0.0.0.0:7447"], certificates=authority.directory)

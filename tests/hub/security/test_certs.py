@@ -66,10 +66,14 @@ def test_a_new_certificate_of_the_hub_keeps_its_names_or_gets_others(authority):
 
 def test_an_expired_certificate_says_so_and_how_to_mend_it(authority):
     expired = authority.issued("touch", days=-0.01)
-    with pytest.raises(ConnectError, match=r"touch.pem is not valid: certificate has expired.*trocar certs issue touch"):
+    with pytest.raises(
+        ConnectError, match=r"touch.pem is not valid: certificate has expired.*trocar certs issue touch"
+    ):
         examine(expired)
     certs.renew(authority.directory, (), -0.01)
-    with pytest.raises(ConnectError, match=r"hub.pem is not valid: certificate has expired.*trocar certs renew"):
+    with pytest.raises(
+        ConnectError, match=r"hub.pem is not valid: certificate has expired.*trocar certs renew"
+    ):
         examine(authority.hub)
     with pytest.raises(ConnectError, match=r"trocar certs renew HOST"):
         certs.renew(authority.directory, (), 1)
@@ -94,7 +98,10 @@ def test_a_name_that_no_participant_can_have_gets_no_certificate(authority, name
 
 
 def test_what_is_missing_or_something_else_is_said_with_what_to_do(authority, tmp_path):
-    with pytest.raises(ConnectError, match=r"there is no certificate .*touch.pem.*trocar certs issue touch, on the hub's machine"):
+    with pytest.raises(
+        ConnectError,
+        match=r"there is no certificate .*touch.pem.*trocar certs issue touch, on the hub's machine",
+    ):
         load("touch", tmp_path)
     with pytest.raises(ConnectError, match=r"there is no certificate .*hub.pem.*trocar certs init"):
         load("hub", tmp_path)
@@ -130,7 +137,14 @@ def test_the_command_line_makes_and_shows_them(tmp_path):
     assert run(app, ["issue", "touch", "--days", "0", *place]).exit_code == 2  # and the one that works stays
     assert run(app, ["renew", *place]).exit_code == 0
     shown = run(app, ["show", *place]).output
-    for word in ("hub.example", "participant touch", "(29 days)", "(1 days)", "(396 days)", "reading the status"):
+    for word in (
+        "hub.example",
+        "participant touch",
+        "(29 days)",
+        "(1 days)",
+        "(396 days)",
+        "reading the status",
+    ):
         assert word in shown
     certs.issue(tmp_path / "certs", "touch", -0.01)
     assert "not valid" in run(app, ["show", *place]).output

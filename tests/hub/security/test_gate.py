@@ -37,18 +37,38 @@ PLAN = Plan(
             period=1,
             ports=(Port(name="pose", causality="output"), Port(name="contact", causality="input")),
         ),
-        "head": Member(name="head", kind="openxr", role="device", host="remote/head", period=1, ports=(Port(name="pose", causality="output"),)),
+        "head": Member(
+            name="head",
+            kind="openxr",
+            role="device",
+            host="remote/head",
+            period=1,
+            ports=(Port(name="pose", causality="output"),),
+        ),
         "robot": Member(
             name="robot",
             kind="mujoco",
             role="engine",
             host="robot",
             period=1,
-            ports=(Port(name="goal", causality="input"), Port(name="contact", causality="output"), Port(name="secret", causality="output")),
+            ports=(
+                Port(name="goal", causality="input"),
+                Port(name="contact", causality="output"),
+                Port(name="secret", causality="output"),
+            ),
         ),
-        "far": Member(name="far", kind="fmu", role="engine", host="remote/far", period=1, ports=(Port(name="in", causality="input"),)),
+        "far": Member(
+            name="far",
+            kind="fmu",
+            role="engine",
+            host="remote/far",
+            period=1,
+            ports=(Port(name="in", causality="input"),),
+        ),
     },
-    links=(Link(source="robot", source_port="contact", target="far", target_port="in", fresh=True, linear=False),),
+    links=(
+        Link(source="robot", source_port="contact", target="far", target_port="in", fresh=True, linear=False),
+    ),
     inlets=(Inlet(device="touch", device_port="pose", target="robot", target_port="goal", max_age_ns=0),),
     outlets=(Outlet(source="robot", source_port="contact", device="touch", device_port="contact"),),
     bonds=(),
@@ -58,7 +78,9 @@ FEED, OTHERS_FEED = (KEYS.signals("robot", device) for device in ("touch", "head
 
 
 class Hub:
-    """A hub's router with its gate, which listens to all of its session, says something on every key, and answers everybody."""
+    """A hub's router with its gate, which listens to all of its session, says something on every key, and
+    answers everybody.
+    """
 
     def __init__(self, directory):
         self.authority = Authority.founded(directory / "own")
@@ -68,8 +90,12 @@ class Hub:
         self.heard: list[str] = []
         self.router = open_session("router", listen=[inside])
         self.gate = Gate([self.endpoint], self.authority.hub.listening() | access_settings(PLAN, "s"))
-        self.router.declare_subscriber("**", Callback(lambda sample: self.heard.append(str(sample.key_expr)), indirect=False))
-        self.router.liveliness().declare_subscriber("**", Callback(lambda sample: self.heard.append(f"alive: {sample.key_expr}"), indirect=False))
+        self.router.declare_subscriber(
+            "**", Callback(lambda sample: self.heard.append(str(sample.key_expr)), indirect=False)
+        )
+        self.router.liveliness().declare_subscriber(
+            "**", Callback(lambda sample: self.heard.append(f"alive: {sample.key_expr}"), indirect=False)
+        )
         self.router.declare_queryable(f"{KEYS.prefix}/**", Callback(self._answer))
         self.token = self.router.liveliness().declare_token(KEYS.alive("hub", "hub"))
         self.gate.open(inside)
@@ -80,14 +106,28 @@ class Hub:
             query.reply(str(query.key_expr).replace("/*/", "/s/", 1), b"a secret")
 
     def say(self):
-        for key in (CONTACT, FEED, OTHERS_FEED, SECRET, KEYS.grant, KEYS.status, KEYS.link("touch"), KEYS.link("head"), KEYS.output("device", "head", "pose")):
+        for key in (
+            CONTACT,
+            FEED,
+            OTHERS_FEED,
+            SECRET,
+            KEYS.grant,
+            KEYS.status,
+            KEYS.link("touch"),
+            KEYS.link("head"),
+            KEYS.output("device", "head", "pose"),
+        ):
             self.router.put(key, b"said")
 
     @contextmanager
     def client(self, credentials, protocol="tls", mode="client"):
         """Connect; raises ConnectError after a moment."""
         settings = {} if credentials is None else credentials.connecting()
-        with open_session(mode, connect=[f"{protocol}/127.0.0.1:{self.port}"], security=settings | {"connect/timeout_ms": 300}) as session:
+        with open_session(
+            mode,
+            connect=[f"{protocol}/127.0.0.1:{self.port}"],
+            security=settings | {"connect/timeout_ms": 300},
+        ) as session:
             yield session
 
     def close(self):
@@ -128,7 +168,11 @@ def wait_for(true):
 def hears(session, key):
     """Return the list to which the keys are added that come to a subscriber of `key`."""
     heard = []
-    session.declare_subscriber(key, Callback(lambda sample: heard.append(str(sample.key_expr)), indirect=False), allowed_origin=zenoh.Locality.REMOTE)
+    session.declare_subscriber(
+        key,
+        Callback(lambda sample: heard.append(str(sample.key_expr)), indirect=False),
+        allowed_origin=zenoh.Locality.REMOTE,
+    )
     return heard
 
 
@@ -142,14 +186,22 @@ def test_a_device_does_its_part(hub, told, caplog):
         assert asks(touch, Keys("*").join("remote/touch")) == [KEYS.join("remote/touch")]
         assert asks(touch, KEYS.control("clock")) == [KEYS.control("clock")]
         contact, link, alive = hears(touch, FEED), hears(touch, KEYS.link("touch")), []
-        touch.liveliness().declare_subscriber(KEYS.alive("hub", "hub"), Callback(lambda sample: alive.append(sample.kind)), history=True)
+        touch.liveliness().declare_subscriber(
+            KEYS.alive("hub", "hub"), Callback(lambda sample: alive.append(sample.kind)), history=True
+        )
         touch.liveliness().declare_token(KEYS.alive("device", "touch"))
         sleep(0.1)
         hub.say()
-        for key in (KEYS.output("device", "touch", "pose"), KEYS.device_status("touch"), KEYS.refused("device", "touch")):
+        for key in (
+            KEYS.output("device", "touch", "pose"),
+            KEYS.device_status("touch"),
+            KEYS.refused("device", "touch"),
+        ):
             touch.put(key, b"x")
             wait_for(lambda key=key: key in hub.heard)
-        wait_for(lambda: f"alive: {KEYS.alive('device', 'touch')}" in hub.heard and contact and link and alive)
+        wait_for(
+            lambda: f"alive: {KEYS.alive('device', 'touch')}" in hub.heard and contact and link and alive
+        )
     sleep(0.5)
     assert not [line for line in caplog.messages if "refused" in line or "not let in" in line]
 
@@ -177,13 +229,19 @@ def test_an_observer_reads_the_status_and_nothing_else(hub, told):
 
 FORBIDDEN = {
     "the output of another device": lambda session: session.put(KEYS.output("device", "head", "pose"), b"x"),
-    "the output of another device, declared first": lambda session: session.declare_publisher(KEYS.output("device", "head", "pose")).put(b"x"),
+    "the output of another device, declared first": (
+        lambda session: session.declare_publisher(KEYS.output("device", "head", "pose")).put(b"x")
+    ),
     "the output of an engine": lambda session: session.put(SECRET, b"x"),
     "the report of an engine": lambda session: session.put(KEYS.ack("robot"), b"x"),
     "a grant": lambda session: session.put(KEYS.grant, b"x"),
-    "the life of another device": lambda session: session.liveliness().declare_token(KEYS.alive("device", "head")),
+    "the life of another device": (
+        lambda session: session.liveliness().declare_token(KEYS.alive("device", "head"))
+    ),
     "another session": lambda session: session.put(Keys("t").output("device", "touch", "pose"), b"x"),
-    "an answer": lambda session: session.declare_queryable(KEYS.control("pause"), Callback(lambda query: query.drop())),
+    "an answer": lambda session: session.declare_queryable(
+        KEYS.control("pause"), Callback(lambda query: query.drop())
+    ),
 }
 ASKED = [
     KEYS.control("shutdown"),
@@ -195,7 +253,17 @@ ASKED = [
     "trocar/**",
     "@/*/router/**",
 ]
-READ = [OTHERS_FEED, CONTACT, SECRET, KEYS.grant, KEYS.status, KEYS.link("head"), KEYS.output("device", "head", "pose"), "trocar/**", "**"]
+READ = [
+    OTHERS_FEED,
+    CONTACT,
+    SECRET,
+    KEYS.grant,
+    KEYS.status,
+    KEYS.link("head"),
+    KEYS.output("device", "head", "pose"),
+    "trocar/**",
+    "**",
+]
 
 
 @pytest.mark.parametrize("deed", FORBIDDEN)
@@ -204,7 +272,8 @@ def test_a_device_says_nothing_in_the_place_of_others(hub, told, deed):
         hub.heard.clear()
         kept = FORBIDDEN[deed](touch)
         told("refused to 'touch' at 127.0.0.1:")
-        touch.put(KEYS.output("device", "touch", "pose"), b"x")  # what comes after it is heard, so what came before it was not
+        # what comes after it is heard, so what came before it was not
+        touch.put(KEYS.output("device", "touch", "pose"), b"x")
         wait_for(lambda: KEYS.output("device", "touch", "pose") in hub.heard)
         assert set(hub.heard) == {KEYS.output("device", "touch", "pose")}
         del kept
@@ -233,17 +302,25 @@ def test_a_device_hears_nothing_that_is_not_for_it(hub, told, key):
 def test_who_does_not_come_as_a_client_may_do_no_more(hub, told, mode):
     with hub.client(hub.authority.issued("touch"), mode=mode) as touch:
         heard, alive = hears(touch, "**"), []
-        touch.liveliness().declare_subscriber("**", Callback(lambda sample: alive.append(str(sample.key_expr))), history=True)
+        touch.liveliness().declare_subscriber(
+            "**", Callback(lambda sample: alive.append(str(sample.key_expr))), history=True
+        )
         told("refused to 'touch' at 127.0.0.1:", "declare subscriber on **")
         hub.say()
         hub.heard.clear()
-        for key in (SECRET, KEYS.grant, KEYS.output("device", "head", "pose"), KEYS.output("device", "touch", "pose")):
+        for key in (
+            SECRET,
+            KEYS.grant,
+            KEYS.output("device", "head", "pose"),
+            KEYS.output("device", "touch", "pose"),
+        ):
             touch.put(key, b"x")
         touch.liveliness().declare_token(KEYS.alive("device", "head"))
         assert asks(touch, KEYS.control("shutdown")) == []
         sleep(0.3)
         assert heard == []
-        assert set(alive) <= {KEYS.alive("hub", "hub"), KEYS.alive("device", "head")}  # what it may see, and what it said itself
+        # what it may see, and what it said itself
+        assert set(alive) <= {KEYS.alive("hub", "hub"), KEYS.alive("device", "head")}
         assert set(hub.heard) <= {KEYS.output("device", "touch", "pose")}
 
 
@@ -306,7 +383,10 @@ def test_plain_tcp_opens_nothing(hub, told):
 def test_nobody_without_a_certificate_gets_in(hub, told):
     context = ssl.create_default_context(cadata=hub.authority.hub.authority)
     plain = socket.create_connection(("127.0.0.1", hub.port))
-    with context.wrap_socket(plain, server_hostname="127.0.0.1") as secure, pytest.raises(ssl.SSLError, match="CERTIFICATE_REQUIRED"):
+    with (
+        context.wrap_socket(plain, server_hostname="127.0.0.1") as secure,
+        pytest.raises(ssl.SSLError, match="CERTIFICATE_REQUIRED"),
+    ):
         secure.recv(1)
     told("refused a connection: it shows no certificate")
 
@@ -339,7 +419,10 @@ def _opens(hub):
 def test_a_gate_that_cannot_listen_says_so(tmp_path):
     authority, inside = Authority.founded(tmp_path), free_endpoint(range(1))
     with socket.create_server(("127.0.0.1", 0)) as taken, open_session("router", listen=[inside]):
-        gate = Gate([f"tls/127.0.0.1:{taken.getsockname()[1]}"], authority.hub.listening() | access_settings(PLAN, "s"))
+        gate = Gate(
+            [f"tls/127.0.0.1:{taken.getsockname()[1]}"],
+            authority.hub.listening() | access_settings(PLAN, "s"),
+        )
         with pytest.raises(ConnectError, match=r"cannot listen on tls/127\.0\.0\.1"):
             gate.open(inside)
         gate.close()

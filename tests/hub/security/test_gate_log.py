@@ -1,4 +1,6 @@
-"""What is made of the lines of Zenoh's log; that they are still as they were, the tests of the gate itself show."""
+"""What is made of the lines of Zenoh's log; that they are still as they were, the tests of the gate itself
+show.
+"""
 
 import logging
 
@@ -6,13 +8,26 @@ import pytest
 
 from hub.security.gate_log import GateLog
 
-ZENOH = "2026-11-21T18:48:20.1Z \x1b[33m{level}\x1b[0m  rx-1 ThreadId({thread}) \x1b[2mzenoh{module}\x1b[0m: {text}"
-KINDS = ("Query", "Reply", "Put", "Delete", "Declare/Undeclare Subscriber", "Declare/Undeclare Queryable", "Declare/Undeclare Liveliness Token")
+ZENOH = (
+    "2026-11-21T18:48:20.1Z \x1b[33m{level}\x1b[0m  rx-1 ThreadId({thread}) \x1b[2mzenoh{module}\x1b[0m:"
+    " {text}"
+)
+KINDS = (
+    "Query",
+    "Reply",
+    "Put",
+    "Delete",
+    "Declare/Undeclare Subscriber",
+    "Declare/Undeclare Queryable",
+    "Declare/Undeclare Liveliness Token",
+)
 KINDS += ("Liveliness Query", "Declare Liveliness Subscriber")
 
 
 def rule(text, thread=1):
-    return ZENOH.format(level="TRACE", thread=thread, module="::net::routing::interceptor::access_control", text=text)
+    return ZENOH.format(
+        level="TRACE", thread=thread, module="::net::routing::interceptor::access_control", text=text
+    )
 
 
 def tls(text, level="WARN"):
@@ -52,7 +67,10 @@ def test_who_connects_is_told_with_name_and_address():
 @pytest.mark.parametrize(
     ("zenoh", "ours"),
     [
-        ("invalid peer certificate: UnknownIssuer. Hint: increase the system open file limit.", "its certificate is of another authority"),
+        (
+            "invalid peer certificate: UnknownIssuer. Hint: increase the system open file limit.",
+            "its certificate is of another authority",
+        ),
         ("peer sent no certificates. Hint: increase the system open file limit.", "it shows no certificate"),
         ("something new. Hint: increase the system open file limit.", "something new"),
     ],
@@ -65,7 +83,10 @@ def test_a_refusal_is_told_once_in_a_connection():
     lines = [came("touch"), *[verdict("Put", "trocar/s/hub/grant")] * 3]
     cached = rule("Using cached result: abc1 is unauthorized to Put (ingress) on trocar/s/hub/grant")
     told = [message for _, message in read(*lines, cached)]
-    assert told == ["'touch' connects from 10.0.0.2:40000", "refused to 'touch' at 10.0.0.2:40000: to put on trocar/s/hub/grant"]
+    assert told == [
+        "'touch' connects from 10.0.0.2:40000",
+        "refused to 'touch' at 10.0.0.2:40000: to put on trocar/s/hub/grant",
+    ]
     assert len(read(*lines, *lines)) == 4
 
 
@@ -75,19 +96,30 @@ def test_what_is_allowed_or_kept_from_somebody_is_not_told():
 
 def test_to_name_a_key_of_ones_own_is_no_try():
     for flow in ("ingress", "egress"):
-        assert read(came("touch"), *named("trocar/s/device/touch/out/pose", [(flow, "Put")]), verdict("Put", "b", may=True))[1:] == []
+        assert (
+            read(
+                came("touch"),
+                *named("trocar/s/device/touch/out/pose", [(flow, "Put")]),
+                verdict("Put", "b", may=True),
+            )[1:]
+            == []
+        )
 
 
 def test_to_name_a_key_of_others_is_one():
     told = [message for _, message in read(came("touch"), *named("trocar/s/device/head/out/pose"))[1:]]
-    assert told == ["refused to 'touch' at 10.0.0.2:40000: to say or hear anything on trocar/s/device/head/out/pose"]
+    assert told == [
+        "refused to 'touch' at 10.0.0.2:40000: to say or hear anything on trocar/s/device/head/out/pose"
+    ]
 
 
 def test_threads_do_not_mix():
     own = named("own", [("ingress", "Put")], thread=1)
     others = named("others", thread=2)
     lines = [line for pair in zip(own, others, strict=True) for line in pair]
-    assert [message for _, message in read(came("touch"), *lines)[1:]] == ["refused to 'touch' at 10.0.0.2:40000: to say or hear anything on others"]
+    assert [message for _, message in read(came("touch"), *lines)[1:]] == [
+        "refused to 'touch' at 10.0.0.2:40000: to say or hear anything on others"
+    ]
 
 
 def test_a_flood_of_refusals_is_not_told_to_its_end():
@@ -110,4 +142,6 @@ def test_a_connection_that_ended_was_let_in_or_not():
     log = GateLog(["touch"])
     list(log.read(came("touch")))
     assert list(log.ended("10.0.0.2:40000")) == []
-    assert list(log.ended("10.0.0.2:40001")) == [(logging.WARNING, "the connection from 10.0.0.2:40001 was not let in")]
+    assert list(log.ended("10.0.0.2:40001")) == [
+        (logging.WARNING, "the connection from 10.0.0.2:40001 was not let in")
+    ]

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hub.session.clock import Clock
 from hub.session import clock as module
+from hub.session.clock import Clock
 from tests.hub.parts import Part, Stylus, into, out, plan_of
 
 MS = 1_000_000
@@ -15,7 +15,13 @@ def plan(*periods):
     """A plan with participants of these periods that listen to a device."""
     listeners = [Part(f"p{period}", into()) for period in periods]
     specs = {f"p{period}": {"period": f"{period} ms"} for period in periods}
-    return plan_of(Stylus("s", out()), Part("other", out()), *listeners, specs=specs, connections=[f"s.out -> p{period}.in" for period in periods])
+    return plan_of(
+        Stylus("s", out()),
+        Part("other", out()),
+        *listeners,
+        specs=specs,
+        connections=[f"s.out -> p{period}.in" for period in periods],
+    )
 
 
 @given(st.sets(st.integers(1, 6), max_size=3), st.integers(1, 12), st.integers(1, 60), st.data())
@@ -43,7 +49,13 @@ def test_a_run_without_an_end_is_never_done():
 
 @pytest.mark.parametrize(
     ("step", "realtime", "host", "count"),
-    [("1 ms", False, "hub", 10), ("4 ms", False, "hub", 2), ("20 ms", False, "hub", 1), ("1 ms", True, "hub", 1), ("1 ms", False, "far", 1)],
+    [
+        ("1 ms", False, "hub", 10),
+        ("4 ms", False, "hub", 2),
+        ("20 ms", False, "hub", 1),
+        ("1 ms", True, "hub", 1),
+        ("1 ms", False, "far", 1),
+    ],
 )
 def test_a_grant_covers_10_ms_where_nobody_says_and_nothing_enters(step, realtime, host, count):
     quiet = plan_of(Part("one", out()), Part("other", out()), specs={"other": {"host": host}}, step=step)

@@ -63,7 +63,10 @@ def steer(prepare):
         thread = threading.Thread(target=lambda: outcome.append(session.run()))
         thread.start()
         try:
-            while not any(status.state == "paused" if paused else status.step for status in live_sessions([session.endpoint])):
+            while not any(
+                status.state == "paused" if paused else status.step
+                for status in live_sessions([session.endpoint])
+            ):
                 sleep(0.05)
             with open_session("client", connect=[session.endpoint]) as client:
                 yield Console(session, client, thread), outcome
@@ -130,14 +133,23 @@ def test_what_cannot_be_set_is_refused_with_the_reason(steer, participant, port,
 
 def test_strangers_may_not_join(steer):
     with steer() as (console, _):
-        for host, message in (("nowhere", "has no host 'nowhere'; it has other"), ("hub", "no host 'hub'"), ("other", "is here already, as process")):
+        for host, message in (
+            ("nowhere", "has no host 'nowhere'; it has other"),
+            ("hub", "no host 'hub'"),
+            ("other", "is here already, as process"),
+        ):
             with pytest.raises(MessageError, match=message):
                 console.ask(f"join/{host}", JoinRequest(host=host, pid=1), JoinReply)
 
 
 def test_a_host_joins_under_its_own_name_and_need_not_know_the_session(steer):
     with steer() as (console, _):
-        with pytest.raises(MessageError, match="belongs on trocar/steered/control/join/there, and came on trocar/steered/control/join/other"):
+        with pytest.raises(
+            MessageError,
+            match=(
+                "belongs on trocar/steered/control/join/there, and came on trocar/steered/control/join/other"
+            ),
+        ):
             console.ask("join/other", JoinRequest(host="there", pid=1), JoinReply)
         with pytest.raises(MessageError, match="is here already, as process"):
             ask(console._client, Keys("*").join("other"), JoinRequest(host="other", pid=1), JoinReply)
@@ -148,7 +160,13 @@ def test_status_says_who_lives_where(steer):
         console.ask("pause")
         status = console.until(lambda s: s.state == "paused")
         here, there = status.participants
-    assert (status.session, here.name, here.host, there.name, there.host) == ("steered", "here", "hub", "there", "other")
+    assert (status.session, here.name, here.host, there.name, there.host) == (
+        "steered",
+        "here",
+        "hub",
+        "there",
+        "other",
+    )
     assert here.pid != there.pid
     assert here.step == there.step == status.step - 1
     assert status.sim_time_ns == status.step * 1_000_000

@@ -1,4 +1,6 @@
-"""Bad days: whoever fails is named with the step, the recording is closed and readable, and nothing is left behind."""
+"""Bad days: whoever fails is named with the step, the recording is closed and readable, and nothing is left
+behind.
+"""
 
 from pathlib import Path
 from time import monotonic_ns
@@ -22,7 +24,10 @@ connections:
   - source.out -> bad.a
   - bad.out -> sink.a
 """
-BAD_AWAY, ALL_AWAY = ["participants.bad.host=other"], [f"participants.{name}.host=other" for name in ("source", "bad", "sink")]
+BAD_AWAY, ALL_AWAY = (
+    ["participants.bad.host=other"],
+    [f"participants.{name}.host=other" for name in ("source", "bad", "sink")],
+)
 THREE_HOSTS = ["participants.source.host=one", "participants.bad.host=two", "participants.sink.host=three"]
 PLACEMENTS = {"hub": [], "process": BAD_AWAY, "one process": ALL_AWAY, "three processes": THREE_HOSTS}
 CAUSES = {
@@ -62,10 +67,19 @@ def fail(prepare, tmp_path, caplog):
 
 
 @pytest.mark.parametrize(
-    ("how", "placement"), [*(("raise", placement) for placement in PLACEMENTS), ("nan", "hub"), ("nan", "process"), ("shape", "hub"), ("shape", "one process")]
+    ("how", "placement"),
+    [
+        *(("raise", placement) for placement in PLACEMENTS),
+        ("nan", "hub"),
+        ("nan", "process"),
+        ("shape", "hub"),
+        ("shape", "one process"),
+    ],
 )
 def test_a_participant_that_goes_wrong_is_named_with_step_and_cause(fail, how, placement):
-    error = fail(TRIO, f"participants.bad.how={how}", "participants.bad.at=7", "window=3", *PLACEMENTS[placement])
+    error = fail(
+        TRIO, f"participants.bad.how={how}", "participants.bad.at=7", "window=3", *PLACEMENTS[placement]
+    )
     assert (error.participant, error.step) == ("bad", 7)
     assert CAUSES[how] in str(error)
 
@@ -95,14 +109,24 @@ def test_a_participant_that_cannot_be_configured(fail, placement):
 
 @pytest.mark.parametrize("placement", PLACEMENTS)
 def test_a_participant_that_hangs(fail, placement):
-    error = fail(TRIO, "participants.bad.how=hang", "participants.bad.at=7", "answer_limit=2 s", *PLACEMENTS[placement])
+    error = fail(
+        TRIO, "participants.bad.how=hang", "participants.bad.at=7", "answer_limit=2 s", *PLACEMENTS[placement]
+    )
     assert (error.participant, error.step) == ("bad", 7)
     assert "not answered for 2 s (answer_limit)" in str(error)
 
 
-@pytest.mark.parametrize(("placement", "step"), [("process", 18), ("one process", 20), ("three processes", 0)])
+@pytest.mark.parametrize(
+    ("placement", "step"), [("process", 18), ("one process", 20), ("three processes", 0)]
+)
 def test_a_killed_process(fail, tmp_path, placement, step):
-    error = fail(TRIO, "participants.bad.how=kill", f"participants.bad.at={step}", f"participants.bad.stamp={tmp_path / 'killed'}", *PLACEMENTS[placement])
+    error = fail(
+        TRIO,
+        "participants.bad.how=kill",
+        f"participants.bad.at={step}",
+        f"participants.bad.stamp={tmp_path / 'killed'}",
+        *PLACEMENTS[placement],
+    )
     told_ms = (monotonic_ns() - int((tmp_path / "killed").read_text())) / 1e6
     assert error.step == step
     assert "killed by SIGKILL" in str(error)

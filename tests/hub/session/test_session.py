@@ -51,7 +51,11 @@ measure:
   mixed: {kind: mean, of: two.out}
 """
 
-ONE, OTHER, THIRD = ("rare", "two", "listener", "slow_talker", "follower"), ("five", "talker", "slow_follower", "ledger"), ("fast", "other_listener")
+ONE, OTHER, THIRD = (
+    ("rare", "two", "listener", "slow_talker", "follower"),
+    ("five", "talker", "slow_follower", "ledger"),
+    ("fast", "other_listener"),
+)
 
 
 def _on(host, names):
@@ -84,7 +88,12 @@ def reference(prepare):
     ],
 )
 def test_the_same_hashes_wherever_participants_run(prepare, reference, tmp_path, placement, window, recorded):
-    session = prepare(NETWORK, f"window={window}", *PLACEMENTS[placement], record=tmp_path / "recording" if recorded else None)
+    session = prepare(
+        NETWORK,
+        f"window={window}",
+        *PLACEMENTS[placement],
+        record=tmp_path / "recording" if recorded else None,
+    )
     summary = session.run()
     assert (summary.state, summary.steps, summary.dropped_messages) == ("done", 60, 0)
     assert summary.state_hash == reference.state_hash
@@ -102,8 +111,15 @@ def test_every_event_arrives_and_silence_is_marked(reference):
 
 
 def test_a_change_of_wiring_changes_the_hashes(prepare, reference):
-    for wiring in ("order=[rare, fast, two, five]", "connections.5.extrapolation=hold", "connections.0.extrapolation=linear", "algorithm=jacobi"):
-        text = NETWORK.replace("- fast.out -> rare.a", "- {source: fast.out, target: rare.b}").replace("five.out -> rare.b", "five.out -> rare.a")
+    for wiring in (
+        "order=[rare, fast, two, five]",
+        "connections.5.extrapolation=hold",
+        "connections.0.extrapolation=linear",
+        "algorithm=jacobi",
+    ):
+        text = NETWORK.replace("- fast.out -> rare.a", "- {source: fast.out, target: rare.b}").replace(
+            "five.out -> rare.b", "five.out -> rare.a"
+        )
         assert prepare(text, wiring).run().state_hash != reference.state_hash
 
 

@@ -52,7 +52,12 @@ class Hub:
         self.recording = directory / "recording"
         run = ["run", "session.yaml", "--listen", self.endpoint, "--record", "recording"]
         self.errors = (directory / "stderr").open("w+")
-        self.process = subprocess.Popen([sys.executable, "-P", "-m", "hub.command_line", *run], cwd=directory, stderr=self.errors, **options)
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "hub.command_line", *run],
+            cwd=directory,
+            stderr=self.errors,
+            **options,
+        )
 
     @property
     def recorded(self):

@@ -1,4 +1,6 @@
-"""What the signals of a participant are for a device: together in one message, and nothing else than was sent."""
+"""What the signals of a participant are for a device: together in one message, and nothing else than was
+sent.
+"""
 
 import time
 
@@ -56,6 +58,11 @@ def test_bytes_that_are_none_are_refused(bundle, cut, where):
 def test_both_ends_count_the_same_connections():
     arm = Part("arm", out("a"), out("b"), out("e", variability="event"))
     console = Stylus("console", into("x"), into("y"), into("z", variability="event"))
-    plan = plan_of(arm, console, connections=["arm.b -> console.x", "arm.e -> console.z", "arm.a -> console.y"])
-    assert [(k.source_port, k.device_port) for k in bundled(plan, "arm", "console")] == [("b", "x"), ("a", "y")]
+    plan = plan_of(
+        arm, console, connections=["arm.b -> console.x", "arm.e -> console.z", "arm.a -> console.y"]
+    )
+    assert [(k.source_port, k.device_port) for k in bundled(plan, "arm", "console")] == [
+        ("b", "x"),
+        ("a", "y"),
+    ]
     assert bundled(plan, "arm", "other") == []

@@ -43,17 +43,24 @@ def test_the_hub_stays_on_loopback_beside_its_gate(taken):
     assert outside == ["tls/0.0.0.0:7447"]
     assert is_loopback(inside)
     assert endpoint.address(inside)[1] != 7447
-    assert endpoint.parted(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == ("tcp/127.0.0.1:5", ["tls/0.0.0.0:6", "tls/[::]:6"])
+    assert endpoint.parted(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == (
+        "tcp/127.0.0.1:5",
+        ["tls/0.0.0.0:6", "tls/[::]:6"],
+    )
     with pytest.raises(ScenarioError, match="once on loopback"):
         endpoint.parted(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
 
 
-@pytest.mark.parametrize(("where", "parts"), [("tls/hub.example:7447", ("hub.example", 7447)), ("tcp/[::1]:80", ("::1", 80))])
+@pytest.mark.parametrize(
+    ("where", "parts"), [("tls/hub.example:7447", ("hub.example", 7447)), ("tcp/[::1]:80", ("::1", 80))]
+)
 def test_an_endpoint_has_a_host_and_a_port(where: str, parts: tuple[str, int]) -> None:
     assert endpoint.address(where) == parts
 
 
-@pytest.mark.parametrize("where", ["hub.example:7447", "tls/hub.example", "tls/:7447", "tls/hub.example:port"])
+@pytest.mark.parametrize(
+    "where", ["hub.example:7447", "tls/hub.example", "tls/:7447", "tls/hub.example:port"]
+)
 def test_what_is_no_endpoint_is_refused_with_an_example(where: str) -> None:
     with pytest.raises(ScenarioError, match="write tls/HOST:PORT"):
         endpoint.address(where)
@@ -64,7 +71,17 @@ def test_a_hub_may_listen_on_loopback(where: str) -> None:
     assert require_loopback(where) == where
 
 
-@pytest.mark.parametrize("where", ["tcp/0.0.0.0:7447", "tcp/192.168.1.2:7447", "tcp/[::]:7447", "udp/127.0.0.1:7447", "tcp/hub:7447", "nonsense"])
+@pytest.mark.parametrize(
+    "where",
+    [
+        "tcp/0.0.0.0:7447",
+        "tcp/192.168.1.2:7447",
+        "tcp/[::]:7447",
+        "udp/127.0.0.1:7447",
+        "tcp/hub:7447",
+        "nonsense",
+    ],
+)
 def test_a_hub_does_not_listen_elsewhere(where: str) -> None:
     with pytest.raises(ScenarioError, match="a hub listens on loopback"):
         require_loopback(where)

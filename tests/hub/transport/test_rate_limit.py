@@ -18,6 +18,8 @@ def test_never_more_than_those_of_a_second_at_once_and_the_rate_after_it(pauses,
 
 def test_a_flood_is_held_to_the_rate_and_what_keeps_to_it_all_comes():
     allowance = Allowance(100.0)
-    assert sum(allowance.spend(5 * S + i * 100_000) for i in range(30_000)) == pytest.approx(100 + 3 * 100, abs=2)
+    assert sum(allowance.spend(5 * S + i * 100_000) for i in range(30_000)) == pytest.approx(
+        100 + 3 * 100, abs=2
+    )
     allowance = Allowance(100.0)
     assert all(allowance.spend(5 * S + i * 10_000_000) for i in range(1000))

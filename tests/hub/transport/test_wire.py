@@ -1,4 +1,6 @@
-"""What a stranger on the network can send to a running session: it is counted, logged and dropped, and changes nothing."""
+"""What a stranger on the network can send to a running session: it is counted, logged and dropped, and
+changes nothing.
+"""
 
 import logging
 import struct
@@ -47,7 +49,10 @@ measure:
 PREFIX = "trocar/target"
 HEARD = [
     f"{PREFIX}/hub/grant",
-    *(f"{PREFIX}/engine/{name}/ack" for name in ("away", "talker", "far_listener", "follower", "nobody", "hub")),
+    *(
+        f"{PREFIX}/engine/{name}/ack"
+        for name in ("away", "talker", "far_listener", "follower", "nobody", "hub")
+    ),
     *(f"{PREFIX}/engine/{port}" for port in ("talker/out/words", "far_listener/out/heard")),
     *(f"{PREFIX}/device/idle_player/out/{port}" for port in ("hand", "buttons")),
 ]
@@ -72,13 +77,22 @@ _POSE = encode(PoseStamped(header=Header(frame_id="stylus_base")))
 _ELSEWHERE = encode(PoseStamped(header=Header(frame_id="elsewhere")))
 _JOY = encode(Joy(buttons=np.array([3], np.int32)))
 BAD_SAMPLES = {
-    "hand": [_POSE[:-1], _POSE + bytes(9), _POSE[:-8] + struct.pack("<d", float("nan")), _POSE[:-8] + bytes(8), _ELSEWHERE, _JOY],
+    "hand": [
+        _POSE[:-1],
+        _POSE + bytes(9),
+        _POSE[:-8] + struct.pack("<d", float("nan")),
+        _POSE[:-8] + bytes(8),
+        _ELSEWHERE,
+        _JOY,
+    ],
     "buttons": [_JOY[:-1], _JOY + bytes(9), _POSE],
 }
 
 
 class Stranger:
-    """A client that listens to a session and sends it garbage, and real messages cut short or filled with NaN."""
+    """A client that listens to a session and sends it garbage, and real messages cut short or filled with
+    NaN.
+    """
 
     def __init__(self, session: zenoh.Session):
         self._session = session
@@ -123,7 +137,12 @@ class Stranger:
         """Send the newest real messages again: without their end, with a NaN at their end, and with a tail."""
         for key, sample in list(self._newest.items()):
             payload = sample.payload.to_bytes()
-            for distorted in (payload[:-1], payload[: len(payload) // 2], payload[:-8] + struct.pack("<d", float("nan")), payload + b"\x00" * 9):
+            for distorted in (
+                payload[:-1],
+                payload[: len(payload) // 2],
+                payload[:-8] + struct.pack("<d", float("nan")),
+                payload + b"\x00" * 9,
+            ):
                 if key in HEARD and distorted and distorted != payload:
                     self._session.put(key, distorted, attachment=sample.attachment)
 
@@ -177,7 +196,11 @@ def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, caplog
     assert summary.measures == undisturbed.measures
     assert summary.dropped_messages > 1000
     log = caplog.text + capfd.readouterr().err
-    missing = [key for key in (*HEARD, *(f"{PREFIX}/control/{verb}" for verb in VERBS)) if f"dropped a message on {key}" not in log]
+    missing = [
+        key
+        for key in (*HEARD, *(f"{PREFIX}/control/{verb}" for verb in VERBS))
+        if f"dropped a message on {key}" not in log
+    ]
     assert missing == []
     assert [grant.step for grant in Recording(tmp_path / "recording").grants()] == list(range(400))
 

@@ -1,4 +1,6 @@
-"""Bags both ways: a session that a program has driven becomes a bag with ROS names, and the bag drives a new session, to the same bits."""
+"""Bags both ways: a session that a program has driven becomes a bag with ROS names, and the bag drives a new
+session, to the same bits.
+"""
 
 import json
 import subprocess
@@ -61,7 +63,9 @@ GOALS = [0.02, -0.01, 0.125, 0.05, 0.0, 0.1]
 
 
 def recorded(directory, device, connections="", *, pace="fast", duration="20 s", drive=None):
-    """Run the scenario with `device` as `ros`, and return its recording; `drive` gets the hub's endpoint, in a thread."""
+    """Run the scenario with `device` as `ros`, and return its recording; `drive` gets the hub's endpoint, in
+    a thread.
+    """
     directory.mkdir()
     file = directory / "bags.yaml"
     file.write_text(SCENARIO.format(device=device, pace=pace, duration=duration) + connections)
@@ -89,12 +93,20 @@ def operate(endpoint):
     """Home the arm, move it, lead it, close the jaw; and send what must be refused."""
     heard = []
     sec, nanosec = divmod(time.time_ns(), 10**9)
-    home = {"header": {"stamp": {"sec": sec + 60, "nanosec": nanosec}, "frame_id": ""}, "string": "home"}  # a console machine whose clock is fast
+    # a console machine whose clock is fast
+    home = {"header": {"stamp": {"sec": sec + 60, "nanosec": nanosec}, "frame_id": ""}, "string": "home"}
     assert until(lambda: reachable(endpoint), 20.0), "no hub"
     with Peer(endpoint) as program:
-        program.listen("/PSM1/operating_state", STATE_TYPE, lambda message, _: heard.append((message.state, message.is_homed, message.is_busy)), latched=True)
+        program.listen(
+            "/PSM1/operating_state",
+            STATE_TYPE,
+            lambda message, _: heard.append((message.state, message.is_homed, message.is_busy)),
+            latched=True,
+        )
         command = program.publisher("/PSM1/state_command", "crtk_msgs/msg/StringStamped")
-        move, servo, jaw = (program.publisher(f"/PSM1/{name}", JOINTS) for name in ("move_jp", "servo_jp", "jaw/servo_jp"))
+        move, servo, jaw = (
+            program.publisher(f"/PSM1/{name}", JOINTS) for name in ("move_jp", "servo_jp", "jaw/servo_jp")
+        )
         assert until(lambda: heard, 20.0), "no state came"
         command(built(TYPES, "crtk_msgs/msg/StringStamped", home))
         assert until(lambda: ("ENABLED", True, False) in heard, 20.0), heard
@@ -107,7 +119,9 @@ def operate(endpoint):
         for k in range(20):
             servo(joints([GOALS[0] + 0.001 * k, *GOALS[1:]]))
             time.sleep(0.005)
-        time.sleep(0.1)  # what enters at the very last communication point is of no effect, and no other session has that point
+        # what enters at the very last communication point is of no effect, and no other session has that
+        # point
+        time.sleep(0.1)
 
 
 def reachable(endpoint):
@@ -122,7 +136,13 @@ def reachable(endpoint):
 def driven(tmp_path_factory):
     """The recording of a session that a program has driven through a gateway."""
     gateway = "{kind: ros2-zenoh, mounting: cart, arms: *psm, cameras: []}"
-    return recorded(tmp_path_factory.mktemp("bags") / "driven", gateway, "  - motion.* -> ros.*\n", pace="realtime", drive=operate)
+    return recorded(
+        tmp_path_factory.mktemp("bags") / "driven",
+        gateway,
+        "  - motion.* -> ros.*\n",
+        pace="realtime",
+        drive=operate,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -140,15 +160,25 @@ def messages(bag, *topics):
     with AnyReader([bag]) as reader:
         wanted = [connection for connection in reader.connections if connection.topic in topics]
         read = reader.messages(wanted) if wanted else ()
-        return [(c.topic, (time_ns - reader.start_time) * 1e-9, reader.deserialize(payload, c.msgtype)) for c, time_ns, payload in read]
+        return [
+            (c.topic, (time_ns - reader.start_time) * 1e-9, reader.deserialize(payload, c.msgtype))
+            for c, time_ns, payload in read
+        ]
 
 
 def test_a_bag_of_a_session_drives_another_one_to_the_same_bits(driven, bag):
     """Of what the program sent on its own time all comes at the same communication points again."""
     then = values(driven, MEASURED)
-    replayed = recorded(driven.directory() / "replayed", f"{{kind: ros-bag, bag: {bag}, arms: *psm}}", duration=f"{then[-1][0]} ns")
+    replayed = recorded(
+        driven.directory() / "replayed",
+        f"{{kind: ros-bag, bag: {bag}, arms: *psm}}",
+        duration=f"{then[-1][0]} ns",
+    )
     assert values(replayed, MEASURED) == then
-    sent, again = ([time_ns for time_ns, _ in values(recording, "/device/ros/out/PSM1/servo_jp")] for recording in (driven, replayed))
+    sent, again = (
+        [time_ns for time_ns, _ in values(recording, "/device/ros/out/PSM1/servo_jp")]
+        for recording in (driven, replayed)
+    )
     assert len(sent) == 20
     assert again == sent
     assert verify(replayed).same
@@ -156,14 +186,25 @@ def test_a_bag_of_a_session_drives_another_one_to_the_same_bits(driven, bag):
 
 def test_it_has_the_names_the_pace_and_the_quality_that_programs_expect(driven, bag):
     with AnyReader([bag]) as reader:
-        quality = {connection.topic: connection.ext.offered_qos_profiles[0] for connection in reader.connections}
+        quality = {
+            connection.topic: connection.ext.offered_qos_profiles[0] for connection in reader.connections
+        }
         assert 0 <= reader.start_time - driven.started_ns() < 10**9
     assert {topic for topic, told in quality.items() if told.durability == QosDurability.TRANSIENT_LOCAL} == {
-        *(f"/PSM1/{name}" for name in ("operating_state", "desired_state", "tool_type", "status", "goal_reached")),
+        *(
+            f"/PSM1/{name}"
+            for name in ("operating_state", "desired_state", "tool_type", "status", "goal_reached")
+        ),
         "/SUJ/PSM1/operating_state",
     }
     assert {told.reliability for told in quality.values()} == {QosReliability.RELIABLE}
-    assert {"/tf", "/joint_states", "/PSM1/measured_cp", "/PSM1/state_command", "/PSM1/jaw/servo_jp"} <= quality.keys()
+    assert {
+        "/tf",
+        "/joint_states",
+        "/PSM1/measured_cp",
+        "/PSM1/state_command",
+        "/PSM1/jaw/servo_jp",
+    } <= quality.keys()
     told = messages(bag, "/PSM1/measured_js")
     np.testing.assert_allclose(np.diff([t for _, t, _ in told]), 0.01, atol=1e-6)
     assert told[-1][2].position[0] > GOALS[0]
@@ -171,24 +212,44 @@ def test_it_has_the_names_the_pace_and_the_quality_that_programs_expect(driven, 
     stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for _, _, message in states]
     assert stamps == sorted(set(stamps))
     assert [(m.state, m.is_homed, m.is_busy) for _, _, m in states][-1] == ("ENABLED", True, False)
-    (tf, *_) = messages(bag, "/tf")
-    assert {(edge.header.frame_id, edge.child_frame_id) for edge in tf[2].transforms} == {("Cart", "PSM1_base"), ("PSM1_base", "PSM1")}
+    tf, *_ = messages(bag, "/tf")
+    assert {(edge.header.frame_id, edge.child_frame_id) for edge in tf[2].transforms} == {
+        ("Cart", "PSM1_base"),
+        ("PSM1_base", "PSM1"),
+    }
 
 
 def test_states_are_what_the_gateway_would_have_written(driven, bag):
     """The gateway's own port writes the same bytes of the same values, but for the stamp."""
-    gateway = ZenohGateway("ros", ZenohGateway.params_model.model_validate({"mounting": "cart", "arms": {"PSM1": {"instrument": "400006"}}, "cameras": []}))
+    gateway = ZenohGateway(
+        "ros",
+        ZenohGateway.params_model.model_validate(
+            {"mounting": "cart", "arms": {"PSM1": {"instrument": "400006"}}, "cameras": []}
+        ),
+    )
     ports = {row.topic: row.port for row in gateway.rows if row.periodic and row.port is not None}
-    for topic in ("/PSM1/measured_js", "/PSM1/local/measured_cp", "/PSM1/spatial/jacobian", "/PSM1/body/measured_cf"):
+    for topic in (
+        "/PSM1/measured_js",
+        "/PSM1/local/measured_cp",
+        "/PSM1/spatial/jacobian",
+        "/PSM1/body/measured_cf",
+    ):
         port, (_, _, last) = ports[topic], messages(bag, topic)[-1]
         _, recorded = driven.series(f"/engine/motion/out{topic}")
         header = getattr(last, "header", None)
         assert header is None or header.frame_id == port.frame
-        assert VectorCodec(port).from_message(validated(message_type(port.type), last)).tolist() == recorded[-1].tolist()
+        assert (
+            VectorCodec(port).from_message(validated(message_type(port.type), last)).tolist()
+            == recorded[-1].tolist()
+        )
 
 
 def test_the_command_writes_it(driven, tmp_path):
-    out = json.loads(CliRunner().invoke(app, ["bag", str(driven.directory() / "recording"), "-o", str(tmp_path / "bag"), "--json"]).stdout)
+    out = json.loads(
+        CliRunner()
+        .invoke(app, ["bag", str(driven.directory() / "recording"), "-o", str(tmp_path / "bag"), "--json"])
+        .stdout
+    )
     assert (out["gateway"], out["bag"]) == ("ros", str(tmp_path / "bag"))
     with AnyReader([tmp_path / "bag"]) as reader:
         assert (reader.message_count, len(reader.connections)) == (out["messages"], out["topics"])
@@ -211,11 +272,19 @@ for line in sys.stdin:
 def test_ros_reads_it(bag, rclpy_python):
     """Every message, by the type support that `ros2 bag play` and its listeners have."""
     with AnyReader([bag]) as reader:
-        told = [(c.msgtype, payload, reader.deserialize(payload, c.msgtype)) for c, _, payload in reader.messages()]
+        told = [
+            (c.msgtype, payload, reader.deserialize(payload, c.msgtype))
+            for c, _, payload in reader.messages()
+        ]
     lines = "".join(json.dumps((type_, b64encode(payload).decode())) + "\n" for type_, payload, _ in told)
-    read = subprocess.run([rclpy_python, "-c", READER], input=lines, capture_output=True, text=True, timeout=60, check=False)
+    read = subprocess.run(
+        [rclpy_python, "-c", READER], input=lines, capture_output=True, text=True, timeout=60, check=False
+    )
     assert read.returncode == 0, read.stderr
-    said = [m.position.tolist() if type_ == JOINTS else m.state if type_ == STATE_TYPE else None for type_, _, m in told]
+    said = [
+        m.position.tolist() if type_ == JOINTS else m.state if type_ == STATE_TYPE else None
+        for type_, _, m in told
+    ]
     assert [json.loads(line) for line in read.stdout.splitlines()] == said
 
 
@@ -234,7 +303,14 @@ def test_ros_1_reads_it_once_it_is_converted(bag, tmp_path):
     converter = Path(sys.executable).with_name("rosbags-convert")
     subprocess.run([converter, "--src", bag, "--dst", tmp_path / "one.bag"], check=True)
     python, path = rospy_python()
-    read = subprocess.run([python, "-c", ROSBAG, tmp_path / "one.bag"], env=environment(path), capture_output=True, text=True, timeout=60, check=False)
+    read = subprocess.run(
+        [python, "-c", ROSBAG, tmp_path / "one.bag"],
+        env=environment(path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
     if "No module named 'rosbag'" in read.stderr:
         pytest.skip("needs rosbag: apt install python3-rosbag")
     assert read.returncode == 0, read.stderr
@@ -260,7 +336,13 @@ def test_a_bag_that_cannot_be_finished_is_not_left_behind(driven, tmp_path, monk
         raise MessageError(f"{model.ros_type}: {len(payload)} bytes are no such message")
 
     monkeypatch.setattr(bag_export, "decode", none_of_that_type)
-    with pytest.raises(RecordingError, match=r"topic '/engine/motion/out/PSM1/operating_state' at 2000000 ns: crtk_msgs/msg/OperatingState: \d+ bytes"):
+    with pytest.raises(
+        RecordingError,
+        match=(
+            r"topic '/engine/motion/out/PSM1/operating_state' at 2000000 ns: crtk_msgs/msg/OperatingState:"
+            r" \d+ bytes"
+        ),
+    ):
         export(driven, tmp_path / "bag")
     assert not (tmp_path / "bag").exists()
     (tmp_path / "file").touch()

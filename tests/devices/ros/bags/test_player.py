@@ -68,7 +68,11 @@ def write(path, said, storage=StoragePlugin.MCAP, compression=CompressionMode.NO
         for t, topic, message in said:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, message.ros_type, typestore=typestore())
-            writer.write(connections[topic], EPOCH + round(t * SECOND), message if isinstance(message, bytes) else encode(message))
+            writer.write(
+                connections[topic],
+                EPOCH + round(t * SECOND),
+                message if isinstance(message, bytes) else encode(message),
+            )
     return path
 
 
@@ -83,8 +87,12 @@ def write1(path, said):
                 connections[topic] = writer.add_connection(topic, message.ros_type, typestore=store)
             raw = typestore().deserialize_cdr(encode(message), message.ros_type)
             if hasattr(raw, "header"):
-                raw.header = store.types[Header.ros_type](seq=7, stamp=raw.header.stamp, frame_id=raw.header.frame_id)
-            writer.write(connections[topic], EPOCH + round(t * SECOND), store.serialize_ros1(raw, message.ros_type))
+                raw.header = store.types[Header.ros_type](
+                    seq=7, stamp=raw.header.stamp, frame_id=raw.header.frame_id
+                )
+            writer.write(
+                connections[topic], EPOCH + round(t * SECOND), store.serialize_ros1(raw, message.ros_type)
+            )
     return path
 
 
@@ -111,11 +119,21 @@ def bag(tmp_path_factory):
 def test_bags_of_every_kind_say_the_same(form, tmp_path):
     storage = StoragePlugin.SQLITE3 if "db3" in form else StoragePlugin.MCAP
     compression = CompressionMode.FILE if form == "compressed" else CompressionMode.NONE
-    path = write1(tmp_path / "said.bag", SAID) if form == "ros1" else write(tmp_path / "bag", SAID, storage, compression)
+    path = (
+        write1(tmp_path / "said.bag", SAID)
+        if form == "ros1"
+        else write(tmp_path / "bag", SAID, storage, compression)
+    )
     if form in ("mcap", "db3"):
         (path,) = path.glob(f"*.{form}")
     samples = played(path)
-    assert [sample.port for sample in samples] == ["PSM1/state_command", "PSM1/move_jp", "PSM1/jaw/servo_jp", "PSM1/hold", "console/teleop/enable"]
+    assert [sample.port for sample in samples] == [
+        "PSM1/state_command",
+        "PSM1/move_jp",
+        "PSM1/jaw/servo_jp",
+        "PSM1/hold",
+        "console/teleop/enable",
+    ]
     assert samples[0].message.string == "home"
     assert samples[1].message.position.tolist() == [0.1, 0.2, 0.12, 0.0, 0.0, 0.0]
     assert [stamp(sample) for sample in samples[:3]] == [0.5, 1.0, 1.5]
@@ -137,17 +155,35 @@ with rosbag.Bag(sys.argv[1], "w", compression="bz2") as bag:
 @needs_rospy
 def test_a_bag_that_ros_1_itself_has_written(tmp_path):
     python, path = rospy_python()
-    ran = subprocess.run([python, "-c", ROSBAG, tmp_path / "one.bag"], env=environment(path), capture_output=True, text=True, timeout=60, check=False)
+    ran = subprocess.run(
+        [python, "-c", ROSBAG, tmp_path / "one.bag"],
+        env=environment(path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
     if "No module named 'rosbag'" in ran.stderr:
         pytest.skip("needs rosbag: apt install python3-rosbag")
     assert ran.returncode == 0, ran.stderr
-    assert [(sample.port, stamp(sample)) for sample in played(tmp_path / "one.bag")] == [("PSM1/servo_jp", 0.0), ("PSM1/servo_jp", 1.5)]
+    assert [(sample.port, stamp(sample)) for sample in played(tmp_path / "one.bag")] == [
+        ("PSM1/servo_jp", 0.0),
+        ("PSM1/servo_jp", 1.5),
+    ]
 
 
 def test_ports_are_those_of_a_gateway_that_the_bag_has_something_for(bag):
     ports = {port.name: port for port in player(bag).ports}
-    assert ports.keys() == {"PSM1/state_command", "PSM1/move_jp", "PSM1/jaw/servo_jp", "PSM1/hold", "console/teleop/enable"}
-    assert {(port.causality, port.variability, port.clock) for port in ports.values()} == {("output", "event", "simulated")}
+    assert ports.keys() == {
+        "PSM1/state_command",
+        "PSM1/move_jp",
+        "PSM1/jaw/servo_jp",
+        "PSM1/hold",
+        "console/teleop/enable",
+    }
+    assert {(port.causality, port.variability, port.clock) for port in ports.values()} == {
+        ("output", "event", "simulated")
+    }
     assert ports["PSM1/move_jp"].names == ("yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw")
 
 
@@ -177,7 +213,9 @@ def test_it_keeps_the_contract_of_a_device(bag):
 def test_topics_may_have_other_names(tmp_path):
     """dVRK 1 called them so."""
     old = "/dvrk/PSM1/set_position_goal_joint"
-    bag = write(tmp_path / "old", [(0.0, old, joints(0.0, *[0.1] * 6)), (0.1, "/sim/PSM1/hold", EmptyMessage())])
+    bag = write(
+        tmp_path / "old", [(0.0, old, joints(0.0, *[0.1] * 6)), (0.1, "/sim/PSM1/hold", EmptyMessage())]
+    )
     assert [sample.port for sample in played(bag, rename={old: "/PSM1/move_jp"})] == ["PSM1/move_jp"]
     assert [sample.port for sample in played(bag, namespace="sim")] == ["PSM1/hold"]
     with pytest.raises(ValidationError, match=r"no topic '/dvrk/PSM1/set_position_goal'. Did you mean"):
@@ -188,13 +226,21 @@ def test_states_of_a_real_system_are_signals(tmp_path):
     pose = PoseStamped(header=header(0.0), pose=Pose())
     invalid = PoseStamped(header=Header(stamp=Time.from_ns(0)), pose=Pose())
     pedal = Joy(header=header(0.1), buttons=np.array([1], np.int32))
-    said = [(0.0, "/MTMR/measured_cp", pose), (0.05, "/MTMR/measured_cp", invalid), (0.1, "/footpedals/clutch", pedal)]
+    said = [
+        (0.0, "/MTMR/measured_cp", pose),
+        (0.05, "/MTMR/measured_cp", invalid),
+        (0.1, "/footpedals/clutch", pedal),
+    ]
     bag = write(tmp_path / "real", said)
     device = player(bag, listen=["MTMR", "footpedals"], rate=0.5)
     measured, clutch = device.ports
-    assert (measured.variability, measured.max_age_ns) == ("signal", SECOND // 5)  # ten periods of 10 ms, played at half the speed
+    # ten periods of 10 ms, played at half the speed
+    assert (measured.variability, measured.max_age_ns) == ("signal", SECOND // 5)
     assert (clutch.name, clutch.variability) == ("footpedals/clutch", "event")
-    assert [sample.port for sample in played(bag, listen=["MTMR", "footpedals"])] == ["MTMR/measured_cp", "footpedals/clutch"]
+    assert [sample.port for sample in played(bag, listen=["MTMR", "footpedals"])] == [
+        "MTMR/measured_cp",
+        "footpedals/clutch",
+    ]
 
 
 def test_what_a_gateway_refuses_is_refused(tmp_path, caplog):
@@ -205,24 +251,41 @@ def test_what_a_gateway_refuses_is_refused(tmp_path, caplog):
         (0.2, "/PSM1/servo_cp", PoseStamped(header=header(0.2), pose=Pose(orientation=Quaternion(w=0.5)))),
     ]
     no_number = encode(said[1][2]).replace(np.array(0.1).tobytes(), np.array(np.nan).tobytes())
-    bag = write(tmp_path / "bad", [*said, (1.0, "/PSM1/servo_jp", no_number), (1.0, "/PSM1/servo_jp", b"\x00\x01\x00\x00nonsense")])
+    bag = write(
+        tmp_path / "bad",
+        [*said, (1.0, "/PSM1/servo_jp", no_number), (1.0, "/PSM1/servo_jp", b"\x00\x01\x00\x00nonsense")],
+    )
     with caplog.at_level(logging.WARNING):
         samples = played(bag)
     assert [stamp(sample) for sample in samples] == [0.1]
     told = [record.getMessage() for record in caplog.records]
-    for reason in ("2 values in position, expected 6 (at 0 s)", "has norm 0.5", "every number must be finite", "no such message"):
+    for reason in (
+        "2 values in position, expected 6 (at 0 s)",
+        "has norm 0.5",
+        "every number must be finite",
+        "no such message",
+    ):
         assert any(reason in line for line in told), told
 
 
 def test_a_command_that_only_a_connection_has_brought_moves_nothing(tmp_path, caplog):
-    """A recorder that joins late gets the last state command of a program, of an hour ago; one that is brought twice counts once."""
+    """A recorder that joins late gets the last state command of a program, of an hour ago; one that is
+    brought twice counts once.
+    """
     again = command(1.0, "enable")
-    said = [(0.0, "/PSM1/state_command", command(-3600.0)), (1.0, "/PSM1/state_command", again), (1.3, "/PSM1/state_command", again)]
+    said = [
+        (0.0, "/PSM1/state_command", command(-3600.0)),
+        (1.0, "/PSM1/state_command", again),
+        (1.3, "/PSM1/state_command", again),
+    ]
     said.append((2.0, "/PSM1/state_command", StringStamped(string="disable")))  # no stamp: always new
     bag = write(tmp_path / "latched", said)
     with caplog.at_level(logging.WARNING):
         samples = played(bag)
-    assert [(sample.message.string, stamp(sample)) for sample in samples] == [("enable", 1.0), ("disable", 2.0)]
+    assert [(sample.message.string, stamp(sample)) for sample in samples] == [
+        ("enable", 1.0),
+        ("disable", 2.0),
+    ]
     told = "\n".join(record.getMessage() for record in caplog.records)
     assert "given 3600.0 s before it was recorded" in told
     assert "heeded before, with the same stamp" in told
@@ -232,11 +295,20 @@ def test_what_is_passed_over_is_said(bag, caplog):
     with caplog.at_level(logging.INFO):
         played(bag)
     (line,) = [record.getMessage() for record in caplog.records]
-    assert line.endswith("as nothing here hears them: /PSM1/measured_js (sensor_msgs/msg/JointState, 1), /rosout (std_msgs/msg/String, 1)")
+    assert line.endswith(
+        "as nothing here hears them: /PSM1/measured_js (sensor_msgs/msg/JointState, 1), /rosout"
+        " (std_msgs/msg/String, 1)"
+    )
 
 
 def test_a_bag_with_nothing_to_play_is_refused_before_the_session(bag, tmp_path):
-    with pytest.raises(ValidationError, match=r"nothing that could be played here. Its topics: .*/PSM1/hold \(std_msgs/msg/Empty, 1\).*/SUJ/PSM2/servo_jp"):
+    with pytest.raises(
+        ValidationError,
+        match=(
+            r"nothing that could be played here. Its topics: .*/PSM1/hold \(std_msgs/msg/Empty,"
+            r" 1\).*/SUJ/PSM2/servo_jp"
+        ),
+    ):
         player(bag, arms={"PSM2": {}}, namespace="elsewhere")
     other = write(tmp_path / "other", [(0.0, "/PSM1/hold", BoolMessage(data=True))])
     with pytest.raises(ValidationError, match="nothing that could be played"):

@@ -1,4 +1,5 @@
-"""The gateway to ROS 2 over DDS, as a program with rmw_cyclonedds sees it: there are no wheels of that, so one is written here after its sources.
+"""The gateway to ROS 2 over DDS, as a program with rmw_cyclonedds sees it: there are no wheels of that, so
+one is written here after its sources.
 
 It is on cyclonedds; types and header are written by hand, and share nothing with the gateway's.
 """
@@ -28,7 +29,11 @@ from schemas.errors import DeviceError, MessageError
 from tests.devices.ros.rclpy_peer import free_domain
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
-RELIABLE = Qos(Policy.Reliability.Reliable(0), Policy.History.KeepAll, Policy.DataRepresentation(use_cdrv0_representation=True))
+RELIABLE = Qos(
+    Policy.Reliability.Reliable(0),
+    Policy.History.KeepAll,
+    Policy.DataRepresentation(use_cdrv0_representation=True),
+)
 
 
 @dataclass
@@ -107,7 +112,12 @@ def test_a_datagram_that_goes_wrong_ends_no_service(gateway, caplog):
     calls = gateway._transport._calls
     torn = dds_rtps.data(b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7", 1, b"", {0x71: b""})
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        for payload in (b"", b"RTPS", dds_rtps.message(b"\x01\x0f" + bytes(10), bytes(12), [torn]), bytes(range(256))):
+        for payload in (
+            b"",
+            b"RTPS",
+            dds_rtps.message(b"\x01\x0f" + bytes(10), bytes(12), [torn]),
+            bytes(range(256)),
+        ):
             other.sendto(payload, ("127.0.0.1", calls._socket.getsockname()[1]))
     calls._take = lambda *_: 1 / 0
     assert until(lambda: "ZeroDivisionError" in caplog.text), "it hears what is told every second"
@@ -141,12 +151,15 @@ def test_all_is_told_to_be_of_one_node(gateway):
         gid: Gid
         node_entities_info_seq: types.sequence[Node]
 
-    reader = DataReader(program, Topic(program, "ros_discovery_info", Info), RELIABLE + Qos(Policy.Durability.TransientLocal))
+    reader = DataReader(
+        program, Topic(program, "ros_discovery_info", Info), RELIABLE + Qos(Policy.Durability.TransientLocal)
+    )
     assert until(lambda: told.extend(reader.take(100)) or told)
     (node,) = told[-1].node_entities_info_seq
     rows = face(gateway.params)
     assert (node.node_namespace, node.node_name) == ("/", "dvrk")
-    assert len(node.writer_gid_seq) == sum(row.way != "subscribe" for row in rows)  # a service has one of each
+    # a service has one of each
+    assert len(node.writer_gid_seq) == sum(row.way != "subscribe" for row in rows)
     assert len(node.reader_gid_seq) == sum(row.way != "publish" for row in rows)
     assert watch.clients({"rt/PSM1/measured_js"}) == ()
     program.__del__()
@@ -161,7 +174,9 @@ def test_nothing_but_the_loopback_interface_reaches_it(gateway):
             continue
         if it.family == socket.AF_INET and it.type == socket.SOCK_DGRAM:
             host, port = it.getsockname()
-            bound[port] = host == "127.0.0.1" or it.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).startswith(b"lo\0")
+            bound[port] = host == "127.0.0.1" or it.getsockopt(
+                socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16
+            ).startswith(b"lo\0")
         it.detach()
     assert len(bound) > 2
     assert all(bound.values())
@@ -230,7 +245,10 @@ class TestGraph:
             graph.told(entities_info(participant, "/lab/console", [], [bytes(16)]))
         assert graph.sender(self.OTHER) == "/lab/console"
         assert graph.sender(self.THIRD) == f"/lab/console ({self.THIRD[:12].hex()})"
-        assert [client.name for client in graph.clients({"rt/PSM1/servo_jp"})] == [graph.sender(self.OTHER), graph.sender(self.THIRD)]
+        assert [client.name for client in graph.clients({"rt/PSM1/servo_jp"})] == [
+            graph.sender(self.OTHER),
+            graph.sender(self.THIRD),
+        ]
         assert graph.clients({"rt/elsewhere"}) == ()
 
     def test_who_has_sent_something_keeps_its_name(self):

@@ -16,7 +16,9 @@ from tests.devices.ros.rclpy_peer import RclpyPeer, free_domain
 
 __all__ = ["rclpy_python"]
 
-STATE, COMMAND, EVENT, STATUS, WARNING = (f"/PSM1/{name}" for name in ("measured_js", "servo_jp", "operating_state", "status", "warning"))
+STATE, COMMAND, EVENT, STATUS, WARNING = (
+    f"/PSM1/{name}" for name in ("measured_js", "servo_jp", "operating_state", "status", "warning")
+)
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 
 
@@ -53,7 +55,9 @@ class Console(RclpyPeer):
         found = [it.get_publication_matched_status for it in transport._writers if it.topic.name in topics]
         found += [it.get_subscription_matched_status for it in transport._readers if it.topic.name in topics]
         assert until(lambda: all(status().current_count for status in found))
-        assert until(lambda: any(client.name == f"/{self.name}" for client in transport.clients())), "nobody has told the gateway its name"
+        assert until(lambda: any(client.name == f"/{self.name}" for client in transport.clients())), (
+            "nobody has told the gateway its name"
+        )
 
 
 def test_every_row_of_the_table(rclpy_python, domain, tmp_path):
@@ -98,7 +102,9 @@ def test_all_belongs_to_one_node_called_as_on_the_real_system(rclpy_python, psm)
             offers = [offer[1:] for offer in program.do("offered", topic=topic) if offer[0] == "dvrk"]
             type_ = row(psm, topic).type
             assert offers == [[type_, rihs01(type_), durability, "RELIABLE"]]
-        assert until(lambda: [client.name for client in psm._transport.clients()] == ["/console"]), psm._transport.clients()
+        assert until(lambda: [client.name for client in psm._transport.clients()] == ["/console"]), (
+            psm._transport.clients()
+        )
 
 
 def test_a_program_with_the_default_range_finds_it(rclpy_python, psm):
@@ -109,7 +115,9 @@ def test_a_program_with_the_default_range_finds_it(rclpy_python, psm):
 
 def test_another_domain_is_another_graph(rclpy_python, psm):
     with RclpyPeer(rclpy_python, free_domain()) as program:
-        assert program.do("join", rows=[(STATE, row(psm, STATE).type, "publish", False)], timeout=1.5) == [STATE]
+        assert program.do("join", rows=[(STATE, row(psm, STATE).type, "publish", False)], timeout=1.5) == [
+            STATE
+        ]
 
 
 def test_a_console_that_comes_back_is_there_again(rclpy_python, psm):
@@ -123,7 +131,10 @@ def test_a_console_that_comes_back_is_there_again(rclpy_python, psm):
 
 
 def test_a_second_console_does_not_command_the_same_arm(rclpy_python, psm):
-    with console(rclpy_python, psm, COMMAND, name="first") as first, console(rclpy_python, psm, COMMAND, WARNING, name="second") as second:
+    with (
+        console(rclpy_python, psm, COMMAND, name="first") as first,
+        console(rclpy_python, psm, COMMAND, WARNING, name="second") as second,
+    ):
         first.send(row(psm, COMMAND), joints([0.1] * 6))
         assert until(lambda: came(psm))
         second.send(row(psm, COMMAND), joints([0.5] * 6))
@@ -142,7 +153,10 @@ def test_bytes_that_are_no_message_move_nothing(rclpy_python, psm):
 
 
 def test_a_flood_costs_no_other_console_its_states(rclpy_python, psm):
-    with console(rclpy_python, psm, COMMAND, name="flood") as flood, console(rclpy_python, psm, STATE) as program:
+    with (
+        console(rclpy_python, psm, COMMAND, name="flood") as flood,
+        console(rclpy_python, psm, STATE) as program,
+    ):
         flood.send(row(psm, COMMAND), joints(), times=20_000)
         psm.write(STATE[1:], np.zeros(18))
         assert program.do("count", topic=STATE, seconds=0.5) > 20
@@ -150,9 +164,19 @@ def test_a_flood_costs_no_other_console_its_states(rclpy_python, psm):
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(rclpy_python, domain, tmp_path):
-    picture = {"height": 288, "width": 320, "encoding": "rgb8", "step": 960, "data": np.zeros(276480, np.uint8)}
+    picture = {
+        "height": 288,
+        "width": 320,
+        "encoding": "rgb8",
+        "step": 960,
+        "data": np.zeros(276480, np.uint8),
+    }
     image = message_type("sensor_msgs/msg/Image").model_validate(picture)
-    with showing(tmp_path, arms={"PSM1": {}}, domain=domain) as gateway, console(rclpy_python, gateway, STATE, STATUS) as program, ExitStack() as stack:
+    with (
+        showing(tmp_path, arms={"PSM1": {}}, domain=domain) as gateway,
+        console(rclpy_python, gateway, STATE, STATUS) as program,
+        ExitStack() as stack,
+    ):
         stalled = stack.enter_context(Console(rclpy_python, gateway, "stalled"))
         stalled.join(gateway.rows)
         stalled.process.send_signal(signal.SIGSTOP)

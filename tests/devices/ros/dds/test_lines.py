@@ -28,13 +28,20 @@ US, THEM, WRITER, READER = bytes(range(12)), bytes(range(12, 24)), b"\x00\x00\x0
 
 
 class Air:
-    """Carries datagrams both ways, and loses, doubles and reorders them as `fates` say, until they are used up."""
+    """Carries datagrams both ways, and loses, doubles and reorders them as `fates` say, until they are used
+    up.
+    """
 
     def __init__(self, fates):
         self.fates, self.flying = list(fates), []
         self.heard = []
         self.sending = Sending(lambda parts: self.fly("there", parts), WRITER, READER)
-        self.receiving = Receiving(lambda parts: self.fly("back", parts), READER, WRITER, lambda sample: self.heard.append(sample.payload))
+        self.receiving = Receiving(
+            lambda parts: self.fly("back", parts),
+            READER,
+            WRITER,
+            lambda sample: self.heard.append(sample.payload),
+        )
 
     def fly(self, way, parts):
         for part in parts:
@@ -50,7 +57,9 @@ class Air:
                 if way == "back":
                     self.sending.asked(it)
                 else:
-                    {Data: self.receiving.came, Heartbeat: self.receiving.beat, Gap: self.receiving.skip}[type(it)](it)
+                    {Data: self.receiving.came, Heartbeat: self.receiving.beat, Gap: self.receiving.skip}[
+                        type(it)
+                    ](it)
 
 
 @given(st.lists(st.sampled_from(["arrives", "lost", "twice", "overtakes"]), max_size=60), st.integers(1, 20))

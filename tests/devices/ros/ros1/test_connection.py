@@ -1,4 +1,6 @@
-"""Connections of ROS 1: headers, frames in pieces, readers that do not keep up, and what is no header or no message."""
+"""Connections of ROS 1: headers, frames in pieces, readers that do not keep up, and what is no header or no
+message.
+"""
 
 import queue
 import socket
@@ -57,7 +59,9 @@ def test_a_header_says_what_was_put_into_it(fields):
 
 
 def test_frames_come_whole_however_they_are_cut():
-    data = header_frame({"callerid": "/it", "topic": "/a"}) + framed(b"one") + framed(b"") + framed(b"x" * 70000)
+    data = (
+        header_frame({"callerid": "/it", "topic": "/a"}) + framed(b"one") + framed(b"") + framed(b"x" * 70000)
+    )
     with connected() as (connection, other, heard, _):
         assert (connection.program, connection.is_greeted) == ("127.0.0.1", False)
         for at in range(150):
@@ -68,7 +72,15 @@ def test_frames_come_whole_however_they_are_cut():
         assert (connection.program, connection.is_greeted) == ("/it", True)
 
 
-@pytest.mark.parametrize("data", [b"\xff\xff\xff\x7f", framed(b"\x05\x00\x00\x00a=b"), framed(b"\x03\x00\x00\x00abc"), framed(b"\x02\x00\x00\x00\xff=")])
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\xff\xff\xff\x7f",
+        framed(b"\x05\x00\x00\x00a=b"),
+        framed(b"\x03\x00\x00\x00abc"),
+        framed(b"\x02\x00\x00\x00\xff="),
+    ],
+)
 def test_what_is_no_header_is_hung_up_on(data, caplog):
     with connected() as (_, other, heard, ends):
         other.sendall(data)

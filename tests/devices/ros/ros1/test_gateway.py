@@ -22,9 +22,19 @@ from tests.hub.authorities import free_port
 pytestmark = needs_rospy
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
-STATE, COMMAND, EVENT, STATE_COMMAND = "/PSM1/measured_js", "/PSM1/servo_jp", "/PSM1/operating_state", "/PSM1/state_command"
+STATE, COMMAND, EVENT, STATE_COMMAND = (
+    "/PSM1/measured_js",
+    "/PSM1/servo_jp",
+    "/PSM1/operating_state",
+    "/PSM1/state_command",
+)
 RELAY = shutil.which("relay", path="/usr/lib/topic_tools:/opt/ros/noetic/lib/topic_tools")
-JOINTS, STATE_TYPE, WORD, ORDER = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState", "std_msgs/msg/String", "crtk_msgs/msg/StringStamped"
+JOINTS, STATE_TYPE, WORD, ORDER = (
+    "sensor_msgs/msg/JointState",
+    "crtk_msgs/msg/OperatingState",
+    "std_msgs/msg/String",
+    "crtk_msgs/msg/StringStamped",
+)
 
 
 @contextmanager
@@ -84,7 +94,9 @@ def test_every_row_of_the_table(ros, tmp_path):
     with showing(ros, tmp_path, **WHOLE) as gateway:
         with Program(ros) as console:
             types = sorted({row.type for row in gateway.rows})
-            assert console.checksums(types) == [(service_checksum if "/srv/" in type_ else checksum)(type_) for type_ in types]
+            assert console.checksums(types) == [
+                (service_checksum if "/srv/" in type_ else checksum)(type_) for type_ in types
+            ]
             table = TablePeer(console)
             table.join(gateway.rows)
             exercise(gateway, table)
@@ -95,13 +107,27 @@ def test_every_row_of_the_table(ros, tmp_path):
 
 def test_the_tools_of_ros_show_it(ros, psm):
     psm.write("PSM1/status", StringMessage(data="a word"))
-    listed = subprocess.run(["rostopic", "list"], env=ros.environment, capture_output=True, text=True, timeout=20, check=True).stdout.split()
+    listed = subprocess.run(
+        ["rostopic", "list"], env=ros.environment, capture_output=True, text=True, timeout=20, check=True
+    ).stdout.split()
     assert {row.topic for row in psm.rows if row.way != "serve"} <= set(listed)
-    echoed = subprocess.run(["rostopic", "echo", "-n", "1", "/PSM1/status"], env=ros.environment, capture_output=True, text=True, timeout=20, check=True).stdout
+    echoed = subprocess.run(
+        ["rostopic", "echo", "-n", "1", "/PSM1/status"],
+        env=ros.environment,
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=True,
+    ).stdout
     assert 'data: "a word"' in echoed
     node = "xmlrpc.client.ServerProxy(rosgraph.Master('/t').lookupNode('/trocar_ros'))"
-    ask = f"import rosgraph, xmlrpc.client; node = {node}; print(node.getPid('/t')[0], node.getBusInfo('/t')[0])"
-    assert subprocess.run([ros.python, "-c", ask], env=ros.environment, capture_output=True, text=True, timeout=20, check=True).stdout.split() == ["1", "1"]
+    ask = (
+        f"import rosgraph, xmlrpc.client; node = {node}; print(node.getPid('/t')[0],"
+        " node.getBusInfo('/t')[0])"
+    )
+    assert subprocess.run(
+        [ros.python, "-c", ask], env=ros.environment, capture_output=True, text=True, timeout=20, check=True
+    ).stdout.split() == ["1", "1"]
 
 
 def test_every_row_of_the_authors_topics(ros, tmp_path):
@@ -115,7 +141,11 @@ def test_every_row_of_the_authors_topics(ros, tmp_path):
 @contextmanager
 def relay(ros, heard, told):
     """A program on roscpp that says on one topic what it hears on another."""
-    with subprocess.Popen([RELAY, heard, told, f"__name:=relay{told.replace('/', '_')}"], env=ros.environment, stdout=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        [RELAY, heard, told, f"__name:=relay{told.replace('/', '_')}"],
+        env=ros.environment,
+        stdout=subprocess.DEVNULL,
+    ) as process:
         try:
             yield
         finally:
@@ -181,7 +211,11 @@ def test_a_second_console_does_not_command_the_same_arm(psm, ros, console):
         assert not came_in(psm, COMMAND, 0.1)
 
 
-@pytest.mark.parametrize("payload", [b"", b"\x00\x01\x00\x00", b"\xff" * 60, bytes(range(256)) * 16], ids=["empty", "header", "lengths", "noise"])
+@pytest.mark.parametrize(
+    "payload",
+    [b"", b"\x00\x01\x00\x00", b"\xff" * 60, bytes(range(256)) * 16],
+    ids=["empty", "header", "lengths", "noise"],
+)
 def test_bytes_that_are_no_message_move_nothing(psm, console, payload):
     console.advertise(COMMAND, JOINTS)
     console.listen("/PSM1/error", WORD)
@@ -227,7 +261,9 @@ def test_a_command_kept_from_before_is_not_heeded_when_the_gateway_comes(psm, co
 
 def test_what_a_real_arm_has_kept_is_its_state(ros, tmp_path, console):
     console.advertise("/MTML/operating_state", STATE_TYPE, True)
-    console.send("/MTML/operating_state", {**order(""), "state": "ENABLED", "is_homed": True, "is_busy": False})
+    console.send(
+        "/MTML/operating_state", {**order(""), "state": "ENABLED", "is_homed": True, "is_busy": False}
+    )
     with showing(ros, tmp_path, **ARM, listen=["MTML"]) as gateway:
         assert came_in(gateway, "/MTML/operating_state")
 
@@ -248,12 +284,24 @@ def test_a_flood_costs_no_other_console_its_states(psm, ros, console):
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(ros, tmp_path, console):
-    picture = {"height": 288, "width": 320, "encoding": "rgb8", "step": 960, "data": np.zeros(276480, np.uint8)}
+    picture = {
+        "height": 288,
+        "width": 320,
+        "encoding": "rgb8",
+        "step": 960,
+        "data": np.zeros(276480, np.uint8),
+    }
     image = message_type("sensor_msgs/msg/Image").model_validate(picture)
     topic = "/endoscope/left/image_raw"
     with showing(ros, tmp_path, arms={"PSM1": {}}) as psm, Program(ros, "stalled") as stalled:
         for each in (console, stalled):
-            each.join([(STATE, JOINTS, "publish"), ("/PSM1/status", WORD, "publish"), (topic, image.ros_type, "publish")])
+            each.join(
+                [
+                    (STATE, JOINTS, "publish"),
+                    ("/PSM1/status", WORD, "publish"),
+                    (topic, image.ros_type, "publish"),
+                ]
+            )
         stalled.process.send_signal(signal.SIGSTOP)
         slowest = 0.0
         for word in range(120):  # 33 MB, more than the buffers on the way to the stalled one hold
@@ -264,12 +312,18 @@ def test_a_console_that_stops_reading_holds_up_nobody(ros, tmp_path, console):
             slowest = max(slowest, time.monotonic() - before)
             time.sleep(0.01)
         assert slowest < 0.5, "publishing waits for the stalled console"
-        assert [console.heard("/PSM1/status", 5.0)["data"] for _ in range(120)] == [str(word) for word in range(120)]
+        assert [console.heard("/PSM1/status", 5.0)["data"] for _ in range(120)] == [
+            str(word) for word in range(120)
+        ]
         numbers = console.sequence(STATE)
-        assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "another console's stop costs this one states"
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), (
+            "another console's stop costs this one states"
+        )
         psm.write(EVENT[1:], OperatingState(state="ENABLED"))
         stalled.process.send_signal(signal.SIGCONT)
-        assert [stalled.heard("/PSM1/status", 5.0)["data"] for _ in range(120)] == [str(word) for word in range(120)], "events are kept for who stops"
+        assert [stalled.heard("/PSM1/status", 5.0)["data"] for _ in range(120)] == [
+            str(word) for word in range(120)
+        ], "events are kept for who stops"
 
 
 def test_two_gateways_of_one_name(ros, psm, tmp_path, console, caplog):
@@ -287,7 +341,12 @@ def test_two_gateways_of_one_name(ros, psm, tmp_path, console, caplog):
 
 def test_the_place_of_one_that_was_killed_is_taken(ros, tmp_path, console, caplog):
     with xmlrpc.client.ServerProxy(ros.uri) as known:
-        assert known.registerPublisher("/trocar_ros", STATE, JOINTS.replace("/msg", ""), f"http://127.0.0.1:{free_port()}/")[0] == 1
+        assert (
+            known.registerPublisher(
+                "/trocar_ros", STATE, JOINTS.replace("/msg", ""), f"http://127.0.0.1:{free_port()}/"
+            )[0]
+            == 1
+        )
         console.listen(STATE, JOINTS)
         with showing(ros, tmp_path, **ARM) as psm:
             assert until(lambda: clients(psm) == ["/console"])
@@ -323,7 +382,9 @@ def test_a_master_that_comes_later_and_one_that_starts_again(tmp_path, caplog):
                 with Program(ros, "second") as second:
                     second.join([(STATE, JOINTS, "publish"), (COMMAND, JOINTS, "subscribe")])
                     for each in (first, second):
-                        assert until(lambda each=each: psm.write(STATE[1:], np.zeros(18)) or each.heard(STATE, 0.1)), "whoever was connected stays so"
+                        assert until(
+                            lambda each=each: psm.write(STATE[1:], np.zeros(18)) or each.heard(STATE, 0.1)
+                        ), "whoever was connected stays so"
                 first.send(COMMAND, joints())
                 assert came_in(psm, COMMAND)
             ros.stop()

@@ -37,7 +37,9 @@ def test_it_listens_at_the_address_towards_its_master_only(tmp_path):
         server = it._transport._server.uri
         assert server.startswith("http://127.0.0.1:")
         assert xmlrpc.client.ServerProxy(server).getPid("/somebody")[0] == 1
-        code, _, (protocol, host, _) = xmlrpc.client.ServerProxy(server).requestTopic("/somebody", "/PSM1/measured_js", [["UDPROS"], ["TCPROS"]])
+        code, _, (protocol, host, _) = xmlrpc.client.ServerProxy(server).requestTopic(
+            "/somebody", "/PSM1/measured_js", [["UDPROS"], ["TCPROS"]]
+        )
         assert (code, protocol, host) == (1, "TCPROS", "127.0.0.1")
         for topic, protocols in (("/PSM1/measured_js", [["UDPROS"]]), ("/nothing", [["TCPROS"]])):
             assert xmlrpc.client.ServerProxy(server).requestTopic("/somebody", topic, protocols)[0] == 0
@@ -48,7 +50,10 @@ def test_it_listens_at_the_address_towards_its_master_only(tmp_path):
 @pytest.mark.parametrize(
     ("params", "words"),
     [
-        ({"master": "http://nowhere.invalid:11311"}, "no way to the ROS master at 'http://nowhere.invalid:11311'"),
+        (
+            {"master": "http://nowhere.invalid:11311"},
+            "no way to the ROS master at 'http://nowhere.invalid:11311'",
+        ),
         ({"master": "http://127.0.0.1:11311", "ip": "192.0.2.1"}, "cannot listen at 192.0.2.1"),
     ],
 )
@@ -57,7 +62,16 @@ def test_addresses_that_cannot_be_are_told(tmp_path, params, words):
         it.open(tmp_path)
 
 
-@pytest.mark.parametrize("params", [{"master": "127.0.0.1:11311"}, {"master": "http://here"}, {"ip": "here"}, {"ip": "0.0.0.0"}, {"ip": "::1"}])
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"master": "127.0.0.1:11311"},
+        {"master": "http://here"},
+        {"ip": "here"},
+        {"ip": "0.0.0.0"},
+        {"ip": "::1"},
+    ],
+)
 def test_addresses_that_are_none_are_refused(params):
     with pytest.raises(ValidationError):
         gateway(**params)

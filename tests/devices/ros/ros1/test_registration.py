@@ -28,11 +28,23 @@ def registers(uri):
 
 
 @pytest.mark.parametrize(
-    "answer", [[], [5, 5], [[1, "", []]] * 2, [{"faultCode": 1, "faultString": "no"}] * 2, [[[1, "", []]]] * 3, [[[1, "", []]], [[1, "", 5]]]], ids=repr
+    "answer",
+    [
+        [],
+        [5, 5],
+        [[1, "", []]] * 2,
+        [{"faultCode": 1, "faultString": "no"}] * 2,
+        [[[1, "", []]]] * 3,
+        [[[1, "", []]], [[1, "", 5]]],
+    ],
+    ids=repr,
 )
 def test_an_answer_that_is_none_is_asked_for_again(answer, caplog):
     answers = iter([answer])
-    calls = {"lookupNode": lambda *_: Answer(-1, "unknown", 0), "system.multicall": lambda *_: next(answers, MADE_KNOWN)}
+    calls = {
+        "lookupNode": lambda *_: Answer(-1, "unknown", 0),
+        "system.multicall": lambda *_: next(answers, MADE_KNOWN),
+    }
     master = ProgramServer("127.0.0.1", calls)
     registration, told = registers(master.uri)
     try:
@@ -45,7 +57,9 @@ def test_an_answer_that_is_none_is_asked_for_again(answer, caplog):
 
 @pytest.mark.parametrize("uri", ["rosrpc://127.0.0.1:5/", "nowhere", "http://[::1:5/"])
 def test_a_node_of_its_name_at_an_address_that_is_none_is_no_other(uri):
-    master = ProgramServer("127.0.0.1", {"lookupNode": lambda *_: said(uri), "system.multicall": lambda *_: MADE_KNOWN})
+    master = ProgramServer(
+        "127.0.0.1", {"lookupNode": lambda *_: said(uri), "system.multicall": lambda *_: MADE_KNOWN}
+    )
     registration, told = registers(master.uri)
     try:
         assert until(lambda: told)
@@ -60,7 +74,10 @@ BODIES = [
     b"<?xml version='1.0' encoding='foo'?><a/>",
     *(
         f"<methodResponse>{part}</methodResponse>".encode()
-        for part in ("<fault><value><int>1</int></value></fault>", "<params><param><value><int>x</int></value></param></params>")
+        for part in (
+            "<fault><value><int>1</int></value></fault>",
+            "<params><param><value><int>x</int></value></param></params>",
+        )
     ),
 ]
 

@@ -1,4 +1,6 @@
-"""A session with a gateway to ROS 1: a client of CRTK on rospy enables, homes and moves an arm, and nothing moves that should not."""
+"""A session with a gateway to ROS 1: a client of CRTK on rospy enables, homes and moves an arm, and nothing
+moves that should not.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -28,11 +30,23 @@ def session(ros, directory):
     controller = motion(arms=ARMS, mounting="cart")
     params = {"master": ros.uri, "arms": ARMS, "mounting": "cart", "publish_period": "5 ms", "cameras": []}
     gateway = Ros1Gateway("ros", Ros1Gateway.params_model.model_validate(params))
-    connections = ["motion.drive/* -> robot.*", "robot.* -> motion.sense/*", "motion.* -> ros.*", "ros.* -> motion.*"]
+    connections = [
+        "motion.drive/* -> robot.*",
+        "robot.* -> motion.sense/*",
+        "motion.* -> ros.*",
+        "ros.* -> motion.*",
+    ]
     participants = {"motion": controller, "robot": IdealRobot(controller), "ros": gateway}
     kinds = {name: {"kind": type(participant).__name__} for name, participant in participants.items()}
     scenario = Scenario.model_validate(
-        {"name": "ros_1", "step": "2 ms", "pace": "realtime", "order": ["motion", "robot"], "participants": kinds, "connections": connections}
+        {
+            "name": "ros_1",
+            "step": "2 ms",
+            "pace": "realtime",
+            "order": ["motion", "robot"],
+            "participants": kinds,
+            "connections": connections,
+        }
     )
     plan = make_plan(scenario, participants, {"motion": "controller", "robot": "engine", "ros": "device"})
     it = Session(scenario, plan, participants, directory, endpoint=free_endpoint(range(1)))

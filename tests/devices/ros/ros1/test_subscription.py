@@ -1,4 +1,6 @@
-"""Links of a ROS 1 node to those that publish, without a master and without ROS: which messages count as kept from before, and programs that go wrong."""
+"""Links of a ROS 1 node to those that publish, without a master and without ROS: which messages count as kept
+from before, and programs that go wrong.
+"""
 
 import socket
 import threading
@@ -65,7 +67,8 @@ def test_one_that_comes_later_means_what_it_has_kept(listening, publisher):
 def test_one_that_may_have_been_there_before_does_not(listening, publisher, by_answer):
     listener, linked = listening
     say(publisher)
-    is_told_of(listener, publisher._server.uri, by_answer=by_answer)  # False: another one has made itself known while we did
+    # False: another one has made itself known while we did
+    is_told_of(listener, publisher._server.uri, by_answer=by_answer)
     is_told_of(listener, publisher._server.uri, by_answer=not by_answer)
     assert linked.get(timeout=5.0) > 0
 
@@ -74,12 +77,22 @@ def test_one_that_was_not_reached_at_first_does_not(listening, publisher):
     listener, linked = listening
     is_told_of(listener, by_answer=True)
     is_told_of(listener, publisher._server.uri)  # and does not publish it yet
-    assert until(lambda: any(link.delay for links in listener._subscriptions._links.values() for link in links.values()))
+    assert until(
+        lambda: any(
+            link.delay for links in listener._subscriptions._links.values() for link in links.values()
+        )
+    )
     say(publisher)
     assert linked.get(timeout=5.0) > 0
 
 
-NOWHERE = [["TCPROS", "127.0.0.1"], ["TCPROS", "127.0.0.1", 70000], ["TCPROS", 5, 5], ["TCPROS", "a" * 300, 5], 0]
+NOWHERE = [
+    ["TCPROS", "127.0.0.1"],
+    ["TCPROS", "127.0.0.1", 70000],
+    ["TCPROS", 5, 5],
+    ["TCPROS", "a" * 300, 5],
+    0,
+]
 
 
 @pytest.mark.parametrize("answer", [*(said(place) for place in NOWHERE), Answer(0, "", 0), "none"], ids=repr)
@@ -87,7 +100,9 @@ def test_one_that_names_no_place_is_asked_again(listening, answer):
     listener, _ = listening
     with socket.create_server(("127.0.0.1", 0)) as server:
         answers = iter([answer])
-        program = ProgramServer("127.0.0.1", {"requestTopic": lambda *_: next(answers, said(["TCPROS", *server.getsockname()]))})
+        program = ProgramServer(
+            "127.0.0.1", {"requestTopic": lambda *_: next(answers, said(["TCPROS", *server.getsockname()]))}
+        )
         try:
             is_told_of(listener, program.uri)
             server.settimeout(5.0)
@@ -100,7 +115,9 @@ def test_one_that_names_no_place_is_asked_again(listening, answer):
 def test_an_address_that_is_none_leaves_no_thread(listening, uri):
     listener, _ = listening
     is_told_of(listener, uri)
-    assert until(lambda: any(link.delay for link in listener._subscriptions._links[uri].values())), "it is tried again"
+    assert until(lambda: any(link.delay for link in listener._subscriptions._links[uri].values())), (
+        "it is tried again"
+    )
     is_told_of(listener)
     assert until(lambda: uri not in listener._subscriptions._links)
     assert until(lambda: not any(thread.name == f"ROS 1 {uri}" for thread in threading.enumerate()))

@@ -41,7 +41,8 @@ def test_names_and_definitions():
         "time stamp",
         "string frame_id",
     ]
-    assert service_checksum("crtk_msgs/srv/QueryForwardKinematics") == "787c6da7a75e9886573c4af11f1a381f"  # by genmsg, which test_ros1_gateway.py asks
+    # by genmsg, which test_ros1_gateway.py asks
+    assert service_checksum("crtk_msgs/srv/QueryForwardKinematics") == "787c6da7a75e9886573c4af11f1a381f"
 
 
 @pytest.mark.parametrize("type_", TOPICS)
@@ -49,20 +50,38 @@ def test_messages_there_and_back(type_):
     message, wire = encode(sample(TOPICS[type_])), Wire(type_)
     frame = wire.frame(message, 7)
     assert int.from_bytes(frame[:4], "little") == len(frame) - 4
-    assert ("header" in message_type(type_).model_fields) == (frame[4:8] == b"\x07\x00\x00\x00" and len(frame) > 12)
+    assert ("header" in message_type(type_).model_fields) == (
+        frame[4:8] == b"\x07\x00\x00\x00" and len(frame) > 12
+    )
     assert wire.cdr(frame[4:]) == message
 
 
 def test_a_joint_state_byte_by_byte():
-    message = JointState(header=Header(stamp=Time(sec=1, nanosec=2), frame_id="a"), name=["q"], position=[0.5])
+    message = JointState(
+        header=Header(stamp=Time(sec=1, nanosec=2), frame_id="a"), name=["q"], position=[0.5]
+    )
     numbers = (5).to_bytes(4, "little") + (1).to_bytes(4, "little") + (2).to_bytes(4, "little")
     one, none = (1).to_bytes(4, "little"), bytes(4)
-    content = numbers + one + b"a" + one + one + b"q" + one + b"\x00\x00\x00\x00\x00\x00\xe0\x3f" + none + none
+    content = (
+        numbers + one + b"a" + one + one + b"q" + one + b"\x00\x00\x00\x00\x00\x00\xe0\x3f" + none + none
+    )
     assert Wire(JointState.ros_type).frame(encode(message), 5) == len(content).to_bytes(4, "little") + content
 
 
-@pytest.mark.parametrize("payload", [b"", b"\x00", b"\xff" * 60, bytes(range(256)) * 16], ids=["empty", "short", "lengths", "noise"])
-@pytest.mark.parametrize("type_", ["sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped", "std_msgs/msg/String", "crtk_msgs/msg/CartesianState"])
+@pytest.mark.parametrize(
+    "payload",
+    [b"", b"\x00", b"\xff" * 60, bytes(range(256)) * 16],
+    ids=["empty", "short", "lengths", "noise"],
+)
+@pytest.mark.parametrize(
+    "type_",
+    [
+        "sensor_msgs/msg/JointState",
+        "geometry_msgs/msg/PoseStamped",
+        "std_msgs/msg/String",
+        "crtk_msgs/msg/CartesianState",
+    ],
+)
 def test_bytes_that_are_no_message_are_told(type_, payload):
     with pytest.raises(MessageError, match="no such message of ROS 1"):
         Wire(type_).cdr(payload)

@@ -41,7 +41,9 @@ def showing(endpoint, directory, **params):
         gateway.learn_hub(partial(open_session, "client", connect=[endpoint]))
         gateway.open(directory)
         with Peer(endpoint, "probe", domain=params.get("domain", 0)) as probe:
-            assert until(lambda: sum(entry[0] == "dvrk" for entry in probe.graph()) == len(gateway.rows) + 1), "the graph is not complete"
+            assert until(
+                lambda: sum(entry[0] == "dvrk" for entry in probe.graph()) == len(gateway.rows) + 1
+            ), "the graph is not complete"
         yield gateway
 
 
@@ -74,14 +76,21 @@ def until(condition, seconds=5.0):
 def joints(values=(0.0,) * 6, stamp_ns=None):
     sec, nanosec = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 10**9)
     header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": ""}
-    return built(TYPES, JOINTS, {"header": header, "name": [], "position": values, "velocity": [], "effort": []})
+    return built(
+        TYPES, JOINTS, {"header": header, "name": [], "position": values, "velocity": [], "effort": []}
+    )
 
 
 def complaints(peer):
     """Return a list to which all is added that is said of PSM1."""
     said = []
     for level in ("warning", "error"):
-        peer.listen(f"/PSM1/{level}", "std_msgs/msg/String", lambda message, _: said.append(message.data), latched=True)
+        peer.listen(
+            f"/PSM1/{level}",
+            "std_msgs/msg/String",
+            lambda message, _: said.append(message.data),
+            latched=True,
+        )
     return said
 
 
@@ -97,7 +106,12 @@ class TablePeer:
         for row in rows:
             if row.way == "publish":
                 heard = self.published[row.topic] = queue.Queue()
-                self.peer.listen(row.topic, row.type, lambda message, _, heard=heard: heard.put(message), latched=row.latched)
+                self.peer.listen(
+                    row.topic,
+                    row.type,
+                    lambda message, _, heard=heard: heard.put(message),
+                    latched=row.latched,
+                )
             elif row.way == "subscribe":
                 self.publishers[row.topic] = self.peer.publisher(row.topic, row.type)
         time.sleep(0.5)  # until all has gone round
@@ -107,13 +121,17 @@ class TablePeer:
 
     def heard(self, row, timeout_s):
         try:
-            return message_type(row.type).model_validate(flat(self.published[row.topic].get(timeout=timeout_s)))
+            return message_type(row.type).model_validate(
+                flat(self.published[row.topic].get(timeout=timeout_s))
+            )
         except queue.Empty:
             raise TimeoutError(row.topic) from None
 
     def call(self, row, request):
         package, _, name = row.type.split("/")
-        response, went, came = self.peer.call(row.topic, row.type, built(TYPES, f"{package}/msg/{name}_Request", request.model_dump()))
+        response, went, came = self.peer.call(
+            row.topic, row.type, built(TYPES, f"{package}/msg/{name}_Request", request.model_dump())
+        )
         assert (went[:8], went[16:]) == (came[:8], came[16:])  # sequence number and id come back
         return message_type(f"{row.type}_Response").model_validate(flat(response))
 
@@ -132,7 +150,9 @@ def test_all_belongs_to_one_node_called_as_on_the_real_system(psm, peer):
     graph = peer.graph()
     assert {entry[0] for entry in graph} == {"dvrk", "console"}
     ways = {"publish": "MP", "subscribe": "MS", "serve": "SS"}
-    assert {entry[1:3] for entry in graph if entry[0] == "dvrk" and entry[1] != "NN"} == {(ways[row.way], row.topic) for row in psm.rows}
+    assert {entry[1:3] for entry in graph if entry[0] == "dvrk" and entry[1] != "NN"} == {
+        (ways[row.way], row.topic) for row in psm.rows
+    }
     assert {entry[5] for entry in graph if entry[2:3] == (EVENT,)} == {":1:,1:,:,:,,"}
     assert {entry[5] for entry in graph if entry[2:3] == (STATE,)} == {"::,10:,:,:,,"}
 
@@ -206,7 +226,12 @@ def test_a_second_console_does_not_command_the_same_arm(psm, hub):
         assert "second" in warnings[0] or "publisher" in warnings[0]
 
 
-NO_MESSAGES = {"empty": b"", "header": b"\x00\x01\x00\x00", "lengths": b"\x00\x01\x00\x00" + b"\xff" * 60, "noise": bytes(range(256)) * 16}
+NO_MESSAGES = {
+    "empty": b"",
+    "header": b"\x00\x01\x00\x00",
+    "lengths": b"\x00\x01\x00\x00" + b"\xff" * 60,
+    "noise": bytes(range(256)) * 16,
+}
 
 
 @pytest.mark.parametrize("payload", NO_MESSAGES.values(), ids=NO_MESSAGES)
@@ -262,11 +287,19 @@ def stalled(endpoint):
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(hub, tmp_path):
-    picture = {"height": 288, "width": 320, "encoding": "rgb8", "step": 960, "data": np.zeros(276480, np.uint8)}
+    picture = {
+        "height": 288,
+        "width": 320,
+        "encoding": "rgb8",
+        "step": 960,
+        "data": np.zeros(276480, np.uint8),
+    }
     with showing(hub, tmp_path, arms={"PSM1": {}}) as psm, Peer(hub) as console, stalled(hub):
         numbers, words, slowest = [], [], 0.0
         console.listen(STATE, JOINTS, lambda _, attached: numbers.append(attached[0]))
-        console.listen("/PSM1/status", "std_msgs/msg/String", lambda message, _: words.append(message.data), latched=True)
+        console.listen(
+            "/PSM1/status", "std_msgs/msg/String", lambda message, _: words.append(message.data), latched=True
+        )
         image = message_type("sensor_msgs/msg/Image").model_validate(picture)
         for word in range(120):  # 33 MB, more than the buffers on the way to the stalled one hold
             before = time.monotonic()

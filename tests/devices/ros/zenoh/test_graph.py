@@ -13,7 +13,9 @@ def node(session, name="/console"):
 
 
 def endpoint(session, topic, kind="MP", number=1, name="/console"):
-    return Endpoint(session, number, kind, name, topic, "sensor_msgs/msg/JointState", "RIHS01_0", VOLATILE).token(0)
+    return Endpoint(
+        session, number, kind, name, topic, "sensor_msgs/msg/JointState", "RIHS01_0", VOLATILE
+    ).token(0)
 
 
 def graph(*tokens):
@@ -24,7 +26,14 @@ def graph(*tokens):
 
 
 def test_programs_are_known_by_what_they_have_to_do_with():
-    it = graph(node(OURS, "/dvrk"), endpoint(OURS, STATE, name="/dvrk"), node(ONE), endpoint(ONE, STATE, "MS"), node(OTHER, "/rviz"), endpoint(OTHER, "/other"))
+    it = graph(
+        node(OURS, "/dvrk"),
+        endpoint(OURS, STATE, name="/dvrk"),
+        node(ONE),
+        endpoint(ONE, STATE, "MS"),
+        node(OTHER, "/rviz"),
+        endpoint(OTHER, "/other"),
+    )
     assert it.clients({COMMAND, STATE}) == (Client("/console", ONE),)
 
 

@@ -1,4 +1,6 @@
-"""The layout of rmw_zenoh, held against what nodes of ROS 2 Jazzy (rmw_zenoh 0.2.11) have on the wire, and against hashes that ROS ships."""
+"""The layout of rmw_zenoh, held against what nodes of ROS 2 Jazzy (rmw_zenoh 0.2.11) have on the wire, and
+against hashes that ROS ships.
+"""
 
 import pytest
 from hypothesis import given
@@ -17,7 +19,9 @@ NODE = "@ros2_lv/0/914ec2c920f5151f26394cf0ba959999/0/0/NN/%/%/p_tl"
 PUBLISHER = f"@ros2_lv/0/914ec2c920f5151f26394cf0ba959999/0/4/MP/%/%/p_tl/%q_transient/std_msgs::msg::dds_::String_/{STRING_HASH}/:1:,10:,:,:,,"
 SENT = bytes.fromhex("15000000000000008903674cf9a2dc1810b9249d3fec6b1be4c0c8a0e3eb3550bb")
 NAMESPACED = f"@ros2_lv/7/6977b59f87229328a8d406ad77b301a6/0/11/MP/%/%cell4/gw/%cell4%chatter/std_msgs::msg::dds_::String_/{STRING_HASH}/::,7:,:,:,,"
-"""As captured from `ros2 topic pub` of Jazzy: a node, its latched publisher, the attachment of a message of that, and a publisher in a namespace."""
+"""As captured from `ros2 topic pub` of Jazzy: a node, its latched publisher, the attachment of a message of
+that, and a publisher in a namespace.
+"""
 
 
 def test_tokens_are_those_of_a_real_node():
@@ -25,8 +29,25 @@ def test_tokens_are_those_of_a_real_node():
     assert node == Endpoint("914ec2c920f5151f26394cf0ba959999", 0, "NN", "/p_tl")
     assert node.token(0) == NODE
     publisher = Endpoint.of(PUBLISHER)
-    assert (publisher.number, publisher.kind, publisher.node, publisher.topic) == (4, "MP", "/p_tl", "/q_transient")
-    assert Endpoint(publisher.session, 4, "MP", "/p_tl", "/q_transient", "std_msgs/msg/String", STRING_HASH, ":1:,10:,:,:,,").token(0) == PUBLISHER
+    assert (publisher.number, publisher.kind, publisher.node, publisher.topic) == (
+        4,
+        "MP",
+        "/p_tl",
+        "/q_transient",
+    )
+    assert (
+        Endpoint(
+            publisher.session,
+            4,
+            "MP",
+            "/p_tl",
+            "/q_transient",
+            "std_msgs/msg/String",
+            STRING_HASH,
+            ":1:,10:,:,:,,",
+        ).token(0)
+        == PUBLISHER
+    )
     assert Endpoint.of(NAMESPACED).node == "/cell4/gw"
     assert Endpoint.of(NAMESPACED).topic == "/cell4/chatter"
 
@@ -38,7 +59,15 @@ def test_ids_and_attachments_are_those_of_a_real_node():
 
 
 @pytest.mark.parametrize(
-    "token", ["", "@ros2_lv/0", PUBLISHER.replace("MP", "XX"), PUBLISHER + "/more", NODE.replace("/0/0/", "/0/x/"), "trocar/s/alive/hub/hub"]
+    "token",
+    [
+        "",
+        "@ros2_lv/0",
+        PUBLISHER.replace("MP", "XX"),
+        PUBLISHER + "/more",
+        NODE.replace("/0/0/", "/0/x/"),
+        "trocar/s/alive/hub/hub",
+    ],
 )
 def test_other_tokens_are_left_alone(token):
     assert Endpoint.of(token) is None
@@ -54,18 +83,25 @@ def test_bytes_that_are_no_attachment_are_refused(data):
 
 
 def test_keys_hold_domain_topic_type_and_hash():
-    assert key(0, "/chatter", "std_msgs/msg/String") == f"0/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"
-    assert key(42, "/PSM1/measured_js", "sensor_msgs/msg/JointState").startswith("42/PSM1/measured_js/sensor_msgs::msg::dds_::JointState_/RIHS01_")
+    assert (
+        key(0, "/chatter", "std_msgs/msg/String") == f"0/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"
+    )
+    assert key(42, "/PSM1/measured_js", "sensor_msgs/msg/JointState").startswith(
+        "42/PSM1/measured_js/sensor_msgs::msg::dds_::JointState_/RIHS01_"
+    )
     assert graph_key(42) == "@ros2_lv/42/**"
 
 
 def test_a_service_has_the_hash_that_ros_ships():
-    shipped = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"  # ros-jazzy-std-srvs, share/std_srvs/srv/Trigger.json
+    # ros-jazzy-std-srvs, share/std_srvs/srv/Trigger.json
+    shipped = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
     assert service_hash("std_srvs/srv/Trigger", "", "bool success\nstring message") == shipped
 
 
 def test_every_type_of_the_table_has_a_hash():
-    everything = GatewayParams.model_validate({"arms": {"PSM1": {}, "ECM": {}}, "listen": ["MTMR"], "teleoperations": ["MTMR_PSM1"]})
+    everything = GatewayParams.model_validate(
+        {"arms": {"PSM1": {}, "ECM": {}}, "listen": ["MTMR"], "teleoperations": ["MTMR_PSM1"]}
+    )
     for type_ in {row.type for row in face(everything)}:
         assert type_hash(type_).startswith("RIHS01_")
         if type_ in TYPES.types:  # of the peer, which has the types from rosbags and their texts from CRTK

@@ -1,6 +1,7 @@
 """The table through zenoh-ros2-sdk, a client of others: Robotis' own way to speak ROS 2 on Zenoh without ROS.
 
-It fetches definitions of messages from GitHub; here it finds them in a directory, written from rosbags' and from CRTK's own texts.
+It fetches definitions of messages from GitHub; here it finds them in a directory, written from rosbags' and
+from CRTK's own texts.
 """
 
 import logging
@@ -30,7 +31,10 @@ def write_definitions(directory):
             _write(directory / package / "msg" / f"{short}.msg", text)
         elif short.endswith("_Request"):
             service = short.removesuffix("_Request")
-            _write(directory / package / "srv" / f"{service}.srv", f"{text}\n---\n{CRTK[f'{package}/msg/{service}_Response']}")
+            _write(
+                directory / package / "srv" / f"{service}.srv",
+                f"{text}\n---\n{CRTK[f'{package}/msg/{service}_Response']}",
+            )
 
 
 def _write(file, text):
@@ -76,7 +80,9 @@ class SdkPeer:
 
     def heard(self, row, timeout_s):
         try:
-            return message_type(row.type).model_validate(flat(self.heard_of[row.topic].get(timeout=timeout_s)))
+            return message_type(row.type).model_validate(
+                flat(self.heard_of[row.topic].get(timeout=timeout_s))
+            )
         except queue.Empty:
             raise TimeoutError(row.topic) from None
 
@@ -102,9 +108,15 @@ def test_the_table_through_a_client_of_others(tmp_path, caplog):
 
 
 def test_its_tools_list_what_the_gateway_shows(tmp_path):
-    with router() as hub, showing(hub, tmp_path, arms={"PSM1": {}}) as gateway, connected(hub, tmp_path / "messages"):
+    with (
+        router() as hub,
+        showing(hub, tmp_path, arms={"PSM1": {}}) as gateway,
+        connected(hub, tmp_path / "messages"),
+    ):
         listed = dict(sdk.get_topic_names_and_types(domain_id=0))
         assert {row.topic for row in gateway.rows if row.way != "serve"} == listed.keys()
         assert listed[STATE] == ["sensor_msgs/msg/JointState"]
         assert listed[EVENT] == ["crtk_msgs/msg/OperatingState"]
-        assert dict(sdk.get_service_names_and_types(domain_id=0))["/PSM1/inverse_kinematics"] == ["crtk_msgs/srv/QueryInverseKinematics"]
+        assert dict(sdk.get_service_names_and_types(domain_id=0))["/PSM1/inverse_kinematics"] == [
+            "crtk_msgs/srv/QueryInverseKinematics"
+        ]

@@ -1,4 +1,6 @@
-"""The gateway as a participant: in the hub's process and in a host of its own, found by a program at the hub's address."""
+"""The gateway as a participant: in the hub's process and in a host of its own, found by a program at the
+hub's address.
+"""
 
 import threading
 import time
@@ -73,7 +75,9 @@ def test_a_program_moves_an_arm(host, prepare, tmp_path, monkeypatch):
                 program.listen(STATE, JOINTS, lambda message, _: heard.append(message.position.tolist()))
                 assert until(lambda: heard, 20.0), "no state came"
                 publish = program.publisher(COMMAND, JOINTS)
-                assert until(lambda: publish(joints([0.1] * 6)) or time.sleep(0.05) or heard[-1] == [0.1] * 6, 10.0), "the arm did not move"
+                assert until(
+                    lambda: publish(joints([0.1] * 6)) or time.sleep(0.05) or heard[-1] == [0.1] * 6, 10.0
+                ), "the arm did not move"
         except Exception as error:  # noqa: BLE001  # it is raised in the main thread
             failures.append(error)
         finally:
