@@ -24,11 +24,11 @@ import numpy as np
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from hub.participant import Inputs, Setup
-from hub.planning.plan import Member
+from hub.planning.plan import PlannedParticipant
 from hub.session.launch import plan_of
 from hub.session.session import Session
 from hub.transport.endpoints import free_endpoint
-from schemas.lockstep import Report
+from schemas.lockstep import Ack
 from schemas.scenario import Scenario
 
 STEP_NS = 1_000_000
@@ -75,10 +75,10 @@ def session_us() -> float:
     plan, participants = plan_of(scenario, {"robot": MujocoParams.model_validate(SCENE)})
     reported: list[tuple[int, float]] = []
 
-    def on_report(_member: Member, report: Report) -> None:
-        reported.append((report.step, time.thread_time()))
+    def on_ack(_member: PlannedParticipant, ack: Ack) -> None:
+        reported.append((ack.step, time.thread_time()))
 
-    Session(scenario, plan, participants, Path(), endpoint=free_endpoint(range(1)), on_report=on_report).run()
+    Session(scenario, plan, participants, Path(), endpoint=free_endpoint(range(1)), on_ack=on_ack).run()
     (first, begun), (last, ended) = reported[len(reported) // 2], reported[-1]
     return (ended - begun) / (last - first) * 1e6
 

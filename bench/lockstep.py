@@ -145,7 +145,7 @@ def _wait_for_start(
     neighbour: zenoh.Subscriber | None,
     index: int,
 ) -> None:
-    """Report ready once the neighbour can be heard, until the first grant says that all are."""
+    """Ack ready once the neighbour can be heard, until the first grant says that all are."""
     heard = neighbour is None
     while grants.try_recv() is None:
         if neighbour is not None:

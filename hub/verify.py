@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from hub.observation.summary import Progress
 from hub.planning import registry
 from hub.planning.file_hashes import changed_files
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recording import Recording
 from hub.session.session import Session
-from schemas.lockstep import Report
-from schemas.trocar_msgs import Ack
+from schemas.lockstep import Ack
+from schemas.trocar_msgs import AckMessage
 
 __all__ = ["VerifySummary", "verify"]
 
@@ -48,12 +48,16 @@ def verify(
         _plan(recording),
         recording.directory(),
     )
-    here = [member for member in plan.members.values() if member.host == "hub" and member.role != "device"]
+    here = [
+        planned
+        for planned in plan.participants.values()
+        if planned.host == "hub" and planned.role != "device"
+    ]
     made = {
-        member.name: registry.make(
-            member.kind, member.name, scenario.participants[member.name].params, directory
+        planned.name: registry.make(
+            planned.kind, planned.name, scenario.participants[planned.name].params, directory
         )
-        for member in here
+        for planned in here
     }
     for path in changed_files(recording.files()):
         log.warning("'%s' is not the file that was read when this was recorded: expect differences", path)
@@ -65,7 +69,7 @@ def verify(
         directory,
         endpoint=endpoint,
         grants=recording.grants(),
-        on_report=comparison.take,
+        on_ack=comparison.take,
     )
     comparison.stop = session.state.shutdown
     ran = session.run(progress)
@@ -84,7 +88,7 @@ class _Comparison:
     """Every ack beside the recorded one."""
 
     def __init__(self, recording: Recording, plan: Plan) -> None:
-        self._recorded: dict[str, Iterator[Ack]] = {name: recording.acks(name) for name in plan.order}
+        self._recorded: dict[str, Iterator[AckMessage]] = {name: recording.acks(name) for name in plan.order}
         self._order = plan.order
         self._differences: list[tuple[int, int]] = []
         self.hashes = 0
@@ -95,28 +99,24 @@ class _Comparison:
         """Step and place in the step order of the first difference."""
         return min(self._differences, default=None)
 
-    def take(self, member: Member, report: Report) -> None:
+    def take(self, planned: PlannedParticipant, ack: Ack) -> None:
         """Compare a report; at a difference, end the session once the others of this step have been compared."""
-        then = next(self._recorded[member.name], None)
+        then = next(self._recorded[planned.name], None)
         if then is None:
             return  # the recording was cut short between the grant and this ack
         recorded = then.state_hash.tolist()
-        self.hashes += min(len(recorded), len(report.state_hash))
+        self.hashes += min(len(recorded), len(ack.state_hash))
         first = next(
-            (
-                i
-                for i, (one, other) in enumerate(zip(recorded, report.state_hash, strict=False))
-                if one != other
-            ),
+            (i for i, (one, other) in enumerate(zip(recorded, ack.state_hash, strict=False)) if one != other),
             None,
         )
-        if then.step != report.step or len(recorded) != len(report.state_hash):
-            self._differ(report.step, member)
+        if then.step != ack.step or len(recorded) != len(ack.state_hash):
+            self._differ(ack.step, planned)
         elif first is not None:
-            self._differ(report.step + first * member.period, member)
+            self._differ(ack.step + first * planned.period, planned)
 
-    def _differ(self, step: int, member: Member) -> None:
-        self._differences.append((step, self._order.index(member.name)))
+    def _differ(self, step: int, planned: PlannedParticipant) -> None:
+        self._differences.append((step, self._order.index(planned.name)))
         self.stop()
 
 
@@ -125,9 +125,11 @@ def _plan(recording: Recording) -> Plan:
     are left alone.
     """
     plan = recording.plan()
-    members = {
-        name: member.model_copy(update={"host": member.host.replace("/", "_")})
-        for name, member in plan.members.items()
+    participants = {
+        name: planned.model_copy(update={"host": planned.host.replace("/", "_")})
+        for name, planned in plan.participants.items()
     }
-    links = tuple(link for link in plan.links if plan.members[link.target].role != "device")
-    return plan.model_copy(update={"members": members, "links": links, "outlets": ()})
+    connections = tuple(k for k in plan.connections if plan.participants[k.target].role != "device")
+    return plan.model_copy(
+        update={"participants": participants, "connections": connections, "to_devices": ()}
+    )

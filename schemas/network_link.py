@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from schemas.quantity import Duration
 
-__all__ = ["PRESETS", "LinkSpec", "Outage", "Preset"]
+__all__ = ["PRESETS", "NetworkLinkSpec", "Outage", "Preset"]
 
 PRESETS = {
     0: "no way at all",
@@ -52,7 +52,7 @@ class Outage(BaseModel):
     duration: Duration = Field(gt=0)
 
 
-class LinkSpec(BaseModel):
+class NetworkLinkSpec(BaseModel):
     """The way between a device and the hub, the same in both directions."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

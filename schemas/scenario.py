@@ -10,10 +10,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from schemas.keys import valid_name
-from schemas.network_link import LinkSpec
+from schemas.network_link import NetworkLinkSpec
 from schemas.quantity import Duration
 
-__all__ = ["Bond", "Connection", "Endpoint", "Measure", "ParticipantSpec", "Scenario"]
+__all__ = ["Bond", "Connection", "PortReference", "Measure", "ParticipantSpec", "Scenario"]
 
 Algorithm = Literal["impulse", "impulse-linearised", "gauss-seidel", "jacobi"]
 
@@ -31,7 +31,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Endpoint(_Part):
+class PortReference(_Part):
     """`participant.port`."""
 
     participant: str
@@ -67,7 +67,7 @@ class ParticipantSpec(_Part):
             " read; default: 1 ms"
         ),
     )
-    link: LinkSpec | None = Field(
+    network_link: NetworkLinkSpec | None = Field(
         default=None, description="of a device: the network that is put between it and the hub; default: none"
     )
     rate_limit: float = Field(
@@ -78,7 +78,7 @@ class ParticipantSpec(_Part):
             "of a device: messages per second that the hub takes from each of its ports, bursts aside"
         ),
     )
-    RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period", "link", "rate_limit")
+    RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period", "network_link", "rate_limit")
 
     @property
     def params(self) -> dict[str, Any]:
@@ -93,8 +93,8 @@ class Connection(_Part):
     input of the same name of `robot`; outputs that have no such input stay unconnected.
     """
 
-    source: Endpoint
-    target: Endpoint
+    source: PortReference
+    target: PortReference
     extrapolation: Literal["hold", "linear"] = "hold"
 
     @model_validator(mode="before")
@@ -127,8 +127,8 @@ class Connection(_Part):
 class Bond(_Part):
     """A power bond: pose and twist one way, wrench the other."""
 
-    motion: Endpoint
-    force: Endpoint
+    motion: PortReference
+    force: PortReference
     algorithm: Algorithm = "impulse"
     prediction: Literal["velocity", "slope"] = Field(
         default="velocity",
@@ -159,7 +159,7 @@ class Measure(_Part):
             " else of several numbers the norm is taken"
         )
     )
-    of: Endpoint
+    of: PortReference
     after: Duration = Field(default=0, ge=0, description="simulated time before which values do not count")
     level: float | None = Field(default=None, description="for time-above, in the unit of the port")
     unit: str = ""
@@ -208,6 +208,14 @@ class Scenario(_Part):
     )
     join_limit: Duration = Field(
         default=60 * 10**9, gt=0, description="wall time to wait for all participants to join"
+    )
+    scene: dict[str, Any] = Field(
+        default={},
+        exclude=True,
+        description=(
+            "parameters stated once, such as arms, mounting, table and objects: every participant gets those"
+            " that its kind has; what it states itself goes before them, and null keeps them out"
+        ),
     )
     participants: dict[Name, ParticipantSpec] = Field(min_length=1)
     connections: Annotated[list[Connection], BeforeValidator(lambda v: [] if v is None else v)] = []

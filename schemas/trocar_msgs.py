@@ -24,7 +24,7 @@ from schemas.message import (
 from schemas.ros import Header, Vector3
 
 __all__ = [
-    "Ack",
+    "AckMessage",
     "ContactModel",
     "ContactPlane",
     "CouplingEnergy",
@@ -32,7 +32,7 @@ __all__ = [
     "GatewayClient",
     "GatewayStatus",
     "GatewayTopic",
-    "Grant",
+    "GrantMessage",
     "InletSample",
     "Latency",
     "ParticipantStatus",
@@ -57,7 +57,7 @@ class InletSample(Message):
     """Wall time between the arrival of the sample and the communication point; for information only."""
 
 
-class Grant(Message):
+class GrantMessage(Message):
     """The hub's permission to advance from step `step` at `start_ns` to `horizon_ns`, with all that enters
     there.
     """
@@ -71,7 +71,7 @@ class Grant(Message):
     inlets: list[InletSample] = Field(default_factory=list[InletSample])
 
 
-class Ack(Message):
+class AckMessage(Message):
     """A participant has done the steps of one grant. The arrays hold one entry per step it took in it."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/Ack"

@@ -68,7 +68,7 @@ class Felt(NamedTuple):
 
 def _run(scenario: dict, file: Path, link: dict) -> Felt:
     """Run a session in this process, and listen at the hand's side of the link."""
-    scenario["participants"]["console"]["link"] = link
+    scenario["participants"]["console"]["network_link"] = link
     file.write_text(json.dumps(scenario))
     loaded = load(str(file))
     checked = in_one_host(loaded.scenario)

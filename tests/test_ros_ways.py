@@ -60,13 +60,13 @@ def test_a_gateway_fits_where_the_recording_of_masters_is():
     ]
     connections = [*loaded.scenario.connections, *(Connection.model_validate(one) for one in back)]
     plan, _ = plan_of(loaded.scenario.model_copy(update={"connections": tuple(connections)}), loaded.params)
-    assert {outlet.device_port for outlet in plan.outlets} >= {
+    assert {outlet.target_port for outlet in plan.to_devices} >= {
         "MTMR/move_cp",
         "MTMR/body/servo_cf",
         "MTMR_PSM1/current_state",
         "PSM1/measured_js",
     }
-    assert {inlet.device_port for inlet in plan.inlets} >= {
+    assert {inlet.source_port for inlet in plan.from_devices} >= {
         "footpedals/clutch",
         "MTMR/gripper/measured_js",
         "MTMR_PSM1/state_command",
@@ -78,8 +78,8 @@ def test_a_gateway_fits_where_the_recording_of_masters_is():
 def test_what_is_said_of_every_arm_reaches_programs_and_back(name):
     loaded = load(name)
     plan, _ = plan_of(loaded.scenario, loaded.params)
-    told = {outlet.device_port for outlet in plan.outlets}
-    heard = {inlet.device_port for inlet in plan.inlets}
+    told = {outlet.target_port for outlet in plan.to_devices}
+    heard = {inlet.source_port for inlet in plan.from_devices}
     if name == "ros":
         assert told >= {
             "PSM1/measured_js",

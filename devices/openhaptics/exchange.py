@@ -80,7 +80,7 @@ class State(NamedTuple):
     permitted: int
     """1 if the dead-man is held."""
     cause: int
-    """Why the force is on or off: index into the members of devices.haptics.safety.Condition."""
+    """Why the force is on or off: index into the participants of devices.haptics.safety.Condition."""
     position: Vector3
     """Of the tip, m."""
     rotation: tuple[float, ...]

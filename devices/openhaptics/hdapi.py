@@ -55,7 +55,7 @@ PLACEHOLDER_MM = (0.0, -110.0, -35.0)
 class Get:
     """Parameters of hdGet...v and hdSet...v (HD/hdDefines.h).
 
-    Plain numbers: members of an enumeration cost a servo callback a microsecond each.
+    Plain numbers: participants of an enumeration cost a servo callback a microsecond each.
     """
 
     BUTTONS = 0x2000

@@ -65,7 +65,7 @@ class Phase(IntEnum):
 _LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
 _POSED = {Phase.READY, Phase.WARNED}
 _READY, _SETTLING, _CALIBRATED = Phase.READY, Phase.SETTLING, Calibration.OK.value
-"""As plain names: Python 3.11 looks a member of an enumeration up in a quarter of a microsecond."""
+"""As plain names: Python 3.11 looks a planned of an enumeration up in a quarter of a microsecond."""
 
 
 @dataclass(frozen=True)

@@ -54,13 +54,13 @@ def link(
     """Put delay, jitter, loss or an outage between a device and the hub while a session runs; what is not
     said stays as it is.
     """
-    from hub.devices.network_link_control import LinkReply, LinkRequest
+    from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
     from hub.remote.live_sessions import ask_about
     from hub.transport.endpoints import listening_endpoints
 
     said = {"preset": preset, "delay": delay, "jitter": jitter, "loss": loss, "outage": outage}
     try:
-        request = LinkRequest.model_validate(
+        request = NetworkLinkRequest.model_validate(
             {"device": device} | {key: value for key, value in said.items() if value is not None}
         )
     except ValidationError as error:
@@ -68,7 +68,9 @@ def link(
         raise typer.BadParameter(
             wrong["msg"].removeprefix("Value error, "), param_hint=f"--{wrong['loc'][0]}"
         ) from error
-    reply = ask_about(device, connect or listening_endpoints(), "link", request, LinkReply, session=session)
+    reply = ask_about(
+        device, connect or listening_endpoints(), "link", request, NetworkLinkReply, session=session
+    )
     if as_json:
         show(reply.model_dump(mode="json"), as_json=True)
     else:

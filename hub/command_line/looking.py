@@ -40,19 +40,21 @@ def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json 
 def _print_plan(plan: Plan) -> None:
     """Print every participant with its ports, and who feeds its inputs."""
     feeds: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
-    for link in plan.links:
+    for link in plan.connections:
         feeds[link.target, link.target_port].append(f"{link.source}.{link.source_port}")
-    for inlet in plan.inlets:
-        feeds[inlet.target, inlet.target_port].append(f"{inlet.device}.{inlet.device_port}")
-    for outlet in plan.outlets:
-        feeds[outlet.device, outlet.device_port].append(f"{outlet.source}.{outlet.source_port}")
-    for member in plan.members.values():
-        console.print(f"[bold]{member.name}[/] ({member.role} of kind {member.kind}) on host {member.host}")
-        for port in member.ports:
+    for inlet in plan.from_devices:
+        feeds[inlet.target, inlet.target_port].append(f"{inlet.source}.{inlet.source_port}")
+    for outlet in plan.to_devices:
+        feeds[outlet.target, outlet.target_port].append(f"{outlet.source}.{outlet.source_port}")
+    for planned in plan.participants.values():
+        console.print(
+            f"[bold]{planned.name}[/] ({planned.role} of kind {planned.kind}) on host {planned.host}"
+        )
+        for port in planned.ports:
             detail = " ".join(
                 part for part in (port.type, port.unit, port.frame and f"in {port.frame}") if part
             )
-            source = ", ".join(feeds.get((member.name, port.name), ()))
+            source = ", ".join(feeds.get((planned.name, port.name), ()))
             console.print(
                 f"    {'->' if port.causality == 'output' else '<-'} {port.name} "
                 f" [dim]{detail}[/]{f'  from {source}' if source else ''}",

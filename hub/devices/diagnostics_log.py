@@ -39,10 +39,10 @@ class Complaints:
         """`drops` counts what is no diagnosis."""
         self._drops = drops
         ports = [
-            (member.name, port.name)
-            for member in plan.members.values()
-            if member.role == "device" and member.host.startswith("remote/")
-            for port in member.ports
+            (planned.name, port.name)
+            for planned in plan.participants.values()
+            if planned.role == "device" and planned.host.startswith("remote/")
+            for port in planned.ports
             if port.causality == "output" and port.type == DiagnosticStatus.ros_type
         ]
         self._last: dict[str, tuple[int, str]] = {}

@@ -66,31 +66,31 @@ class Inlets:
         """From a device to the grant."""
         self.offsets_ns = {
             m.name: 0
-            for m in plan.members.values()
-            if m.follows_clock or (m.role == "device" and m.host == "hub")
+            for m in plan.participants.values()
+            if m.simulated_time or (m.role == "device" and m.host == "hub")
         }
         """What is added to a device's clock to have that of the hub, as far as it is known."""
         self._inlets: dict[tuple[str, str], _Inlet] = {}
-        for inlet in plan.inlets:
-            port = plan.members[inlet.target].port(inlet.target_port)
-            source = plan.members[inlet.device].port(inlet.device_port)
-            device = plan.members[inlet.device]
+        for inlet in plan.from_devices:
+            port = plan.participants[inlet.target].port(inlet.target_port)
+            source = plan.participants[inlet.source].port(inlet.source_port)
+            device = plan.participants[inlet.source]
             new = _Inlet(
-                inlet.device,
-                inlet.device_port,
+                inlet.source,
+                inlet.source_port,
                 PortCodec(source.filled_from(port)),
-                simulated=device.follows_clock,
+                simulated=device.simulated_time,
             )
-            known = self._inlets.setdefault((inlet.device, inlet.device_port), new)
+            known = self._inlets.setdefault((inlet.source, inlet.source_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
-        fed = {(link.target, link.target_port) for link in plan.links} | {
-            (i.target, i.target_port) for i in plan.inlets
+        fed = {(link.target, link.target_port) for link in plan.connections} | {
+            (i.target, i.target_port) for i in plan.from_devices
         }
         self._settable = {
-            (member.name, port.name): port
-            for member in plan.members.values()
-            for port in member.ports
-            if member.role != "device" and port.causality == "input" and (member.name, port.name) not in fed
+            (planned.name, port.name): port
+            for planned in plan.participants.values()
+            for port in planned.ports
+            if planned.role != "device" and port.causality == "input" and (planned.name, port.name) not in fed
         }
         for (name, port_name), port in self._settable.items():
             self._inlets[name, port_name] = _Inlet(name, port_name, PortCodec(port), stale=False)

@@ -21,18 +21,18 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from schemas.network_link import LinkSpec, Outage
+from schemas.network_link import NetworkLinkSpec, Outage
 from schemas.ports import Port
 
-__all__ = ["Line", "Link", "LinkOrder", "in_words"]
+__all__ = ["Line", "NetworkLink", "NetworkLinkOrder", "in_words"]
 
 
-class LinkOrder(BaseModel):
+class NetworkLinkOrder(BaseModel):
     """What is to lie between a device and the hub from now on."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    spec: LinkSpec
+    spec: NetworkLinkSpec
     outage_ns: int = 0
     """And that nothing gets through for so long."""
 
@@ -45,7 +45,7 @@ class Line:
     as one.
     """
 
-    link: Link
+    link: NetworkLink
     reliable: bool
     chance: random.Random
     _waiting: list[tuple[int, int, Any]] = field(default_factory=list[tuple[int, int, Any]])
@@ -82,21 +82,21 @@ class Line:
             yield arrival_ns, message
 
 
-class Link:
+class NetworkLink:
     """Both directions of all ports of one device. Without a spec everything arrives at once; it can be
     changed at any time.
     """
 
-    def __init__(self, spec: LinkSpec | None) -> None:
+    def __init__(self, spec: NetworkLinkSpec | None) -> None:
         """Take the link of the scenario."""
-        self.spec = spec or LinkSpec()
+        self.spec = spec or NetworkLinkSpec()
         self._lines: dict[tuple[str, str], Line] = {}
         self.used = False
         """Whether anything was ever sent over it: a gateway has hundreds of ports, and most links lie
         nowhere.
         """
         self._outages = list(self.spec.outages)
-        self._orders: deque[LinkOrder] = deque()
+        self._orders: deque[NetworkLinkOrder] = deque()
 
     @property
     def clear(self) -> bool:
@@ -117,7 +117,7 @@ class Link:
             )
         return line
 
-    def order(self, order: LinkOrder) -> None:
+    def order(self, order: NetworkLinkOrder) -> None:
         """Ask for another link from the next time on that somebody looks; from any thread."""
         self._orders.append(order)
 
@@ -147,7 +147,7 @@ class Link:
         return random.Random(f"{self.spec.seed} {causality} {port}")
 
 
-def in_words(spec: LinkSpec, outage_ns: int = 0) -> str:
+def in_words(spec: NetworkLinkSpec, outage_ns: int = 0) -> str:
     """Return what lies between a device and the hub; empty: nothing."""
     parts = (
         f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",

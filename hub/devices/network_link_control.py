@@ -8,19 +8,19 @@ from typing import Any
 import zenoh
 from pydantic import BaseModel, ConfigDict, Field
 
-from hub.devices.network_link import Link, LinkOrder, in_words
+from hub.devices.network_link import NetworkLink, NetworkLinkOrder, in_words
 from hub.planning.plan import Plan
 from schemas.codec import encode
 from schemas.errors import MessageError, did_you_mean
 from schemas.keys import Keys
-from schemas.network_link import LinkSpec, Preset
+from schemas.network_link import NetworkLinkSpec, Preset
 from schemas.quantity import Duration
 from schemas.ros import StringMessage
 
-__all__ = ["LinkReply", "LinkRequest", "Relink"]
+__all__ = ["NetworkLinkReply", "NetworkLinkRequest", "NetworkLinkControl"]
 
 
-class LinkRequest(BaseModel):
+class NetworkLinkRequest(BaseModel):
     """Change the link of a device; what is not said stays as it is.
 
     A preset or a delay takes the place of the other.
@@ -37,23 +37,29 @@ class LinkRequest(BaseModel):
     """Let nothing through for so long from now on."""
 
 
-class LinkReply(BaseModel):
+class NetworkLinkReply(BaseModel):
     """How the link of a device is from now on."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     device: str
-    link: LinkSpec
+    link: NetworkLinkSpec
     description: str
     """The same in words; empty: nothing."""
 
 
-class Relink:
+class NetworkLinkControl:
     """Knows the present link of every device, and has it changed where the device is."""
 
-    def __init__(self, plan: Plan, session: zenoh.Session, keys: Keys, simulated: Mapping[str, Link]) -> None:
+    def __init__(
+        self, plan: Plan, session: zenoh.Session, keys: Keys, simulated: Mapping[str, NetworkLink]
+    ) -> None:
         """`simulated`: the links of the devices that follow the clock; the others are told over Zenoh."""
-        self._specs = {m.name: m.link or LinkSpec() for m in plan.members.values() if m.role == "device"}
+        self._specs = {
+            m.name: m.network_link or NetworkLinkSpec()
+            for m in plan.participants.values()
+            if m.role == "device"
+        }
         self._simulated = simulated
         away = [name for name in self._specs if name not in simulated]
         block, cdr = zenoh.CongestionControl.BLOCK, zenoh.Encoding.APPLICATION_CDR
@@ -63,7 +69,7 @@ class Relink:
         }
         self._changed: set[str] = set()
 
-    def change(self, request: LinkRequest) -> LinkReply:
+    def change(self, request: NetworkLinkRequest) -> NetworkLinkReply:
         """Change a link; raises MessageError if there is no such device, ValueError if the link cannot be so."""
         name = request.device
         if name not in self._specs:
@@ -72,11 +78,11 @@ class Relink:
             mode="json", exclude={"device", "outage"}, exclude_none=True
         )
         replaced = {"preset": None, "delay": 0} if said.keys() & {"preset", "delay"} else {}
-        self._specs[name] = LinkSpec.model_validate(
+        self._specs[name] = NetworkLinkSpec.model_validate(
             self._specs[name].model_dump(mode="json") | replaced | said
         )
         self._order(name, request.outage)
-        return LinkReply(
+        return NetworkLinkReply(
             device=name,
             link=self._specs[name],
             description=in_words(self._specs[name], outage_ns=request.outage),
@@ -88,7 +94,7 @@ class Relink:
             self._order(device, 0)
 
     def _order(self, name: str, outage_ns: int) -> None:
-        order = LinkOrder(spec=self._specs[name], outage_ns=outage_ns)
+        order = NetworkLinkOrder(spec=self._specs[name], outage_ns=outage_ns)
         self._changed.add(name)
         if name in self._simulated:
             self._simulated[name].order(order)

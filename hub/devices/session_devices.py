@@ -15,7 +15,7 @@ from zenoh.handlers import Callback
 from hub.devices.diagnostics_log import Complaints
 from hub.devices.inlets import Inlets
 from hub.devices.loop import DeviceLoop
-from hub.devices.network_link_control import Relink
+from hub.devices.network_link_control import NetworkLinkControl
 from hub.devices.simulated import SimulatedDevices
 from hub.devices.uplink import DeviceUplink, Run
 from hub.observation.observers import Observers
@@ -23,7 +23,7 @@ from hub.participant import Device, Sample
 from hub.planning.plan import Plan
 from hub.transport.envelope import Stamp
 from hub.transport.rate_limit import Allowance
-from hub.transport.reader import Feed
+from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Drops
 from schemas.codec import decode
 from schemas.errors import LateError, MessageError
@@ -47,7 +47,7 @@ class Intake:
     def __init__(self, plan: Plan, keys: Keys, run: int, drops: Drops, inlets: Inlets) -> None:
         """`drops` counts what is refused."""
         self._plan, self._keys, self._run, self._drops, self._inlets = plan, keys, run, drops, inlets
-        self._connected = {(inlet.device, inlet.device_port) for inlet in plan.inlets}
+        self._connected = {(inlet.source, inlet.source_port) for inlet in plan.from_devices}
         self._statuses: dict[str, DeviceStatus] = {}
         self._latencies: dict[str, list[Latency]] = {}
         """What the host of each device told last, also of one that is gone."""
@@ -58,31 +58,36 @@ class Intake:
         self,
         session: zenoh.Session,
         devices: Mapping[str, Device],
-        feeds: Mapping[str, Feed],
+        feeds: Mapping[str, DeviceInputs],
         observers: Observers,
         failed: Callable[[str, str], None],
     ) -> None:
         """Lay out the `devices` of this process, and listen to those of others."""
         self._observers = observers
-        members = self._plan.members
-        simulated = {name: device for name, device in devices.items() if members[name].follows_clock}
+        participants = self._plan.participants
+        simulated = {name: device for name, device in devices.items() if participants[name].simulated_time}
         self.simulated = SimulatedDevices(self._plan, simulated, feeds, self._drops)
         self._loops = {
-            name: DeviceLoop(name, device, members[name].read_ns, failed=failed)
+            name: DeviceLoop(name, device, participants[name].read_ns, failed=failed)
             for name, device in devices.items()
             if name not in simulated
         }
         run = Run(self._plan, self._keys, self._run)
         self._uplinks = [
-            DeviceUplink(members[name], run, session, loop, self._drops) for name, loop in self._loops.items()
+            DeviceUplink(participants[name], run, session, loop, self._drops)
+            for name, loop in self._loops.items()
         ]
         for uplink, loop in zip(self._uplinks, self._loops.values(), strict=True):
             loop.attach(uplink)
-        self.relink = Relink(self._plan, session, self._keys, self.simulated.links)
+        self.network_links = NetworkLinkControl(self._plan, session, self._keys, self.simulated.links)
         self._complaints = Complaints(self._plan, self._keys, session, self._drops)
-        self._away = [m.name for m in members.values() if m.role == "device" and m.host != "hub"]
-        self._status_allowance = Allowance(_STATUSES * (1.0 + len(members)))
-        wall = [member for member in members.values() if member.role == "device" and not member.follows_clock]
+        self._away = [m.name for m in participants.values() if m.role == "device" and m.host != "hub"]
+        self._status_allowance = Allowance(_STATUSES * (1.0 + len(participants)))
+        wall = [
+            planned
+            for planned in participants.values()
+            if planned.role == "device" and not planned.simulated_time
+        ]
         spoken = [
             (m.name, p.name)
             for m in wall
@@ -144,7 +149,7 @@ class Intake:
             self._observers.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
-        allowance = Allowance(self._plan.members[device].rate_limit)
+        allowance = Allowance(self._plan.participants[device].rate_limit)
 
         def take(sample: zenoh.Sample) -> None:
             now_ns = monotonic_ns()
@@ -167,7 +172,7 @@ class Intake:
             status = decode(DeviceStatus, sample.payload.to_bytes())
             if (
                 str(sample.key_expr) != self._keys.device_status(status.device)
-                or status.device not in self._plan.members
+                or status.device not in self._plan.participants
             ):
                 raise MessageError(f"tells of '{status.device}', which is no device of this name here")
         except MessageError as error:
@@ -187,6 +192,6 @@ class Intake:
         for uplink in self._uplinks:
             uplink.close()
         self.simulated.close()
-        for entity in (*self._subscribers, self.relink):
+        for entity in (*self._subscribers, self.network_links):
             entity.undeclare()
         self._complaints.close()

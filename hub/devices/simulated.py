@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from hub.devices.network_link import Link
+from hub.devices.network_link import NetworkLink
 from hub.observation.latency import Latencies
 from hub.participant import Device, Sample, Value
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Stamp
-from hub.transport.reader import Feed
+from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Drops
 from schemas.codec import encode
 from schemas.errors import ParticipantError
@@ -31,14 +31,14 @@ class SimulatedDevices:
     """
 
     def __init__(
-        self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, Feed], drops: Drops
+        self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, DeviceInputs], drops: Drops
     ) -> None:
         """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a
         link.
         """
-        meetings = {member.name for member in plan.meetings()}
+        meetings = {planned.name for planned in plan.meetings()}
         self._devices = [
-            _Simulated(plan.members[n], device, feeds[n], n in meetings, drops)
+            _Simulated(plan.participants[n], device, feeds[n], n in meetings, drops)
             for n, device in devices.items()
         ]
         self.links = {device.name: device.link for device in self._devices}
@@ -53,7 +53,7 @@ class SimulatedDevices:
     def exchange(self, time_ns: int, step: int, take: Take) -> None:
         """Write to all devices that are due, and hand on what they have; raises ParticipantError."""
         for one in self._devices:
-            if one.meets and step % one.member.period:
+            if one.meets and step % one.planned.period:
                 continue
             try:
                 one.write(time_ns, step, self.latencies)
@@ -71,11 +71,13 @@ class SimulatedDevices:
 class _Simulated:
     """One device, its link, and how far its samples have been counted."""
 
-    def __init__(self, member: Member, device: Device, feed: Feed, meets: bool, drops: Drops) -> None:
-        self.name, self.member, self.device, self.meets = member.name, member, device, meets
-        self.link = Link(member.link)
+    def __init__(
+        self, planned: PlannedParticipant, device: Device, feed: DeviceInputs, meets: bool, drops: Drops
+    ) -> None:
+        self.name, self.planned, self.device, self.meets = planned.name, planned, device, meets
+        self.link = NetworkLink(planned.network_link)
         self._feed, self._drops = feed, drops
-        self._ports = {port.name: port for port in member.ports}
+        self._ports = {port.name: port for port in planned.ports}
         self._sequence = dict.fromkeys(self._ports, 0)
         self._newest_ns = dict.fromkeys(self._ports, INITIAL)
 

@@ -18,10 +18,10 @@ from zenoh.handlers import Callback
 
 from hub.devices.clock_offset import ClockOffset
 from hub.devices.loop import DeviceLoop
-from hub.devices.network_link import Line, Link, LinkOrder, in_words
+from hub.devices.network_link import Line, NetworkLink, NetworkLinkOrder, in_words
 from hub.observation.latency import Latencies
 from hub.participant import Sample, Value
-from hub.planning.plan import Member, Outlet, Plan
+from hub.planning.plan import ConnectionToDevice, Plan, PlannedParticipant
 from hub.transport.bundle import bundled, unpacked
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Stamp, Tag
@@ -58,7 +58,7 @@ class DeviceUplink:
 
     def __init__(
         self,
-        member: Member,
+        planned: PlannedParticipant,
         run: Run,
         session: zenoh.Session,
         loop: DeviceLoop,
@@ -66,54 +66,58 @@ class DeviceUplink:
         offset: ClockOffset | None = None,
     ) -> None:
         """Take the device's loop; `offset` stays away in the hub's own process, whose clock is the hub's."""
-        self._member, self._run, self._loop, self._drops, self._offset = member, run, loop, drops, offset
-        self._link = Link(member.link)
+        self._member, self._run, self._loop, self._drops, self._offset = planned, run, loop, drops, offset
+        self._link = NetworkLink(planned.network_link)
         self._latencies = Latencies()
         self._told_ns = -_STATUS_NS
-        self._sequence = {port.name: 0 for port in member.ports}
-        outputs = [port for port in member.ports if port.causality == "output"]
+        self._sequence = {port.name: 0 for port in planned.ports}
+        outputs = [port for port in planned.ports if port.causality == "output"]
         self._publishers = {
-            port.name: _publisher(session, run.keys.output("device", member.name, port.name), port)
+            port.name: _publisher(session, run.keys.output("device", planned.name, port.name), port)
             for port in outputs
         }
         self._lines = {port.name: self._link.line(port) for port in outputs}
         self._status = session.declare_publisher(
-            run.keys.device_status(member.name), encoding=zenoh.Encoding.APPLICATION_CDR
+            run.keys.device_status(planned.name), encoding=zenoh.Encoding.APPLICATION_CDR
         )
         self._inflows: list[_Inflow] = []
-        self._arrived: SimpleQueue[_Feed | None] = SimpleQueue()
-        self._taker = Thread(target=self._take, name=f"inflow {member.name}", daemon=True)
+        self._arrived: SimpleQueue[_Subscription | None] = SimpleQueue()
+        self._taker = Thread(target=self._take, name=f"inflow {planned.name}", daemon=True)
         self._taker.start()
         self._subscribers = [
             session.declare_subscriber(feed.key, Callback(partial(self._put, feed), indirect=False))
             for feed in self._feeds()
         ]
         self._subscribers.append(
-            session.declare_subscriber(run.keys.link(member.name), Callback(self._relink, indirect=True))
+            session.declare_subscriber(
+                run.keys.link(planned.name), Callback(self._change_network_link, indirect=True)
+            )
         )
 
-    def _feeds(self) -> Iterator[_Feed]:
+    def _feeds(self) -> Iterator[_Subscription]:
         """Yield what is to be listened to: the bundle of each participant's signals, and each event port."""
         plan, keys, name = self._run.plan, self._run.keys, self._member.name
-        outlets = [outlet for outlet in plan.outlets if outlet.device == name]
+        outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
         for source in dict.fromkeys(outlet.source for outlet in outlets):
             signals = bundled(plan, source, name)
             if signals:
-                yield _Feed(
+                yield _Subscription(
                     keys.signals(source, name), [self._inflow(outlet) for outlet in signals], whole=False
                 )
             for outlet in outlets:
                 if outlet.source == source and outlet not in signals:
-                    yield _Feed(keys.feed(source, outlet.source_port), [self._inflow(outlet)], whole=True)
+                    yield _Subscription(
+                        keys.feed(source, outlet.source_port), [self._inflow(outlet)], whole=True
+                    )
 
-    def _inflow(self, outlet: Outlet) -> _Inflow:
+    def _inflow(self, outlet: ConnectionToDevice) -> _Inflow:
         inflow = _Inflow(
             outlet, self._run, self._link, self._loop, self._drops, self._latencies, self._offset
         )
         self._inflows.append(inflow)
         return inflow
 
-    def _put(self, feed: _Feed, sample: zenoh.Sample) -> None:
+    def _put(self, feed: _Subscription, sample: zenoh.Sample) -> None:
         feed.waiting.append(sample)
         self._arrived.put(feed)
 
@@ -168,10 +172,10 @@ class DeviceUplink:
             latencies=latencies,
         )
 
-    def _relink(self, sample: zenoh.Sample) -> None:
+    def _change_network_link(self, sample: zenoh.Sample) -> None:
         try:
             self._link.order(
-                LinkOrder.model_validate_json(decode(StringMessage, sample.payload.to_bytes()).data)
+                NetworkLinkOrder.model_validate_json(decode(StringMessage, sample.payload.to_bytes()).data)
             )
         except (MessageError, ValidationError) as error:
             self._drops.count(sample, error)
@@ -203,7 +207,7 @@ def _publisher(session: zenoh.Session, key: str, port: Port) -> zenoh.Publisher:
     )
 
 
-class _Feed:
+class _Subscription:
     """What comes under one key."""
 
     def __init__(self, key: str, inflows: Sequence[_Inflow], *, whole: bool) -> None:
@@ -231,24 +235,24 @@ class _Inflow:
 
     def __init__(
         self,
-        outlet: Outlet,
+        outlet: ConnectionToDevice,
         run: Run,
-        link: Link,
+        link: NetworkLink,
         loop: DeviceLoop,
         drops: Drops,
         latencies: Latencies,
         offset: ClockOffset | None,
     ) -> None:
         source, target = (
-            run.plan.members[outlet.source],
-            run.plan.members[outlet.device].port(outlet.device_port),
+            run.plan.participants[outlet.source],
+            run.plan.participants[outlet.target].port(outlet.target_port),
         )
         self._codec = PortCodec(
             source.port(outlet.source_port).model_copy(update={"variability": target.variability})
         )
         self._port, self._stream = (
             target.name,
-            f"{outlet.source}.{outlet.source_port} -> {outlet.device}.{target.name}",
+            f"{outlet.source}.{outlet.source_port} -> {outlet.target}.{target.name}",
         )
         self._link, self._loop, self._drops, self._latencies, self._offset = (
             link,

@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 
 from hub.participant import Inputs, Outputs, Setup, Stepped
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.bundle import Bundle, bundled
 from hub.transport.cells import INITIAL, Cell, RemoteCell
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
 from hub.transport.port_publisher import PortPublisher
-from hub.transport.reader import Feed, Reader, as_messages
+from hub.transport.reader import DeviceInputs, Reader, as_messages
 from hub.transport.wire import Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
-from schemas.lockstep import Permission, Report
+from schemas.lockstep import Ack, Grant
 from schemas.ports import BondSide, Port
 from schemas.vectors import VectorCodec
 
@@ -35,10 +35,10 @@ __all__ = ["Done", "Host", "Tap"]
 
 log = logging.getLogger(__name__)
 
-Tap = Callable[[Member, Port, int, int, Any], None]
+Tap = Callable[[PlannedParticipant, Port, int, int, Any], None]
 """Is shown every output value: participant, port, step, time (ns) at which it is valid, value."""
 
-Done = Callable[[Member, Report], None]
+Done = Callable[[PlannedParticipant, Ack], None]
 """Gets the report of a participant that has done its part of a grant."""
 
 
@@ -58,7 +58,7 @@ class _Slot:
     """A participant and all that its steps need, laid out for the step loop."""
 
     participant: Stepped
-    member: Member
+    planned: PlannedParticipant
     h_ns: int
     inputs: Inputs
     values: dict[str, Any]
@@ -103,9 +103,11 @@ class Host:
         self._wire = wire
         self._tap = tap
         self._slots = [
-            self._slot(plan.members[p], participants[p]) for p in plan.order if plan.members[p].host == name
+            self._slot(plan.participants[p], participants[p])
+            for p in plan.order
+            if plan.participants[p].host == name
         ]
-        self._by_name = {slot.member.name: slot for slot in self._slots}
+        self._by_name = {slot.planned.name: slot for slot in self._slots}
         self._remote: dict[tuple[str, str], RemoteCell] = {}
         self.step = INITIAL
         """The step in which it is or was last."""
@@ -115,9 +117,13 @@ class Host:
         for slot in self._slots:
             self._lay_sinks(slot)
         for slot in self._slots:
-            slot.readers = self._readers(slot.member)
-        fed = {m.name: self._readers(m) for m in plan.members.values() if m.follows_clock and m.host == name}
-        self.feeds = {device: Feed(readers, plan.step_ns) for device, readers in fed.items()}
+            slot.readers = self._readers(slot.planned)
+        fed = {
+            m.name: self._readers(m)
+            for m in plan.participants.values()
+            if m.simulated_time and m.host == name
+        }
+        self.feeds = {device: DeviceInputs(readers, plan.step_ns) for device, readers in fed.items()}
         """What the devices here that follow the clock are to be written."""
         self._seldom_read = self._lay_seldom_read(
             {reader.cell for readers in fed.values() for reader in readers}
@@ -127,10 +133,10 @@ class Host:
     # --- laying out
     # ------------------------------------------------------------------------------------------------
 
-    def _slot(self, member: Member, participant: Stepped) -> _Slot:
+    def _slot(self, planned: PlannedParticipant, participant: Stepped) -> _Slot:
         values = {
             port.name: _start_value(port)
-            for port in member.ports
+            for port in planned.ports
             if port.causality == "input" and port.variability == "signal"
         }
         inputs = Inputs(values)
@@ -140,9 +146,9 @@ class Host:
             inputs._stale,
         )  # pyright: ignore[reportPrivateUsage]  # the host fills them
         slot = _Slot(
-            participant, member, member.period * self.plan.step_ns, inputs, values, rates, events, stale
+            participant, planned, planned.period * self.plan.step_ns, inputs, values, rates, events, stale
         )
-        slot.work_ports = tuple(f"{bond.name}/work" for bond in member.bonds)
+        slot.work_ports = tuple(f"{bond.name}/work" for bond in planned.bonds)
         return slot
 
     def _depth(self, source: str, port: str, *, here: bool | None = None) -> int:
@@ -150,8 +156,8 @@ class Host:
         only, more for the last ones.
         """
         depth = 0
-        for link in self.plan.links:
-            target = self.plan.members[link.target]
+        for link in self.plan.connections:
+            target = self.plan.participants[link.target]
             if (link.source, link.source_port) != (source, port) or (here and target.host != self.name):
                 continue
             back = max(target.period // self.plan.stride(source, port), 1)
@@ -164,30 +170,30 @@ class Host:
         return depth
 
     def _lay_sinks(self, slot: _Slot) -> None:
-        member, wire = slot.member, self._wire
+        planned, wire = slot.planned, self._wire
         places = self._places(slot, wire) if wire is not None else {}
-        for port in member.ports:
+        for port in planned.ports:
             if port.causality == "input":
                 continue
-            stride = self.plan.stride(member.name, port.name)
-            depth = self._depth(member.name, port.name, here=True)
+            stride = self.plan.stride(planned.name, port.name)
+            depth = self._depth(planned.name, port.name, here=True)
             readers = sorted(
                 {
-                    self.plan.members[k.target].host
-                    for k in self.plan.links
-                    if (k.source, k.source_port) == (member.name, port.name)
+                    self.plan.participants[k.target].host
+                    for k in self.plan.connections
+                    if (k.source, k.source_port) == (planned.name, port.name)
                 }
                 - {self.name}
             )
-            feeds = port.variability == "event" and (member.name, port.name) in {
-                (outlet.source, outlet.source_port) for outlet in self.plan.outlets
+            feeds = port.variability == "event" and (planned.name, port.name) in {
+                (outlet.source, outlet.source_port) for outlet in self.plan.to_devices
             }
             publisher = (
-                wire.publisher(member, port, readers, feeds=feeds, bundles=places.get(port.name, ()))
+                wire.publisher(planned, port, readers, feeds=feeds, bundles=places.get(port.name, ()))
                 if wire is not None
                 else None
             )
-            cell = Cell(member.period, stride, depth) if depth else None
+            cell = Cell(planned.period, stride, depth) if depth else None
             vector = PortCodec(port).vector
             sink = _Sink(port, vector, () if vector is None else vector.neutral.shape, cell, publisher)
             sinks = slot.sinks.setdefault(stride, [])
@@ -199,20 +205,20 @@ class Host:
         """
         places: dict[str, list[tuple[Bundle, int]]] = {}
         for device in dict.fromkeys(
-            outlet.device for outlet in self.plan.outlets if outlet.source == slot.member.name
+            outlet.target for outlet in self.plan.to_devices if outlet.source == slot.planned.name
         ):
-            bundle = slot.bundles[device] = wire.bundle(slot.member.name, device)
-            for index, outlet in enumerate(bundled(self.plan, slot.member.name, device)):
+            bundle = slot.bundles[device] = wire.bundle(slot.planned.name, device)
+            for index, outlet in enumerate(bundled(self.plan, slot.planned.name, device)):
                 places.setdefault(outlet.source_port, []).append((bundle, index))
         return places
 
-    def _readers(self, reading: Member) -> list[Reader]:
+    def _readers(self, reading: PlannedParticipant) -> list[Reader]:
         readers: list[Reader] = []
-        for link in self.plan.links:
+        for link in self.plan.connections:
             if link.target != reading.name:
                 continue
             source, target = (
-                self.plan.members[link.source].port(link.source_port),
+                self.plan.participants[link.source].port(link.source_port),
                 reading.port(link.target_port),
             )
             stride_s = self.plan.stride(link.source, link.source_port) * self._step_s
@@ -232,7 +238,7 @@ class Host:
         for slot in self._slots:
             for reader in slot.readers:
                 if isinstance(reader.cell, RemoteCell):
-                    read.setdefault(reader.cell, []).append((slot.member.period, reader.fresh))
+                    read.setdefault(reader.cell, []).append((slot.planned.period, reader.fresh))
         return [
             (cell, by)
             for cell, by in read.items()
@@ -246,54 +252,56 @@ class Host:
         if (source, port) not in self._remote:
             if self._wire is None:
                 raise ValueError(f"'{source}' is in another process, and this host has no wire")
-            member = self.plan.members[source]
-            declared = member.port(port)
+            planned = self.plan.participants[source]
+            declared = planned.port(port)
             self._remote[source, port] = self._wire.cell(
-                member,
+                planned,
                 declared,
                 self.plan.stride(source, port),
                 self._depth(source, port),
-                self._listener(member, declared),
+                self._listener(planned, declared),
             )
         return self._remote[source, port]
 
-    def _listener(self, member: Member, port: Port) -> Callable[[int, Any], None] | None:
+    def _listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, Any], None] | None:
         """Return what shows values of another host to the tap of this one."""
         tap, step_ns = self._tap, self.plan.step_ns
         if tap is None:
             return None
         return lambda tag, value: tap(
-            member, port, tag, (tag + member.period) * step_ns if tag > INITIAL else 0, value
+            planned, port, tag, (tag + planned.period) * step_ns if tag > INITIAL else 0, value
         )
 
     def _lay_inlets(self) -> None:
-        for inlet in self.plan.inlets:
+        for inlet in self.plan.from_devices:
             if inlet.target in self._by_name:
                 slot, port = (
                     self._by_name[inlet.target],
-                    self.plan.members[inlet.target].port(inlet.target_port),
+                    self.plan.participants[inlet.target].port(inlet.target_port),
                 )
-                codec = PortCodec(port.filled_from(self.plan.members[inlet.device].port(inlet.device_port)))
-                self._inlets.setdefault((inlet.device, inlet.device_port), []).append(
+                codec = PortCodec(
+                    port.filled_from(self.plan.participants[inlet.source].port(inlet.source_port))
+                )
+                self._inlets.setdefault((inlet.source, inlet.source_port), []).append(
                     (slot, port.name, codec)
                 )
                 if port.variability == "signal":
                     slot.stale.add(port.name)
-        fed = {(link.target, link.target_port) for link in self.plan.links} | {
-            (i.target, i.target_port) for i in self.plan.inlets
+        fed = {(link.target, link.target_port) for link in self.plan.connections} | {
+            (i.target, i.target_port) for i in self.plan.from_devices
         }
         for slot in self._slots:
-            for port in slot.member.ports:
-                if port.causality == "input" and (slot.member.name, port.name) not in fed:
-                    self._inlets[slot.member.name, port.name] = [(slot, port.name, PortCodec(port))]
+            for port in slot.planned.ports:
+                if port.causality == "input" and (slot.planned.name, port.name) not in fed:
+                    self._inlets[slot.planned.name, port.name] = [(slot, port.name, PortCodec(port))]
 
     # --- running
     # ---------------------------------------------------------------------------------------------------
 
     @property
-    def members(self) -> Sequence[Member]:
+    def participants(self) -> Sequence[PlannedParticipant]:
         """The participants of this host, in step order."""
-        return [slot.member for slot in self._slots]
+        return [slot.planned for slot in self._slots]
 
     def configure(self, directory: Path) -> dict[str, tuple[BondSide, ...]]:
         """Configure every participant and publish its outputs at time 0; returns the bonds with the numbers
@@ -303,19 +311,19 @@ class Host:
         """
         bonds: dict[str, tuple[BondSide, ...]] = {}
         for slot in self._slots:
-            setup = Setup(period_ns=slot.h_ns, directory=directory, bonds=slot.member.bond_plans)
+            setup = Setup(period_ns=slot.h_ns, directory=directory, bonds=slot.planned.bond_plans)
             try:
                 self._hand_on(slot, INITIAL, 0, slot.participant.configure(setup))
             except ParticipantError:
                 raise
             except TrocarError as error:
-                raise ParticipantError(slot.member.name, INITIAL, str(error)) from error
+                raise ParticipantError(slot.planned.name, INITIAL, str(error)) from error
             except Exception as error:
-                log.exception("participant '%s' raised while it was configured", slot.member.name)
+                log.exception("participant '%s' raised while it was configured", slot.planned.name)
                 raise ParticipantError(
-                    slot.member.name, INITIAL, f"{type(error).__name__}: {error}"
+                    slot.planned.name, INITIAL, f"{type(error).__name__}: {error}"
                 ) from error
-            bonds[slot.member.name] = slot.participant.bonds
+            bonds[slot.planned.name] = slot.participant.bonds
         return bonds
 
     def publish_initial(self) -> None:
@@ -343,9 +351,9 @@ class Host:
 
     def due(self, step: int, count: int) -> list[str]:
         """Return who steps at least once in `count` steps from `step`, in step order."""
-        return [s.member.name for s in self._slots if -step % s.member.period < count]
+        return [s.planned.name for s in self._slots if -step % s.planned.period < count]
 
-    def run(self, grant: Permission, done: Done) -> None:
+    def run(self, grant: Grant, done: Done) -> None:
         """Take what enters with `grant` and step to its horizon; `done` gets the report of each participant
         as soon as it is through.
 
@@ -361,13 +369,13 @@ class Host:
         for step in range(grant.step, end):
             self.step = step
             for slot in self._slots:
-                period = slot.member.period
+                period = slot.planned.period
                 if not step % period:
                     self._step(slot, step, step * step_ns)
                     if step + period >= end:
                         done(
-                            slot.member,
-                            Report(
+                            slot.planned,
+                            Ack(
                                 grant.run, grant.epoch, grant.step, slot.hashes, slot.compute_ns, slot.work_j
                             ),
                         )
@@ -378,7 +386,7 @@ class Host:
             )
 
     def _step(self, slot: _Slot, step: int, t: int) -> None:
-        self._stepping = slot.member.name
+        self._stepping = slot.planned.name
         for reader in slot.readers:
             self._read(slot, reader, step)
         begun = perf_counter_ns()
@@ -390,15 +398,15 @@ class Host:
             for port in slot.work_ports:
                 work = float(outputs[port][0])  # pyright: ignore[reportArgumentType, reportIndexIssue]
                 if not isfinite(work):
-                    raise ParticipantError(slot.member.name, step, f"output '{port}' is not finite: {work}")
+                    raise ParticipantError(slot.planned.name, step, f"output '{port}' is not finite: {work}")
                 slot.work_j.append(work)
         except ParticipantError:
             raise
         except TrocarError as error:
-            raise ParticipantError(slot.member.name, step, str(error)) from error
+            raise ParticipantError(slot.planned.name, step, str(error)) from error
         except Exception as error:
-            log.exception("participant '%s' raised in step %d", slot.member.name, step)
-            raise ParticipantError(slot.member.name, step, f"{type(error).__name__}: {error}") from error
+            log.exception("participant '%s' raised in step %d", slot.planned.name, step)
+            raise ParticipantError(slot.planned.name, step, f"{type(error).__name__}: {error}") from error
         if slot.events:
             slot.events.clear()
 
@@ -420,13 +428,13 @@ class Host:
 
     def _hand_on(self, slot: _Slot, step: int, time_ns: int, outputs: Outputs) -> None:
         for stride, sinks in slot.sinks.items():
-            if step > INITIAL and (step + slot.member.period) % stride:
+            if step > INITIAL and (step + slot.planned.period) % stride:
                 continue
             for sink in sinks:
                 name = sink.port.name
                 if name not in outputs:
                     raise ParticipantError(
-                        slot.member.name, step, f"output '{name}' is missing from what step() returned"
+                        slot.planned.name, step, f"output '{name}' is missing from what step() returned"
                     )
                 value: Any = outputs[name]
                 if sink.vector is not None and (
@@ -440,7 +448,7 @@ class Host:
                     if step == INITIAL:
                         self._initial.append((sink.publisher, value if sink.vector is None else value.copy()))
                 if self._tap is not None:
-                    self._tap(slot.member, sink.port, step, time_ns, value)
+                    self._tap(slot.planned, sink.port, step, time_ns, value)
         if slot.bundles:
             self._send_bundles(slot, step, time_ns)
 
@@ -459,7 +467,7 @@ class Host:
         try:
             value = codec.accept(payload)
         except MessageError as error:
-            log.warning("inlet sample for '%s.%s' refused: %s", slot.member.name, port, error)
+            log.warning("inlet sample for '%s.%s' refused: %s", slot.planned.name, port, error)
             return
         if codec.is_event:
             slot.events[port] = (*slot.events.get(port, ()), value)
@@ -472,7 +480,7 @@ class Host:
             try:
                 slot.participant.close()
             except Exception:
-                log.exception("participant '%s' raised while it was closed", slot.member.name)
+                log.exception("participant '%s' raised while it was closed", slot.planned.name)
         if self._wire is not None:
             self._wire.close()
 

@@ -28,7 +28,7 @@ from hub.devices.uplink import DeviceUplink, Run
 from hub.hosting.host import Host
 from hub.hosting.interrupt import Interrupt
 from hub.participant import Device, Stepped
-from hub.planning.plan import Member
+from hub.planning.plan import PlannedParticipant
 from hub.planning.registry import make
 from hub.remote.device_host import DeviceHost
 from hub.remote.hub_connection import reach
@@ -40,7 +40,7 @@ from hub.transport.wire import Wire
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.keys import Keys
-from schemas.lockstep import Permission, Report, pack_report, unpack_permission
+from schemas.lockstep import Ack, Grant, pack_ack, unpack_grant
 from schemas.ros import StringMessage
 
 __all__ = ["main", "run_device", "run_host"]
@@ -126,8 +126,10 @@ class _JoinedHost:
         )
         plan, host = reply.plan, request.host
         self._step_ns = plan.step_ns
-        mine = {name: member for name, member in plan.members.items() if member.host == host}
-        made = {name: make(member.kind, name, reply.params[name], directory) for name, member in mine.items()}
+        mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
+        made = {
+            name: make(planned.kind, name, reply.params[name], directory) for name, planned in mine.items()
+        }
         first = next(iter(mine.values()))
         refused = session.declare_publisher(
             keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
@@ -146,14 +148,14 @@ class _JoinedHost:
             host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire
         )
         self._acks = {
-            member.name: session.declare_publisher(
-                keys.ack(member.name),
+            planned.name: session.declare_publisher(
+                keys.ack(planned.name),
                 encoding=zenoh.Encoding.APPLICATION_CDR,
                 congestion_control=zenoh.CongestionControl.BLOCK,
                 priority=zenoh.Priority.REAL_TIME,
                 express=True,
             )
-            for member in self._host.members
+            for planned in self._host.participants
         }
         if self._acks:
             self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
@@ -162,7 +164,7 @@ class _JoinedHost:
         for device in devices.values():
             device.learn_hub(connect)
         self._loops = {
-            name: DeviceLoop(name, device, plan.members[name].read_ns, failed=self._device_failed)
+            name: DeviceLoop(name, device, plan.participants[name].read_ns, failed=self._device_failed)
             for name, device in devices.items()
         }
         self._stack = contextlib.ExitStack()
@@ -172,12 +174,12 @@ class _JoinedHost:
                 Run(plan, keys, reply.run, reply.admission),
             )
             for name, loop in self._loops.items():
-                uplink = DeviceUplink(plan.members[name], run, session, loop, self._drops, clock.offset)
+                uplink = DeviceUplink(plan.participants[name], run, session, loop, self._drops, clock.offset)
                 self._stack.callback(uplink.close)
                 loop.attach(uplink)
         self._tokens = [
-            session.liveliness().declare_token(keys.alive(member.key_role, name))
-            for name, member in mine.items()
+            session.liveliness().declare_token(keys.alive(planned.key_role, name))
+            for name, planned in mine.items()
         ]
 
     def serve(self) -> None:
@@ -208,35 +210,35 @@ class _JoinedHost:
                 self._host.run(grant, self._done)
             except ParticipantError as error:
                 self._acks[error.participant].put(
-                    pack_report(Report(self._run, 0, error.step, (), (), (), error.cause))
+                    pack_ack(Ack(self._run, 0, error.step, (), (), (), error.cause))
                 )
                 raise
             grant = self._next_grant()
 
-    def _first_grant(self) -> Permission:
+    def _first_grant(self) -> Grant:
         """Repeat the values at time 0 until all links have carried theirs and the first grant is here."""
         told = False
         while True:
             self._host.publish_initial()
             if not told and self._host.linked():
                 told = True
-                for member in self._host.members:
-                    self._done(member, Report(self._run, 0, -1, (), (), ()))
+                for planned in self._host.participants:
+                    self._done(planned, Ack(self._run, 0, -1, (), (), ()))
             if told and (sample := self._grants.try_recv()) is not None:
                 grant = self._accept(sample)
                 if grant is not None:
                     return grant
             sleep(_PRIME_S)
 
-    def _next_grant(self) -> Permission:
+    def _next_grant(self) -> Grant:
         while True:
             grant = self._accept(self._grants.recv())
             if grant is not None:
                 return grant
 
-    def _accept(self, sample: zenoh.Sample) -> Permission | None:
+    def _accept(self, sample: zenoh.Sample) -> Grant | None:
         try:
-            grant = unpack_permission(sample.payload.to_bytes())
+            grant = unpack_grant(sample.payload.to_bytes())
             if grant.run != self._run:
                 raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
             if (
@@ -254,8 +256,8 @@ class _JoinedHost:
         self._next_step = grant.horizon_ns // self._step_ns
         return grant
 
-    def _done(self, member: Member, report: Report) -> None:
-        self._acks[member.name].put(pack_report(report))
+    def _done(self, planned: PlannedParticipant, ack: Ack) -> None:
+        self._acks[planned.name].put(pack_ack(ack))
 
     def _device_failed(self, name: str, cause: str) -> None:
         ask(

@@ -127,7 +127,7 @@ class Watchdog:
 
     def _look(self) -> tuple[str, str] | None:
         for host, how in self._fleet.dead().items():
-            names = [name for name in self._plan.members if self._plan.members[name].host == host]
+            names = [name for name in self._plan.participants if self._plan.participants[name].host == host]
             missing = [name for name in self._waiting if name in names] or names
             others = (
                 f" (host '{host}' also ran {', '.join(n for n in names if n != missing[0])})"

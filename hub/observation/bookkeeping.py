@@ -13,11 +13,11 @@ from hub.devices.session_devices import Intake
 from hub.observation.latency import Histogram, by_way
 from hub.observation.observers import Observers
 from hub.observation.summary import Progress, Summary
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recorder import RecorderSummary
 from hub.session.clock import Clock
 from hub.transport.refusals import Drops
-from schemas.lockstep import Report
+from schemas.lockstep import Ack
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Latency, ParticipantStatus, SessionStatus
 
@@ -70,14 +70,14 @@ class Account:
         """All steps of a grant that was given at `granted_ns` (monotonic) are done."""
         self._answers.add(monotonic_ns() - granted_ns)
 
-    def book(self, member: Member, report: Report) -> int:
+    def book(self, planned: PlannedParticipant, ack: Ack) -> int:
         """Book the hashes and the last step that a participant reports; return the simulated time (ns) at the
         end of that step.
         """
-        self._digests[member.name].update(struct.pack(f"<{len(report.state_hash)}Q", *report.state_hash))
-        first = report.step + -report.step % member.period
-        last = self._last_steps[member.name] = first + (len(report.state_hash) - 1) * member.period
-        return (last + member.period) * self._plan.step_ns
+        self._digests[planned.name].update(struct.pack(f"<{len(ack.state_hash)}Q", *ack.state_hash))
+        first = ack.step + -ack.step % planned.period
+        last = self._last_steps[planned.name] = first + (len(ack.state_hash) - 1) * planned.period
+        return (last + planned.period) * self._plan.step_ns
 
     def progress(self) -> Progress:
         """Return where the run is now."""
@@ -94,7 +94,7 @@ class Account:
 
     def status(self, pid: Callable[[str], int]) -> SessionStatus:
         """Return what the session is doing now; `pid` knows the process of a host."""
-        members = [
+        participants = [
             ParticipantStatus(
                 name=m.name,
                 role=m.role,
@@ -102,7 +102,7 @@ class Account:
                 pid=pid(m.host),
                 step=self._last_steps.get(m.name, self._clock.step),
             )
-            for m in self._plan.members.values()
+            for m in self._plan.participants.values()
         ]
         progress = self.progress()
         return SessionStatus(
@@ -115,7 +115,7 @@ class Account:
             late_steps=progress.late_steps,
             dropped_messages=self._dropped,
             detail=self.detail,
-            participants=members,
+            participants=participants,
             devices=self._intake.statuses,
             latencies=self._latencies,
         )

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hub.planning.plan import Plan, PlannedBond
-from schemas.lockstep import Report
+from schemas.lockstep import Ack
 from schemas.ros import Header, Time
 from schemas.trocar_msgs import CouplingEnergy
 
@@ -32,11 +32,11 @@ class EnergyBooks:
             self._rows.setdefault(bond.motion.participant, []).append((book, "motion_j"))
             self._rows.setdefault(bond.force.participant, []).append((book, "force_j"))
 
-    def take(self, participant: str, report: Report) -> None:
-        """Book the work (J since the start) that a participant states in the last step of its report."""
+    def take(self, participant: str, ack: Ack) -> None:
+        """Book the work (J since the start) that a participant states in the last step of its ack."""
         rows = self._rows.get(participant)
-        if rows and len(report.work_j) >= len(rows):
-            for (book, side), work in zip(rows, report.work_j[-len(rows) :], strict=True):
+        if rows and len(ack.work_j) >= len(rows):
+            for (book, side), work in zip(rows, ack.work_j[-len(rows) :], strict=True):
                 setattr(book, side, work)
 
     @property

@@ -84,9 +84,9 @@ class Measures:
         self.by_port: dict[tuple[str, str], list[_Meter]] = {}
         self._lock = threading.Lock()
         for name, measure in scenario.measure.items():
-            member = plan.members[measure.of.participant]
-            port, part = measured_port(member, measure.of.port)
-            period = 1e-9 * (member.read_ns or plan.step_ns * plan.stride(member.name, port.name))
+            planned = plan.participants[measure.of.participant]
+            port, part = measured_port(planned, measure.of.port)
+            period = 1e-9 * (planned.read_ns or plan.step_ns * plan.stride(planned.name, port.name))
             meter = self._meters[name] = _Meter(measure, part, period)
             self.by_port.setdefault((measure.of.participant, port.name), []).append(meter)
 

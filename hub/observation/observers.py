@@ -9,7 +9,7 @@ import zenoh
 
 from hub.observation.energy import EnergyBooks
 from hub.observation.measures import Measures
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recorder import Recorder
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
@@ -19,9 +19,9 @@ from hub.transport.refusals import Drops
 from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
-from schemas.lockstep import Permission, Report, pack_report
+from schemas.lockstep import Ack, Grant, pack_ack
 from schemas.ports import Port
-from schemas.trocar_msgs import Ack, CouplingEnergy, Grant, InletSample, SessionStatus
+from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, InletSample, SessionStatus
 
 __all__ = ["Observers"]
 
@@ -31,7 +31,7 @@ _ENERGY_PERIOD_NS = 10_000_000
 
 @dataclass
 class _Watched:
-    member: Member
+    planned: PlannedParticipant
     port: Port
     codec: PortCodec
     channel: int
@@ -55,12 +55,12 @@ class Observers:
         self._watched: dict[str, _Watched] = {}
         self._channels: dict[str, int] = {}
         self._next_energy_ns = 0
-        for member in plan.members.values():
-            for port in member.ports:
+        for planned in plan.participants.values():
+            for port in planned.ports:
                 if port.causality == "output":
-                    key = keys.output(member.key_role, member.name, port.name)
+                    key = keys.output(planned.key_role, planned.name, port.name)
                     self._watched[key] = _Watched(
-                        member, port, PortCodec(port), self._channel(key, port.type)
+                        planned, port, PortCodec(port), self._channel(key, port.type)
                     )
 
     def _channel(self, key: str, type_name: str) -> int:
@@ -81,35 +81,35 @@ class Observers:
         away = {
             key: w
             for key, w in self._watched.items()
-            if w.member.host != "hub" and w.member.role != "device" and not self._comes_by_lane(w)
+            if w.planned.host != "hub" and w.planned.role != "device" and not self._comes_by_lane(w)
         }
         measured = set(self.measures.ports)
         return {
-            key: (w.member.name, w.port.name)
+            key: (w.planned.name, w.port.name)
             for key, w in away.items()
-            if self._recorder is not None or (w.member.name, w.port.name) in measured
+            if self._recorder is not None or (w.planned.name, w.port.name) in measured
         }
 
     def _comes_by_lane(self, watched: _Watched) -> bool:
         """Say whether the hub's own host reads the value anyway, past Zenoh, and shows it to `value`."""
-        name, port = watched.member.name, watched.port
+        name, port = watched.planned.name, watched.port
         readers = {
-            self._plan.members[link.target].host
-            for link in self._plan.links
-            if (link.source, link.source_port) == (name, port.name)
+            self._plan.participants[connection.target].host
+            for connection in self._plan.connections
+            if (connection.source, connection.source_port) == (name, port.name)
         }
-        return "hub" in readers and has_lane(port, watched.member.host, "hub")
+        return "hub" in readers and has_lane(port, watched.planned.host, "hub")
 
     def linked(self) -> bool:
         """Say whether the value at time 0 of every watched output of another process has been heard."""
         return all(self._watched[key].newest >= (INITIAL, 0) for key in self.away)
 
-    def value(self, member: Member, port: Port, step: int, time_ns: int, value: Any) -> None:
+    def value(self, planned: PlannedParticipant, port: Port, step: int, time_ns: int, value: Any) -> None:
         """Take an output value of a participant in this process, or one that came here by a lane."""
-        if (member.name, port.name) in self.measures.by_port and step > INITIAL:
-            self.measures.take(member.name, port.name, value, time_ns)
+        if (planned.name, port.name) in self.measures.by_port and step > INITIAL:
+            self.measures.take(planned.name, port.name, value, time_ns)
         if self._recorder is not None:
-            watched = self._watched[self._keys.output(member.key_role, member.name, port.name)]
+            watched = self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
             for item in value if watched.codec.is_event else (value,):
                 self._recorder.write(watched.channel, time_ns, watched.codec.encode(item, time_ns))
 
@@ -132,7 +132,7 @@ class Observers:
             return
         watched.newest = (tag.step, tag.index)
         if tag.step > INITIAL and not watched.codec.is_event:
-            self.measures.take(watched.member.name, watched.port.name, value, tag.time_ns)
+            self.measures.take(watched.planned.name, watched.port.name, value, tag.time_ns)
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
@@ -156,11 +156,11 @@ class Observers:
         if self._recorder is not None and not enters:
             self._recorder.write(watched.channel, time_ns, payload)
 
-    def grant(self, grant: Permission, payload: bytes) -> None:
+    def grant(self, grant: Grant, payload: bytes) -> None:
         """Take a grant and the device samples in it."""
         if self._recorder is None:
             return
-        self._recorder.write(self._channel(self._keys.grant, Grant.ros_type), grant.start_ns, payload)
+        self._recorder.write(self._channel(self._keys.grant, GrantMessage.ros_type), grant.start_ns, payload)
         for sample in grant.inlets:
             self._inlet(sample, grant.start_ns)
 
@@ -169,12 +169,12 @@ class Observers:
         if watched is not None and sample.payload.size and self._recorder is not None:
             self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())
 
-    def report(self, member: Member, report: Report, time_ns: int, payload: bytes | None) -> None:
+    def ack(self, planned: PlannedParticipant, ack: Ack, time_ns: int, payload: bytes | None) -> None:
         """Take a report; `payload` are its bytes if it came from the wire."""
-        self.energy.take(member.name, report)
+        self.energy.take(planned.name, ack)
         if self._recorder is not None:
-            channel = self._channel(self._keys.ack(member.name), Ack.ros_type)
-            self._recorder.write(channel, time_ns, pack_report(report) if payload is None else payload)
+            channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
+            self._recorder.write(channel, time_ns, pack_ack(ack) if payload is None else payload)
 
     def books(self, time_ns: int) -> list[CouplingEnergy]:
         """Return (and record) the energy books when they are due."""

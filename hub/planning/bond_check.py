@@ -27,7 +27,7 @@ def check_bonds(plan: Plan, bonds: Mapping[str, Sequence[BondSide]]) -> None:
         motion, force = (
             next(s for s in bonds[end.participant] if s.name == end.port) for end in (bond.motion, bond.force)
         )
-        step_s = plan.members[bond.force.participant].period * plan.step_ns / 1e9
+        step_s = plan.participants[bond.force.participant].period * plan.step_ns / 1e9
         problem = stable_step_problem(bond, motion, force, step_s)
         if problem and bond.check == "refuse":
             raise ScenarioError(

@@ -1,28 +1,35 @@
-"""The plan of a session: who runs where, and every connection and bond resolved into what hosts carry out."""
+"""The plan of a session: where each participant runs, and every connection and bond resolved."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal, cast
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from hub.participant import BondPlan
-from schemas.network_link import LinkSpec
+from hub.planning.renamed import KINDS
+from schemas.network_link import NetworkLinkSpec
 from schemas.ports import BondSide, Port
 from schemas.scenario import Bond
 
-__all__ = ["Inlet", "Link", "Member", "Plan", "PlannedBond", "plays_in_simulated_time"]
+__all__ = [
+    "ConnectionFromDevice",
+    "ConnectionToDevice",
+    "Plan",
+    "PlannedBond",
+    "PlannedConnection",
+    "PlannedParticipant",
+    "has_simulated_time",
+]
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Member(_Part):
-    """One participant: where it runs, how often it steps, what goes in and out (the ports of its connected
-    bonds included).
-    """
+class PlannedParticipant(_Part):
+    """One participant: where it runs, how often it steps, and its ports, those of connected bonds included."""
 
     name: str
     kind: str
@@ -30,13 +37,13 @@ class Member(_Part):
     host: str
     """`hub`, the name of a process, or `remote/<participant>`."""
     period: int
-    """In steps; a device that lives in wall time has 1."""
+    """In communication steps; 1 for a device in wall time."""
     read_ns: int = 0
-    """Of a device that lives in wall time: the time between two reads."""
-    link: LinkSpec | None = None
-    """Of a device: what lies between it and the hub."""
+    """Of a device in wall time: the time between two reads."""
+    network_link: NetworkLinkSpec | None = None
+    """Of a device: the emulated network between it and the hub."""
     rate_limit: float = 2000.0
-    """Of a device: messages per second that are taken from each of its ports."""
+    """Of a device: messages per second that are accepted on each of its ports."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}
@@ -46,47 +53,46 @@ class Member(_Part):
         return next(port for port in self.ports if port.name == name)
 
     @property
-    def follows_clock(self) -> bool:
-        """Whether this is a device that plays in simulated time."""
-        return self.role == "device" and plays_in_simulated_time(self.ports)
+    def simulated_time(self) -> bool:
+        """Whether this is a device that lives in simulated time; any other device lives in wall time."""
+        return self.role == "device" and has_simulated_time(self.ports)
 
     @property
     def key_role(self) -> str:
-        """The role as it stands in keys: all that is stepped is an engine there."""
+        """The role as it stands in keys: there every stepped participant is an engine."""
         return "device" if self.role == "device" else "engine"
 
 
-class Link(_Part):
-    """A connection from a stepped participant to another one, or to a device that follows the clock."""
+class PlannedConnection(_Part):
+    """A connection from a stepped participant to another one, or to a device in simulated time."""
 
     source: str
     source_port: str
     target: str
     target_port: str
     fresh: bool
-    """The target sees the source's output of the same step; otherwise that of the last communication point.
-    """
+    """The target reads the source's output of the same step, otherwise that of the last communication point."""
     linear: bool
     """The target extrapolates inside its step."""
 
 
-class Inlet(_Part):
-    """A connection from a device to a stepped participant."""
+class ConnectionFromDevice(_Part):
+    """A connection from a device, through its inlet, to a stepped participant."""
 
-    device: str
-    device_port: str
+    source: str
+    source_port: str
     target: str
     target_port: str
     max_age_ns: int
 
 
-class Outlet(_Part):
-    """A connection from a stepped participant to a device that lives in wall time."""
+class ConnectionToDevice(_Part):
+    """A connection from a stepped participant to a device in wall time."""
 
     source: str
     source_port: str
-    device: str
-    device_port: str
+    target: str
+    target_port: str
 
 
 class PlannedBond(_Part):
@@ -98,71 +104,103 @@ class PlannedBond(_Part):
 
 
 class Plan(_Part):
-    """All that hosts need to know of a session."""
+    """Everything that hosts need to know of a session."""
 
     step_ns: int
     order: tuple[str, ...]
     """The stepped participants in the order in which they step."""
-    members: dict[str, Member]
-    links: tuple[Link, ...]
-    inlets: tuple[Inlet, ...]
-    outlets: tuple[Outlet, ...]
+    participants: dict[str, PlannedParticipant]
+    connections: tuple[PlannedConnection, ...]
+    from_devices: tuple[ConnectionFromDevice, ...]
+    to_devices: tuple[ConnectionToDevice, ...]
     bonds: tuple[PlannedBond, ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_0_1_0(cls, data: Any) -> Any:
+        """Accept the plan in recordings of version 0.1.0, which named its parts otherwise."""
+        if isinstance(data, dict) and "members" in data:
+            return _from_0_1_0(cast("dict[str, Any]", data))
+        return cast("Any", data)
 
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""
-        member = self.members[participant]
-        return max(member.period, member.port(port).period_ns // self.step_ns)
+        planned = self.participants[participant]
+        return max(planned.period, planned.port(port).period_ns // self.step_ns)
 
-    def meetings(self) -> tuple[Member, ...]:
-        """Return the devices that must be met at each of their periods: that follow the clock, and are
-        written to or sit behind a link.
+    def meetings(self) -> tuple[PlannedParticipant, ...]:
+        """Return the devices in simulated time that a grant must stop at in each of their periods.
+
+        These are the ones that are written to or sit behind a network link.
         """
-        written = {link.target for link in self.links}
+        written = {connection.target for connection in self.connections}
         return tuple(
-            m for m in self.members.values() if m.follows_clock and (m.name in written or m.link is not None)
+            planned
+            for planned in self.participants.values()
+            if planned.simulated_time and (planned.name in written or planned.network_link is not None)
         )
 
     def seen_from(self, host: str) -> Plan:
-        """Return what another machine needs to know that runs host `host`: its participants, and of the
-        others the ports they share a connection with.
+        """Return the part of the plan that another machine needs to run host `host`.
+
+        That is its participants, and of the others the ports that share a connection with them.
         """
-        own = {name for name, member in self.members.items() if member.host == host}
-        links = tuple(k for k in self.links if {k.source, k.target} & own)
-        inlets = tuple(k for k in self.inlets if {k.device, k.target} & own)
-        outlets = tuple(k for k in self.outlets if {k.source, k.device} & own)
-        ends = {(k.source, k.source_port) for k in (*links, *outlets)} | {
-            (k.target, k.target_port) for k in (*links, *inlets)
-        }
-        ends |= {(k.device, k.device_port) for k in (*inlets, *outlets)}
-        shared: dict[str, Member] = {}
-        for name, member in self.members.items():
-            ports = tuple(port for port in member.ports if (name, port.name) in ends)
+        own = {name for name, planned in self.participants.items() if planned.host == host}
+        connections = tuple(k for k in self.connections if {k.source, k.target} & own)
+        from_devices = tuple(k for k in self.from_devices if {k.source, k.target} & own)
+        to_devices = tuple(k for k in self.to_devices if {k.source, k.target} & own)
+        every = (*connections, *from_devices, *to_devices)
+        ends = {(k.source, k.source_port) for k in every} | {(k.target, k.target_port) for k in every}
+        shared: dict[str, PlannedParticipant] = {}
+        for name, planned in self.participants.items():
+            ports = tuple(port for port in planned.ports if (name, port.name) in ends)
             if name in own:
-                shared[name] = member
+                shared[name] = planned
             elif ports:
-                shared[name] = member.model_copy(update={"ports": ports, "bonds": (), "bond_plans": {}})
-        bonds = tuple(b for b in self.bonds if {b.bond.motion.participant, b.bond.force.participant} & own)
-        order = tuple(name for name in self.order if name in shared)
+                shared[name] = planned.model_copy(update={"ports": ports, "bonds": (), "bond_plans": {}})
         return Plan(
             step_ns=self.step_ns,
-            order=order,
-            members=shared,
-            links=links,
-            inlets=inlets,
-            outlets=outlets,
-            bonds=bonds,
+            order=tuple(name for name in self.order if name in shared),
+            participants=shared,
+            connections=connections,
+            from_devices=from_devices,
+            to_devices=to_devices,
+            bonds=tuple(b for b in self.bonds if {b.bond.motion.participant, b.bond.force.participant} & own),
         )
 
     def hosts(self) -> tuple[str, ...]:
         """Return the names of all hosts, the hub's own first."""
-        names = {member.host for member in self.members.values()} - {"hub"}
+        names = {planned.host for planned in self.participants.values()} - {"hub"}
         return ("hub", *sorted(names))
 
 
-def plays_in_simulated_time(ports: Sequence[Port]) -> bool:
-    """Say whether a device with these ports follows the clock: it has outputs, and all are stamped with
-    simulated time.
+def has_simulated_time(ports: Sequence[Port]) -> bool:
+    """Return whether a device with these ports lives in simulated time.
+
+    It does if it has outputs and all of them are stamped with simulated time.
     """
     outputs = [port for port in ports if port.causality == "output"]
     return bool(outputs) and all(port.clock == "simulated" for port in outputs)
+
+
+def _from_0_1_0(data: dict[str, Any]) -> dict[str, Any]:
+    old = dict(data)
+    participants = {
+        name: {("network_link" if key == "link" else key): value for key, value in planned.items()}
+        | {"kind": KINDS.get(planned["kind"], planned["kind"])}
+        for name, planned in old.pop("members").items()
+    }
+    from_devices = [_renamed(inlet, "source") for inlet in old.pop("inlets")]
+    to_devices = [_renamed(outlet, "target") for outlet in old.pop("outlets")]
+    connections = old.pop("links")
+    return old | {
+        "participants": participants,
+        "connections": connections,
+        "from_devices": from_devices,
+        "to_devices": to_devices,
+    }
+
+
+def _renamed(connection: dict[str, Any], end: str) -> dict[str, Any]:
+    names = {"device": end, "device_port": f"{end}_port"}
+    return {names.get(key, key): value for key, value in connection.items()}

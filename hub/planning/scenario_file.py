@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -12,12 +14,16 @@ from pydantic import ValidationError
 
 from hub.participant import Params
 from hub.planning import registry
+from hub.planning.renamed import SCENARIOS, replace_old_names
 from hub.planning.scenario_source import Location, Source, read
+from hub.planning.scene import spread_scene
 from hub.planning.validation_errors import problems
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.scenario import ParticipantSpec, Scenario
 
 __all__ = ["ScenarioFile", "installed_scenarios", "load", "located"]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,11 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
     source = read(_find(name_or_path))
     for override in overrides:
         source.override(override)
+    replace_old_names(source)
+    try:
+        spread_scene(source, _models(source))
+    except ScenarioError as error:
+        raise located(error, source) from error
     found: list[str] = []
     params = _all_params(source, found)
     try:
@@ -66,6 +77,9 @@ def _find(name_or_path: str) -> Path:
             raise ScenarioError(f"there is no scenario file '{path}' (looked in {Path.cwd()})")
         return path
     known = installed_scenarios()
+    if name_or_path in SCENARIOS:
+        log.warning("scenario '%s' is now '%s'", name_or_path, SCENARIOS[name_or_path])
+        return known[SCENARIOS[name_or_path]]
     if name_or_path not in known:
         raise ScenarioError(
             f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} A file of your own is"
@@ -74,15 +88,29 @@ def _find(name_or_path: str) -> Path:
     return known[name_or_path]
 
 
+def _specs(source: Source) -> dict[str, dict[str, Any]]:
+    """Return the participants that name a kind; the scenario's own validation reports the others."""
+    participants = source.tree.get("participants")
+    given = cast("dict[str, Any]", participants if isinstance(participants, dict) else {})
+    specs = {name: cast("dict[str, Any]", spec) for name, spec in given.items() if isinstance(spec, dict)}
+    return {name: spec for name, spec in specs.items() if isinstance(spec.get("kind"), str)}
+
+
+def _models(source: Source) -> dict[str, type[Params]]:
+    """Return the parameters' model of every participant whose kind can be loaded."""
+    models: dict[str, type[Params]] = {}
+    for name, spec in _specs(source).items():
+        with suppress(ScenarioError):  # `_all_params` reports it
+            models[name] = registry.load(spec["kind"]).params_model
+    return models
+
+
 def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
     """Return the parameters of every participant; what is wrong with them goes into `found`."""
-    participants = source.tree.get("participants")
     params: dict[str, Params] = {}
-    for name, spec in cast("dict[str, Any]", participants if isinstance(participants, dict) else {}).items():
-        if not isinstance(spec, dict) or not isinstance(cast("dict[str, Any]", spec).get("kind"), str):
-            continue  # the scenario's own validation says so
+    for name, spec in _specs(source).items():
         try:
-            params[name] = _params(("participants", name), cast("dict[str, Any]", spec), source)
+            params[name] = _params(("participants", name), spec, source)
         except ScenarioError as error:
             found.append(str(located(error, source)))
     return params

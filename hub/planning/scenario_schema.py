@@ -13,7 +13,7 @@ from schemas.scenario import ParticipantSpec, Scenario
 __all__ = ["scenario_schema"]
 
 _PORT = r"\s*[A-Za-z][A-Za-z0-9_]*\.\S+\s*"
-_TEXT_FORMS = {"Endpoint": rf"^{_PORT}$", "Connection": rf"^{_PORT}->{_PORT}$"}
+_TEXT_FORMS = {"PortReference": rf"^{_PORT}$", "Connection": rf"^{_PORT}->{_PORT}$"}
 """Parts of a scenario that may also be written as one line of text."""
 
 
@@ -45,11 +45,8 @@ def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[st
         properties = {
             key: value for key, value in common.items() if key in ParticipantSpec.RESERVED
         } | params.get("properties", {})
-        then = {
-            "properties": properties,
-            "required": params.get("required", []),
-            "additionalProperties": False,
-        }
+        # parameters that a kind requires may stand in the scene: `trocar check` reports those that are missing
+        then = {"properties": properties, "additionalProperties": False}
         branches.append({"if": {"properties": {"kind": {"const": kind.name}}}, "then": then})
     kind_schema = common["kind"] | {"enum": [kind.name for kind in kinds]}
     return {

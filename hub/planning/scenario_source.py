@@ -67,6 +67,25 @@ class Source:
                 self.overrides[path[: depth + 1]] = text
             parent = cast("dict[Any, Any]", parent)[part]
 
+    def rename(self, parent: Location, old: str, new: str) -> None:
+        """Call the value at `old` of the mapping at `parent` `new`; messages about it still find its place."""
+        mapping: Any = self.tree
+        for part in parent:
+            mapping = mapping[part]
+        mapping[new] = mapping.pop(old)
+        self.stands_also_at((*parent, old), (*parent, new))
+
+    def stands_also_at(self, written: Location, path: Location) -> None:
+        """Find the values below `path` where those below `written` are, unless they have a place of their own."""
+        for places in (self.marks, self.overrides):
+            found = {
+                (*path, *at[len(written) :]): place
+                for at, place in places.items()
+                if at[: len(written)] == written
+            }
+            for at, place in found.items():
+                cast("dict[Location, Any]", places).setdefault(at, place)
+
     def _where(self, path: Location, key: bool) -> str:
         for length in range(len(path), -1, -1):
             known = path[:length]

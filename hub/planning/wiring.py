@@ -8,12 +8,20 @@ from collections.abc import Mapping
 
 from hub.participant import BondPlan, Device, Stepped
 from hub.planning.coupling import bond_plans, is_fresh
-from hub.planning.plan import Inlet, Link, Member, Outlet, Plan, PlannedBond, plays_in_simulated_time
+from hub.planning.plan import (
+    ConnectionFromDevice,
+    ConnectionToDevice,
+    Plan,
+    PlannedBond,
+    PlannedConnection,
+    PlannedParticipant,
+    has_simulated_time,
+)
 from hub.planning.wildcard import spelt_out
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import BondSide, Port, bond_ports
 from schemas.quantity import same_unit
-from schemas.scenario import Bond, Connection, Endpoint, Scenario
+from schemas.scenario import Bond, Connection, PortReference, Scenario
 from schemas.vectors import VectorCodec, has_vector
 
 __all__ = ["make_plan", "measured_port"]
@@ -32,30 +40,32 @@ def make_plan(
     Raises ScenarioError, with the place in the scenario, on the first thing that does not fit.
     """
     bonds = [_planned_bond(scenario, participants, i) for i in range(len(scenario.bonds))]
-    members = {
-        name: _member(scenario, participants[name], roles[name], bonds) for name in scenario.participants
+    planned = {
+        name: _planned(scenario, participants[name], roles[name], bonds) for name in scenario.participants
     }
-    wiring = _Wiring(scenario, members)
-    ports = {name: member.ports for name, member in members.items()}
+    wiring = _Wiring(scenario, planned)
+    ports = {name: one.ports for name, one in planned.items()}
     for index, connection in enumerate(scenario.connections):
         for single in spelt_out(connection, ports, ("connections", index)):
             wiring.connect(single, ("connections", index))
-    for index, planned in enumerate(bonds):
-        wiring.couple(index, planned)
+    for index, bond in enumerate(bonds):
+        wiring.couple(index, bond)
     wiring.check_inputs()
-    _check_measures(scenario, members)
+    _check_measures(scenario, planned)
     return Plan(
         step_ns=scenario.step,
         order=wiring.step_order(),
-        members=members,
-        links=tuple(wiring.links),
-        inlets=tuple(wiring.inlets),
-        outlets=tuple(wiring.outlets),
+        participants=planned,
+        connections=tuple(wiring.connections),
+        from_devices=tuple(wiring.from_devices),
+        to_devices=tuple(wiring.to_devices),
         bonds=tuple(bonds),
     )
 
 
-def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds: list[PlannedBond]) -> Member:
+def _planned(
+    scenario: Scenario, participant: Stepped | Device, role: str, bonds: list[PlannedBond]
+) -> PlannedParticipant:
     name = participant.name
     spec, path = scenario.participants[name], ("participants", name)
     sides = [
@@ -65,7 +75,7 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
         if e.participant == name
     ]
     ports = participant.ports + tuple(port for _, side in sides for port in bond_ports(side))
-    in_wall_time = role == "device" and not plays_in_simulated_time(ports)
+    in_wall_time = role == "device" and not has_simulated_time(ports)
     period_ns = spec.period if spec.period is not None and not in_wall_time else scenario.step
     read_ns = (
         (spec.period if spec.period is not None else participant.read_period_ns)
@@ -82,10 +92,10 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
             f"period {read_ns / 1e6:g} ms: a device is read every {_LEAST_READ_NS / 1e6:g} ms at most",
             path=(*path, "period"),
         )
-    if spec.link is not None and role != "device":
+    if spec.network_link is not None and role != "device":
         raise ScenarioError(
-            f"a link lies between a device and the hub, but '{name}' is a {role}: leave it out",
-            path=(*path, "link"),
+            f"a network link lies between a device and the hub, but '{name}' is a {role}: leave it out",
+            path=(*path, "network_link"),
         )
     for port in ports:
         if port.period_ns % period_ns and not in_wall_time:
@@ -101,25 +111,25 @@ def _member(scenario: Scenario, participant: Stepped | Device, role: str, bonds:
             plans[planned.motion.name] = motion
         if planned.bond.force.participant == name:
             plans[planned.force.name] = force
-    member = Member(
+    planned = PlannedParticipant(
         name=name,
         kind=spec.kind,
         role=role,  # pyright: ignore[reportArgumentType]
         host=f"remote/{name}" if spec.host == "remote" else spec.host,
         period=period_ns // scenario.step,
         read_ns=read_ns,
-        link=spec.link,
+        network_link=spec.network_link,
         rate_limit=spec.rate_limit,
         ports=ports,
         bonds=tuple(side for _, side in sides),
         bond_plans=plans,
     )
-    if member.follows_clock and member.host != "hub":
+    if planned.simulated_time and planned.host != "hub":
         raise ScenarioError(
             f"device '{name}' plays in simulated time, which only the hub's process has: leave out its host",
             path=(*path, "host"),
         )
-    return member
+    return planned
 
 
 def _planned_bond(
@@ -194,17 +204,17 @@ def _check_algorithm(scenario: Scenario, bond: Bond, force: BondSide, index: int
 class _Wiring:
     """Collects the links of a session while checking them."""
 
-    def __init__(self, scenario: Scenario, members: Mapping[str, Member]) -> None:
+    def __init__(self, scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
         self._scenario = scenario
-        self._members = members
+        self._planned = participants
         self._fed: dict[tuple[str, str], list[str]] = {}
         self._rank = {name: i for i, name in enumerate(scenario.order or ())}
-        self.links: list[Link] = []
-        self.inlets: list[Inlet] = []
-        self.outlets: list[Outlet] = []
+        self.connections: list[PlannedConnection] = []
+        self.from_devices: list[ConnectionFromDevice] = []
+        self.to_devices: list[ConnectionToDevice] = []
         for index, name in enumerate(scenario.order or ()):
-            if name not in members or members[name].role == "device":
-                stepped = [n for n, m in members.items() if m.role != "device"]
+            if name not in participants or participants[name].role == "device":
+                stepped = [n for n, m in participants.items() if m.role != "device"]
                 raise ScenarioError(
                     f"unknown stepped participant '{name}'.{did_you_mean(name, stepped)}",
                     path=("order", index),
@@ -224,7 +234,7 @@ class _Wiring:
                 f"{values} cannot be extrapolated, as '{connection.source} -> {connection.target}' would",
                 path=path,
             )
-        from_device, to_device = (self._members[end.participant].role == "device" for end in (one, other))
+        from_device, to_device = (self._planned[end.participant].role == "device" for end in (one, other))
         if to_device and connection.extrapolation == "linear":
             raise ScenarioError(
                 f"'{other.participant}' is a device, which is written what is there: 'extrapolation' is for"
@@ -237,28 +247,28 @@ class _Wiring:
             )
         if from_device:
             age = min((a for a in (source.max_age_ns, target.max_age_ns) if a), default=0)
-            self.inlets.append(
-                Inlet(
-                    device=one.participant,
-                    device_port=one.port,
+            self.from_devices.append(
+                ConnectionFromDevice(
+                    source=one.participant,
+                    source_port=one.port,
                     target=other.participant,
                     target_port=other.port,
                     max_age_ns=age,
                 )
             )
-        elif self._members[other.participant].follows_clock:
-            self._link(one, other, fresh=False, linear=False)
+        elif self._planned[other.participant].simulated_time:
+            self._add(one, other, fresh=False, linear=False)
         elif to_device:
-            self.outlets.append(
-                Outlet(
+            self.to_devices.append(
+                ConnectionToDevice(
                     source=one.participant,
                     source_port=one.port,
-                    device=other.participant,
-                    device_port=other.port,
+                    target=other.participant,
+                    target_port=other.port,
                 )
             )
         else:
-            self._link(
+            self._add(
                 one,
                 other,
                 fresh=self._in_order(one.participant, other.participant),
@@ -269,20 +279,20 @@ class _Wiring:
         bond = planned.bond
         *moving, force = zip(bond_ports(planned.motion), bond_ports(planned.force), strict=True)
         for here, there in moving:
-            self._bond_link(
+            self._connect_bond(
                 index, _end(bond.motion, here), _end(bond.force, there), fresh=is_fresh(bond, "motion")
             )
-        self._bond_link(
+        self._connect_bond(
             index, _end(bond.force, force[1]), _end(bond.motion, force[0]), fresh=is_fresh(bond, "force")
         )
 
-    def _bond_link(self, index: int, one: Endpoint, other: Endpoint, *, fresh: bool) -> None:
+    def _connect_bond(self, index: int, one: PortReference, other: PortReference, *, fresh: bool) -> None:
         self._feed(other, str(one), ("bonds", index))
-        self._link(one, other, fresh=fresh, linear=False)
+        self._add(one, other, fresh=fresh, linear=False)
 
-    def _link(self, one: Endpoint, other: Endpoint, *, fresh: bool, linear: bool) -> None:
-        self.links.append(
-            Link(
+    def _add(self, one: PortReference, other: PortReference, *, fresh: bool, linear: bool) -> None:
+        self.connections.append(
+            PlannedConnection(
                 source=one.participant,
                 source_port=one.port,
                 target=other.participant,
@@ -299,14 +309,14 @@ class _Wiring:
             return self._rank[source] < self._rank[target]
         return True
 
-    def _resolve(self, end: Endpoint, causality: str, path: Path) -> Port:
-        member = self._members.get(end.participant)
-        if member is None:
+    def _resolve(self, end: PortReference, causality: str, path: Path) -> Port:
+        planned = self._planned.get(end.participant)
+        if planned is None:
             raise ScenarioError(
-                f"unknown participant '{end.participant}'.{did_you_mean(end.participant, self._members)}",
+                f"unknown participant '{end.participant}'.{did_you_mean(end.participant, self._planned)}",
                 path=path,
             )
-        ports = {port.name: port for port in member.ports}
+        ports = {port.name: port for port in planned.ports}
         if end.port not in ports:
             allowed = [name for name, port in ports.items() if port.causality == causality]
             raise ScenarioError(
@@ -320,7 +330,7 @@ class _Wiring:
             )
         return ports[end.port]
 
-    def _feed(self, end: Endpoint, source: str, path: Path, *, shared: bool = False) -> None:
+    def _feed(self, end: PortReference, source: str, path: Path, *, shared: bool = False) -> None:
         """Note who feeds an input; one that is `shared`, a queue of events, may have several sources."""
         before = self._fed.setdefault((end.participant, end.port), [])
         if before and (not shared or source in before):
@@ -329,13 +339,13 @@ class _Wiring:
 
     def check_inputs(self) -> None:
         """Refuse an input that has neither a source nor a start value."""
-        for name, member in self._members.items():
-            for port in member.ports:
+        for name, planned in self._planned.items():
+            for port in planned.ports:
                 needs = (
                     port.causality == "input"
                     and port.variability == "signal"
                     and port.start is None
-                    and member.role != "device"
+                    and planned.role != "device"
                 )
                 if needs and (name, port.name) not in self._fed:
                     raise ScenarioError(
@@ -348,10 +358,12 @@ class _Wiring:
         then in the scenario's order.
         """
         stepped = sorted(
-            (name for name, m in self._members.items() if m.role != "device"),
+            (name for name, m in self._planned.items() if m.role != "device"),
             key=lambda name: self._rank.get(name, len(self._rank)),
         )
-        waiting = {name: {k.source for k in self.links if k.fresh and k.target == name} for name in stepped}
+        waiting = {
+            name: {k.source for k in self.connections if k.fresh and k.target == name} for name in stepped
+        }
         order: list[str] = []
         while waiting:
             free = next((name for name in waiting if not waiting[name] & waiting.keys()), None)
@@ -367,11 +379,11 @@ class _Wiring:
         return tuple(order)
 
 
-def _end(side: Endpoint, port: Port) -> Endpoint:
-    return Endpoint(participant=side.participant, port=port.name)
+def _end(side: PortReference, port: Port) -> PortReference:
+    return PortReference(participant=side.participant, port=port.name)
 
 
-def _check_fit(one: Endpoint, source: Port, other: Endpoint, target: Port, path: Path) -> None:
+def _check_fit(one: PortReference, source: Port, other: PortReference, target: Port, path: Path) -> None:
     if source.type != target.type:
         raise ScenarioError(f"'{one}' gives {source.type}, '{other}' takes {target.type}", path=path)
     if (source.variability, target.variability) == ("event", "signal"):
@@ -395,35 +407,35 @@ def _check_fit(one: Endpoint, source: Port, other: Endpoint, target: Port, path:
             )
 
 
-def _check_measures(scenario: Scenario, members: Mapping[str, Member]) -> None:
+def _check_measures(scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
     for name, measure in scenario.measure.items():
         path = ("measure", name, "of")
-        member = members.get(measure.of.participant)
-        if member is None:
+        planned = participants.get(measure.of.participant)
+        if planned is None:
             raise ScenarioError(
                 "unknown participant"
-                f" '{measure.of.participant}'.{did_you_mean(measure.of.participant, members)}",
+                f" '{measure.of.participant}'.{did_you_mean(measure.of.participant, participants)}",
                 path=path,
             )
-        measured_port(member, measure.of.port, path)
+        measured_port(planned, measure.of.port, path)
 
 
-def measured_port(member: Member, text: str, path: Path = ()) -> tuple[Port, slice]:
+def measured_port(planned: PlannedParticipant, text: str, path: Path = ()) -> tuple[Port, slice]:
     """Return the output port and the part of its vector that `port` or `port.field` means."""
     outputs = {
         p.name: p
-        for p in member.ports
+        for p in planned.ports
         if p.causality == "output" and p.variability == "signal" and has_vector(p.type)
     }
     name, _, field = text.partition(".")
     if name not in outputs:
         raise ScenarioError(
-            f"participant '{member.name}' has no output '{name}' to measure.{did_you_mean(name, outputs)}",
+            f"participant '{planned.name}' has no output '{name}' to measure.{did_you_mean(name, outputs)}",
             path=path,
         )
     codec = VectorCodec(outputs[name])
     if field and field not in codec.fields:
         raise ScenarioError(
-            f"'{member.name}.{name}' has no field '{field}'.{did_you_mean(field, codec.fields)}", path=path
+            f"'{planned.name}.{name}' has no field '{field}'.{did_you_mean(field, codec.fields)}", path=path
         )
     return outputs[name], codec.fields[field] if field else slice(0, codec.size)

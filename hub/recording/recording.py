@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from hub.planning.plan import Plan
+from hub.planning.renamed import current_names
 from hub.recording.bag import Bag, output_port
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError
 from schemas.keys import Keys, topic
 from schemas.message import Message
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import Ack, CouplingEnergy, Grant, SessionStatus
+from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, SessionStatus
 from schemas.vectors import Vector, VectorCodec, has_vector
 
 __all__ = ["ENERGY_PREFIX", "GRANT_TOPIC", "STATUS_TOPIC", "Recording"]
@@ -40,7 +41,7 @@ class Recording(Bag):
     def scenario(self) -> Scenario:
         """Return the resolved scenario. Raises RecordingError if the recording is not one of a session."""
         try:
-            return Scenario.model_validate_json(self.attachments["scenario.json"])
+            return Scenario.model_validate(current_names(json.loads(self.attachments["scenario.json"])))
         except KeyError:
             raise RecordingError(
                 f"'{self.file}' holds no scenario: it was not recorded by `trocar run`"
@@ -100,13 +101,13 @@ class Recording(Bag):
         status = next(self._decoded(STATUS_TOPIC, SessionStatus), None)
         return self.scenario().name if status is None else status[1].session
 
-    def grants(self) -> Iterator[Grant]:
+    def grants(self) -> Iterator[GrantMessage]:
         """Yield the grants in the order in which they were given."""
-        return (grant for _, grant in self._decoded(GRANT_TOPIC, Grant))
+        return (grant for _, grant in self._decoded(GRANT_TOPIC, GrantMessage))
 
-    def acks(self, participant: str) -> Iterator[Ack]:
+    def acks(self, participant: str) -> Iterator[AckMessage]:
         """Yield the acks of `participant` in the order in which they came."""
-        return (ack for _, ack in self._decoded(topic(_KEYS.ack(participant)), Ack))
+        return (ack for _, ack in self._decoded(topic(_KEYS.ack(participant)), AckMessage))
 
     def energy(self, bond: str) -> Iterator[tuple[int, CouplingEnergy]]:
         """Yield the energy book of `bond`, with the simulated time (ns) of each entry."""

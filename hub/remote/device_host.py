@@ -98,7 +98,7 @@ class DeviceHost:
 
     def _take_part(self, session: zenoh.Session, reply: JoinReply) -> None:
         """Go along with a run until it is over."""
-        keys, member = Keys(reply.session), reply.plan.members[self._name]
+        keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
         run = Run(reply.plan, keys, reply.run, reply.admission)
         with ExitStack() as stack:
@@ -119,7 +119,7 @@ class DeviceHost:
                 )
                 raise
             clock = stack.enter_context(ClockWatch(session, keys))
-            uplink = DeviceUplink(member, run, session, loop, drops, clock.offset)
+            uplink = DeviceUplink(planned, run, session, loop, drops, clock.offset)
             stack.callback(uplink.close)
             loop.attach(uplink)
             token = session.liveliness().declare_token(keys.alive("device", self._name))
@@ -141,18 +141,18 @@ class DeviceHost:
         """Return the loop of the device, which stays open from one run to the next unless the scenario wants
         another one.
         """
-        member, params = reply.plan.members[self._name], reply.params[self._name]
-        wanted = (member.kind, params, member.read_ns, reply.directory)
+        planned, params = reply.plan.participants[self._name], reply.params[self._name]
+        wanted = (planned.kind, params, planned.read_ns, reply.directory)
         if self._loop is None or self._held != wanted:
             if self._loop is not None:
                 self._loop.close()
             directory = self._directory or Path(reply.directory)
-            device = make(member.kind, self._name, params, directory)
+            device = make(planned.kind, self._name, params, directory)
             if not isinstance(device, Device):
-                raise ParticipantError(self._name, -1, f"'{member.kind}' is no device here")
+                raise ParticipantError(self._name, -1, f"'{planned.kind}' is no device here")
             device.learn_hub(self._connect)
             self._loop, self._held = (
-                DeviceLoop(self._name, device, member.read_ns, failed=self._device_failed),
+                DeviceLoop(self._name, device, planned.read_ns, failed=self._device_failed),
                 wanted,
             )
             self._loop.start(directory)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hub.planning.plan import Member, Outlet, Plan
+from hub.planning.plan import ConnectionToDevice, Plan, PlannedParticipant
 from hub.security.credentials import CONSOLE, OBSERVER
 from schemas.keys import Keys
 
@@ -49,9 +49,9 @@ def access_settings(
     """
     keys = Keys(session)
     rights = {
-        member.name: _part(plan, keys, member)
-        for member in plan.members.values()
-        if member.host.startswith("remote/")
+        planned.name: _part(plan, keys, planned)
+        for planned in plan.participants.values()
+        if planned.host.startswith("remote/")
     }
     # all that `trocar ls` needs
     rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]
@@ -93,13 +93,15 @@ def access_settings(
     return {"access_control": access, **limits, "scouting/gossip/enabled": False}
 
 
-def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
+def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
     """Return the rights of one remote participant."""
-    name, role, hub = member.name, member.key_role, keys.alive("hub", "hub")
+    name, role, hub = planned.name, planned.key_role, keys.alive("hub", "hub")
     links = [
-        keys.output("engine", link.source, link.source_port) for link in plan.links if link.target == name
+        keys.output("engine", link.source, link.source_port)
+        for link in plan.connections
+        if link.target == name
     ]
-    feeds = [_feed(plan, keys, outlet) for outlet in plan.outlets if outlet.device == name]
+    feeds = [_feed(plan, keys, outlet) for outlet in plan.to_devices if outlet.target == name]
     heard = list(dict.fromkeys(links + feeds))
     # as the hub does, to all participants at once
     listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]
@@ -107,18 +109,18 @@ def _part(plan: Plan, keys: Keys, member: Member) -> list[Rule]:
         _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
         _allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *listens),
         _allow("ingress", ["liveliness_token"], keys.alive(role, name)),
-        *_asks(Keys("*").join(member.host), keys.control("clock")),
+        *_asks(Keys("*").join(planned.host), keys.control("clock")),
         *_hears(*heard, keys.link(name) if role == "device" else keys.grant),
         _allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
         _allow("egress", ["liveliness_token"], hub),
     ]
 
 
-def _feed(plan: Plan, keys: Keys, outlet: Outlet) -> str:
+def _feed(plan: Plan, keys: Keys, outlet: ConnectionToDevice) -> str:
     """Return the key on which a device gets what a connection brings."""
-    if plan.members[outlet.source].port(outlet.source_port).variability == "event":
+    if plan.participants[outlet.source].port(outlet.source_port).variability == "event":
         return keys.feed(outlet.source, outlet.source_port)
-    return keys.signals(outlet.source, outlet.device)
+    return keys.signals(outlet.source, outlet.target)
 
 
 def _asks(*keys: str) -> list[Rule]:

@@ -1,1 +1,1 @@
-"""One session: its clock, its members, its beginning and its end."""
+"""One session: its clock, its participants, its beginning and its end."""

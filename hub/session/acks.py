@@ -8,15 +8,15 @@ from contextlib import suppress
 import zenoh
 from zenoh.handlers import FifoChannel
 
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.refusals import Drops
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
-from schemas.lockstep import Permission, Report, unpack_report
+from schemas.lockstep import Ack, Grant, unpack_ack
 
 __all__ = ["Accepted", "Acks"]
 
-Accepted = tuple[Member, Report, bytes]
+Accepted = tuple[PlannedParticipant, Ack, bytes]
 """Who reports what, and the bytes of it."""
 
 _NO_STEPS: Mapping[str, int] = {}
@@ -27,10 +27,10 @@ class Acks:
 
     def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, drops: Drops) -> None:
         self._session, self._key, self._run, self._drops = session, keys.ack("hub"), run, drops
-        self._members = {keys.ack(name): plan.members[name] for name in plan.order}
+        self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
-    def receive(self, waiting: Sequence[str], grant: Permission, steps: Mapping[str, int]) -> Accepted | None:
+    def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Accepted | None:
         """Wait for a message, and return it if it is a valid report of one of `waiting` on `grant`, in which
         participants take `steps`.
 
@@ -54,33 +54,33 @@ class Acks:
         if key == self._key and not sample.payload:
             return None
         try:
-            member = self._members.get(key)
-            if member is None:
+            planned = self._planned.get(key)
+            if planned is None:
                 raise MessageError("belongs to no participant of this run")
             payload = sample.payload.to_bytes()
-            count = steps.get(member.name, 0)
-            report = unpack_report(payload, count, count * len(member.bonds))
-            if report.run != self._run:
-                raise MessageError(f"belongs to run {report.run:x}, this is run {self._run:x}")
-            if report.error:
-                raise ParticipantError(member.name, report.step, report.error)
-            if member.name not in waiting or report.step != step:
-                raise MessageError(f"reports on step {report.step}, for which nobody waits")
+            count = steps.get(planned.name, 0)
+            ack = unpack_ack(payload, count, count * len(planned.bonds))
+            if ack.run != self._run:
+                raise MessageError(f"belongs to run {ack.run:x}, this is run {self._run:x}")
+            if ack.error:
+                raise ParticipantError(planned.name, ack.step, ack.error)
+            if planned.name not in waiting or ack.step != step:
+                raise MessageError(f"reports on step {ack.step}, for which nobody waits")
         except MessageError as error:
             self._drops.count(sample, error)
             return None
-        return member, report, payload
+        return planned, ack, payload
 
     def raise_failure(self) -> None:
         """Raise the failure that a participant has reported in its own words, if there is one among what is
         here.
         """
         while (sample := self._subscriber.try_recv()) is not None:
-            member = self._members.get(str(sample.key_expr))
+            planned = self._planned.get(str(sample.key_expr))
             with suppress(MessageError):
-                report = unpack_report(sample.payload.to_bytes(), 0, 0)
-                if member is not None and report.run == self._run and report.error:
-                    raise ParticipantError(member.name, report.step, report.error)
+                ack = unpack_ack(sample.payload.to_bytes(), 0, 0)
+                if planned is not None and ack.run == self._run and ack.error:
+                    raise ParticipantError(planned.name, ack.step, ack.error)
 
     def wake(self) -> None:
         """Make `receive` return."""

@@ -41,7 +41,7 @@ class Clock:
         """Whether steps follow the wall clock."""
         self.steps = steps
         self._periods = sorted(
-            {plan.members[inlet.target].period for inlet in plan.inlets}
+            {plan.participants[inlet.target].period for inlet in plan.from_devices}
             | {device.period for device in plan.meetings()}
         )
         self._wall_zero_ns = monotonic_ns()

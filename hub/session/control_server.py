@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from zenoh.handlers import Callback
 
 from hub.devices.inlets import Inlets
-from hub.devices.network_link_control import LinkRequest, Relink
+from hub.devices.network_link_control import NetworkLinkControl, NetworkLinkRequest
 from hub.session.run_state import RunState
 from hub.transport.control_messages import ClockReply, Empty, JoinRequest, Refusal, SetRequest, StepRequest
 from hub.transport.port_codec import PortCodec
@@ -44,7 +44,7 @@ class ControlServer:
         keys: Keys,
         state: RunState,
         inlets: Inlets,
-        relink: Relink,
+        network_links: NetworkLinkControl,
         joins: Joins,
         drops: Drops,
     ) -> None:
@@ -66,7 +66,7 @@ class ControlServer:
                 lambda request: self._done(state.step(request.steps)),
             ),
             self._declare(session, keys.control("set"), SetRequest, self._set),
-            self._declare(session, keys.control("link"), LinkRequest, relink.change),
+            self._declare(session, keys.control("link"), NetworkLinkRequest, network_links.change),
             self._declare(session, keys.control("clock"), Empty, self._clock),
             self._declare(session, keys.control("shutdown"), Empty, lambda _: self._done(state.shutdown())),
         ]

@@ -59,7 +59,7 @@ def launch(
     """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
     plan, participants = plan_of(scenario, loaded.params)
-    here = {name: p for name, p in participants.items() if plan.members[name].host == "hub"}
+    here = {name: p for name, p in participants.items() if plan.participants[name].host == "hub"}
     directory = loaded.source.directory
     attachments = {} if record is None else _attachments(scenario, plan, loaded)
     foreign = {

@@ -70,7 +70,7 @@ class Membership:
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
         """Answer a host that presents itself, is ready or has failed; raises MessageError to refuse it."""
-        names = [name for name, member in self._plan.members.items() if member.host == request.host]
+        names = [name for name, planned in self._plan.participants.items() if planned.host == request.host]
         if not names or request.host == "hub":
             hosts = (
                 ", ".join(host for host in self._plan.hosts() if host != "hub") or "none but the hub's own"

@@ -23,7 +23,7 @@ from hub.observation.observers import Observers
 from hub.observation.summary import Progress, Summary
 from hub.participant import Device, Stepped
 from hub.planning.bond_check import check_bonds
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
 from hub.session.acks import Acks
@@ -39,10 +39,10 @@ from hub.transport.zenoh_session import open_session
 from schemas.codec import decode, encode
 from schemas.errors import MessageError, ScenarioError, SessionError
 from schemas.keys import Keys
-from schemas.lockstep import Permission, Report, pack_permission
+from schemas.lockstep import Ack, Grant, pack_grant
 from schemas.ros import StringMessage
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import Grant
+from schemas.trocar_msgs import GrantMessage
 
 __all__ = ["Session"]
 
@@ -66,14 +66,14 @@ class Session:
         gate: Gate | None = None,
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
-        grants: Iterator[Grant] | None = None,
-        on_report: Callable[[Member, Report], None] | None = None,
+        grants: Iterator[GrantMessage] | None = None,
+        on_ack: Callable[[PlannedParticipant, Ack], None] | None = None,
     ) -> None:
         """Prepare a run of `scenario`, wired as `plan` says, with those `participants` that live in this
         process.
 
         `directory`: where relative paths of the scenario start. `gate`: lets other machines in. `grants`:
-        re-simulate these instead of listening to devices. `on_report` sees what every participant reports of
+        re-simulate these instead of listening to devices. `on_ack` sees what every participant reports of
         every grant.
         """
         self.scenario = scenario
@@ -86,7 +86,7 @@ class Session:
         self._record = record
         self._attachments = dict(attachments or {})
         self._grants = grants
-        self._on_report = on_report
+        self._on_ack = on_ack
         self._run_id = secrets.randbits(63) | 1
         self._keys = Keys(scenario.name)
         steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
@@ -94,10 +94,10 @@ class Session:
         self._drops = Drops()
         self._inlets = Inlets(plan)
         self._intake = Intake(plan, self._keys, self._run_id, self._drops, self._inlets)
-        self._away = {name for name in plan.order if plan.members[name].host != "hub"}
-        self._common_period = math.lcm(*(plan.members[name].period for name in plan.order))
+        self._away = {name for name in plan.order if plan.participants[name].host != "hub"}
+        self._common_period = math.lcm(*(plan.participants[name].period for name in plan.order))
         self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
-        self._reports: list[tuple[Member, Report, bytes | None]] = []
+        self._acks_to_book: list[tuple[PlannedParticipant, Ack, bytes | None]] = []
         self._interrupt = Interrupt()
 
     # --- the run
@@ -192,7 +192,13 @@ class Session:
             session.declare_queryable(keys.status, Callback(self._answer_status)),
             session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._came_or_went)),
             ControlServer(
-                session, keys, self.state, self._inlets, self._intake.relink, self._membership, self._drops
+                session,
+                keys,
+                self.state,
+                self._inlets,
+                self._intake.network_links,
+                self._membership,
+                self._drops,
             ),
             session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
             *(session.declare_subscriber(key, watch) for key in self._observers.away),
@@ -232,7 +238,7 @@ class Session:
         self._await_links()
 
     def _is_needed(self, host: str) -> bool:
-        roles = {member.role for member in self.plan.members.values() if member.host == host}
+        roles = {planned.role for planned in self.plan.participants.values() if planned.host == host}
         return self._grants is None or roles != {"device"}
 
     def _await_hosts(self, hosts: list[str]) -> None:
@@ -302,7 +308,7 @@ class Session:
         self._account.phase = "running"
         self._clock.start()
 
-    def _next_grant(self, budget: int | None) -> Permission | None:
+    def _next_grant(self, budget: int | None) -> Grant | None:
         """Return the next grant, of at most `budget` steps, with all that enters the simulation at this
         communication point.
         """
@@ -310,7 +316,7 @@ class Session:
             recorded = next(self._grants, None)
             if recorded is None:
                 return None
-            return Permission(
+            return Grant(
                 self._run_id,
                 recorded.epoch,
                 recorded.step,
@@ -320,23 +326,23 @@ class Session:
             )
         step, time_ns = self._clock.step, self._clock.time_ns
         horizon_ns = time_ns + self._clock.horizon(budget) * self.plan.step_ns
-        return Permission(self._run_id, 0, step, time_ns, horizon_ns, self._intake.enter(time_ns, step))
+        return Grant(self._run_id, 0, step, time_ns, horizon_ns, self._intake.enter(time_ns, step))
 
-    def _step(self, grant: Permission) -> None:
+    def _step(self, grant: Grant) -> None:
         """Publish a grant, take part in it, and wait until everybody else has.
 
         The reports of the grant before are booked while the others are at work on this one.
         """
         granted_ns = monotonic_ns()
         if self._away:
-            self._grant_publisher.put(pack_permission(grant))
+            self._grant_publisher.put(pack_grant(grant))
         self._settle()
         if self._record is not None:
-            self._observers.grant(grant, pack_permission(grant))
+            self._observers.grant(grant, pack_grant(grant))
         due, steps = self._schedule(grant)
         waiting = [name for name in due if name in self._away]
         self._watchdog.wait_for(due)
-        self._host.run(grant, lambda member, report: self._reports.append((member, report, None)))
+        self._host.run(grant, lambda planned, ack: self._acks_to_book.append((planned, ack, None)))
         self._watchdog.wait_for(waiting)
         while waiting:
             accepted = self._acks.receive(waiting, grant, steps)
@@ -344,7 +350,7 @@ class Session:
                 self._check()
             else:
                 waiting.remove(accepted[0].name)
-                self._reports.append(accepted)
+                self._acks_to_book.append(accepted)
         self._watchdog.wait_for(())
         self._account.acknowledged(granted_ns)
         if self._clock.realtime:
@@ -353,31 +359,31 @@ class Session:
         self._clock.advance(count)
         self.state.spend(count)
 
-    def _schedule(self, grant: Permission) -> tuple[list[str], dict[str, int]]:
+    def _schedule(self, grant: Grant) -> tuple[list[str], dict[str, int]]:
         """Return who steps in a grant, in step order, and how often; grants come in few patterns, so each is
         worked out once.
         """
         begin, end = grant.step, grant.horizon_ns // self.plan.step_ns
         key = begin % self._common_period, end - begin
         if key not in self._schedules:
-            periods = {name: self.plan.members[name].period for name in self.plan.order}
+            periods = {name: self.plan.participants[name].period for name in self.plan.order}
             steps = {name: (end - 1) // period - (begin - 1) // period for name, period in periods.items()}
             self._schedules[key] = [name for name in self.plan.order if steps[name]], steps
         return self._schedules[key]
 
     def _settle(self) -> None:
         """Book the reports that have come in, and publish the energy books when they are due."""
-        for member, report, payload in self._reports:
-            self._take(member, report, payload)
-        self._reports.clear()
+        for planned, ack, payload in self._acks_to_book:
+            self._take(planned, ack, payload)
+        self._acks_to_book.clear()
         for message in self._observers.books(self._clock.time_ns):
             self._energy_publishers[message.bond].put(encode(message))
 
-    def _take(self, member: Member, report: Report, payload: bytes | None) -> None:
+    def _take(self, planned: PlannedParticipant, ack: Ack, payload: bytes | None) -> None:
         """Book what a participant reports: its hashes, its last step, the work of its bonds."""
-        self._observers.report(member, report, self._account.book(member, report), payload)
-        if self._on_report is not None:
-            self._on_report(member, report)
+        self._observers.ack(planned, ack, self._account.book(planned, ack), payload)
+        if self._on_ack is not None:
+            self._on_ack(planned, ack)
 
     def _close(self) -> None:
         """End processes and close everything; the hosts end when the hub's token is gone."""
@@ -400,7 +406,7 @@ class Session:
 
     def _fail(self, participant: str, cause: str) -> None:
         """End the run because of `participant`; may be called from any thread."""
-        here = self.plan.members[participant].host == "hub"  # of another host only the grant is known
+        here = self.plan.participants[participant].host == "hub"  # of another host only the grant is known
         self._failures.report(
             participant, max(self._clock.step, self._host.step) if here else self._clock.step, cause
         )
@@ -428,19 +434,19 @@ class Session:
         A lost engine ends the run; a lost device makes its arm hold.
         """
         name = str(sample.key_expr).rsplit("/", 1)[1]
-        member = self.plan.members.get(name)
-        if member is None or not member.host.startswith("remote/"):
+        planned = self.plan.participants.get(name)
+        if planned is None or not planned.host.startswith("remote/"):
             return
         if sample.kind != zenoh.SampleKind.DELETE:
-            if member.role == "device":
-                self._intake.relink.repeat(name)
+            if planned.role == "device":
+                self._intake.network_links.repeat(name)
             return
-        self._membership.lose(member.host)
-        if member.role == "device":
+        self._membership.lose(planned.host)
+        if planned.role == "device":
             self._intake.forget(name)
         if self._account.phase not in ("starting", "running", "paused"):
             return
-        if member.role == "device":
+        if planned.role == "device":
             log.warning(
                 "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the"
                 " network; a host that still runs joins again",

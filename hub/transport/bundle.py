@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import zenoh
 
-from hub.planning.plan import Outlet, Plan
-from hub.transport.publisher import Outgoing
+from hub.planning.plan import ConnectionToDevice, Plan
+from hub.transport.publisher import Publisher
 from schemas.errors import MessageError
 
 __all__ = ["Bundle", "bundled", "unpacked"]
@@ -21,13 +21,15 @@ _HEAD = struct.Struct("<II")
 """Which of the outlets, and how many bytes of CDR follow."""
 
 
-def bundled(plan: Plan, source: str, device: str) -> list[Outlet]:
+def bundled(plan: Plan, source: str, device: str) -> list[ConnectionToDevice]:
     """Return the connections whose values go together, in the order in which both ends count them: those of
     signals.
     """
-    between = (outlet for outlet in plan.outlets if (outlet.source, outlet.device) == (source, device))
+    between = (outlet for outlet in plan.to_devices if (outlet.source, outlet.target) == (source, device))
     return [
-        outlet for outlet in between if plan.members[source].port(outlet.source_port).variability == "signal"
+        outlet
+        for outlet in between
+        if plan.participants[source].port(outlet.source_port).variability == "signal"
     ]
 
 
@@ -37,7 +39,7 @@ class Bundle:
     def __init__(self, session: zenoh.Session, key: str) -> None:
         """Take the key on which the device listens."""
         self._parts: list[bytes] = []
-        self._way = Outgoing(session, key, zenoh.CongestionControl.DROP, lambda: None, always=False)
+        self._way = Publisher(session, key, zenoh.CongestionControl.DROP, lambda: None, always=False)
 
     @property
     def wanted(self) -> bool:

@@ -7,12 +7,12 @@ from typing import Any
 
 import zenoh
 
-from hub.planning.plan import Member
+from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
 from hub.transport.envelope import Tag
 from hub.transport.lane import LaneSender
 from hub.transport.port_codec import PortCodec
-from hub.transport.publisher import Outgoing
+from hub.transport.publisher import Publisher
 from schemas.codec import encode
 from schemas.keys import Keys
 from schemas.ports import Port
@@ -31,7 +31,7 @@ class PortPublisher:
         self,
         session: zenoh.Session,
         keys: Keys,
-        member: Member,
+        planned: PlannedParticipant,
         port: Port,
         run: int,
         *,
@@ -49,11 +49,11 @@ class PortPublisher:
         self._always = always
         self._bundles = bundles
         block = zenoh.CongestionControl.BLOCK
-        self._ways: list[Outgoing] = []
+        self._ways: list[Publisher] = []
         self._ways.append(
-            Outgoing(
+            Publisher(
                 session,
-                keys.output(member.key_role, member.name, port.name),
+                keys.output(planned.key_role, planned.name, port.name),
                 block,
                 self._look,
                 always=always,
@@ -61,7 +61,7 @@ class PortPublisher:
         )
         if feeds:
             self._ways.append(
-                Outgoing(session, keys.feed(member.name, port.name), block, self._look, always=False)
+                Publisher(session, keys.feed(planned.name, port.name), block, self._look, always=False)
             )
         self._look()
 

@@ -8,10 +8,10 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
-__all__ = ["Outgoing"]
+__all__ = ["Publisher"]
 
 
-class Outgoing:
+class Publisher:
     """Publishes under one key, at once and before all else; tells when the first listener comes and the last
     one goes.
     """

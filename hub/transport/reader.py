@@ -14,7 +14,7 @@ from hub.transport.port_codec import PortCodec
 from schemas.message import Message
 from schemas.ports import Port
 
-__all__ = ["Feed", "Reader", "as_messages"]
+__all__ = ["DeviceInputs", "Reader", "as_messages"]
 
 Messages = Callable[[Any, int], tuple[Message, ...]]
 """Takes a value and the time (ns) at which it is valid."""
@@ -48,7 +48,7 @@ class Reader:
         return arrived
 
 
-class Feed:
+class DeviceInputs:
     """What one device that follows the clock is written: at a communication point, what all participants had
     computed by then.
     """

@@ -7,7 +7,7 @@ from typing import Any
 
 import zenoh
 
-from hub.planning.plan import Member
+from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
 from hub.transport.cells import RemoteCell
 from hub.transport.lane import LaneReceiver, LaneSender, has_lane, lane_address
@@ -59,7 +59,7 @@ class Wire:
 
     def publisher(
         self,
-        member: Member,
+        planned: PlannedParticipant,
         port: Port,
         readers: Sequence[str],
         *,
@@ -72,12 +72,12 @@ class Wire:
         number that it has there.
         """
         fast = [host for host in readers if has_lane(port, self.host, host)]
-        lanes = [LaneSender(lane_address(self.run, member.name, port.name, host)) for host in fast]
-        always = len(fast) < len(readers) or (member.name, port.name) in self._watched
+        lanes = [LaneSender(lane_address(self.run, planned.name, port.name, host)) for host in fast]
+        always = len(fast) < len(readers) or (planned.name, port.name) in self._watched
         publisher = PortPublisher(
             self.session,
             self.keys,
-            member,
+            planned,
             port,
             self.run,
             always=always,
@@ -90,7 +90,7 @@ class Wire:
 
     def cell(
         self,
-        member: Member,
+        planned: PlannedParticipant,
         port: Port,
         stride: int,
         depth: int,
@@ -99,21 +99,21 @@ class Wire:
         """Return the cell of an output of a participant elsewhere; `heard` is shown each value that comes by
         a lane.
         """
-        if has_lane(port, member.host, self.host):
+        if has_lane(port, planned.host, self.host):
             receiver = LaneReceiver(
-                lane_address(self.run, member.name, port.name, self.host), port, spin=self._spin
+                lane_address(self.run, planned.name, port.name, self.host), port, spin=self._spin
             )
         else:
             receiver = PortReceiver(
                 self.session,
-                self.keys.output(member.key_role, member.name, port.name),
+                self.keys.output(planned.key_role, planned.name, port.name),
                 port,
                 self.run,
                 self.drops,
             )
             heard = None  # whoever watches it subscribes to it
         self._receivers.append(receiver)
-        cell = RemoteCell(member.period, stride, depth, receiver, heard)
+        cell = RemoteCell(planned.period, stride, depth, receiver, heard)
         self._cells.append(cell)
         return cell
 

@@ -13,7 +13,14 @@ from schemas.keys import Keys, topic
 from schemas.ports import BondSide, Port, bond_ports
 from schemas.ros import Header, Time
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import Ack, CouplingEnergy, Grant, InletSample, ParticipantStatus, SessionStatus
+from schemas.trocar_msgs import (
+    AckMessage,
+    CouplingEnergy,
+    GrantMessage,
+    InletSample,
+    ParticipantStatus,
+    SessionStatus,
+)
 from schemas.vectors import VectorCodec
 
 STEP_NS = 1_000_000
@@ -64,9 +71,9 @@ def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
                 topic(keys.output("engine", "tissue", "probe/wrench")), wrench.port.type
             ),
             "stylus": recorder.channel(topic(keys.output("device", "stylus", "pose")), stylus.port.type),
-            "grant": recorder.channel(topic(keys.grant), Grant.ros_type),
-            "robot": recorder.channel(topic(keys.ack("robot")), Ack.ros_type),
-            "tissue": recorder.channel(topic(keys.ack("tissue")), Ack.ros_type),
+            "grant": recorder.channel(topic(keys.grant), GrantMessage.ros_type),
+            "robot": recorder.channel(topic(keys.ack("robot")), AckMessage.ros_type),
+            "tissue": recorder.channel(topic(keys.ack("tissue")), AckMessage.ros_type),
             "energy": recorder.channel(topic(keys.energy(BOND)), CouplingEnergy.ros_type),
             "status": recorder.channel(topic(keys.status), SessionStatus.ros_type),
         }
@@ -82,7 +89,9 @@ def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
             recorder.write(
                 ports["grant"],
                 start,
-                encode(Grant(run=7, epoch=0, step=step, start_ns=start, horizon_ns=end, inlets=inlets)),
+                encode(
+                    GrantMessage(run=7, epoch=0, step=step, start_ns=start, horizon_ns=end, inlets=inlets)
+                ),
             )
             recorder.write(ports["pose"], end, pose.encode(np.append(tip[step], [0, 0, 0, 1]), end))
             recorder.write(ports["twist"], end, twist.encode(np.zeros(6), end))
@@ -92,7 +101,7 @@ def write_session(directory: Path, seconds: float = 0.5) -> RecorderSummary:
                     [noise.lognormal(np.log(typical), 0.15 + 0.6 * (noise.random() < 0.01))], np.uint64
                 )
                 work = powers[name][step : step + 1]
-                ack = Ack(
+                ack = AckMessage(
                     run=7,
                     epoch=0,
                     step=step,

@@ -20,7 +20,7 @@ from schemas.codec import (
 from schemas.errors import MessageError
 from schemas.message import Message, msg_text
 from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage
-from schemas.trocar_msgs import Grant
+from schemas.trocar_msgs import GrantMessage
 from tests.strategies import any_message
 
 # parts of services are not recorded
@@ -90,10 +90,10 @@ def test_a_payload_over_the_limit_is_refused_unread() -> None:
 
 
 def test_a_sequence_that_claims_more_than_there_is() -> None:
-    grant = bytearray(encode(Grant(run=1, epoch=0, step=0, start_ns=0, horizon_ns=1)))
+    grant = bytearray(encode(GrantMessage(run=1, epoch=0, step=0, start_ns=0, horizon_ns=1)))
     grant[-4:] = b"\xff\xff\xff\xff"
     with pytest.raises(MessageError):
-        decode(Grant, bytes(grant))
+        decode(GrantMessage, bytes(grant))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from schemas.scenario import Bond, Connection, Endpoint, ParticipantSpec, Scenario
+from schemas.scenario import Bond, Connection, ParticipantSpec, PortReference, Scenario
 from tests.strategies import names
 
 FULL: dict[str, Any] = {
@@ -81,8 +81,8 @@ def test_a_full_scenario() -> None:
     )
     assert scenario.participants["robot"].params == {"arms": {"PSM1": {"instrument": "probe"}}}
     assert scenario.connections[0] == Connection(
-        source=Endpoint(participant="robot", port="PSM1/pose"),
-        target=Endpoint(participant="tissue", port="target"),
+        source=PortReference(participant="robot", port="PSM1/pose"),
+        target=PortReference(participant="tissue", port="target"),
     )
     assert scenario.bonds[0].name == "robot/PSM1/probe"
     assert str(scenario.measure["peak_n"].of) == "tissue.probe/wrench.force"

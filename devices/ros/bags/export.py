@@ -79,7 +79,9 @@ def export(recording: Recording, directory: Path, gateway: str | None = None) ->
 def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
     """Return the gateway that is meant, as the scenario declares it."""
     kinds = {
-        member.name: registry.load(member.kind) for member in plan.members.values() if member.role == "device"
+        planned.name: registry.load(planned.kind)
+        for planned in plan.participants.values()
+        if planned.role == "device"
     }
     there = [device for device, kind in kinds.items() if issubclass(kind, Gateway)]
     if name is None and len(there) != 1:
@@ -98,7 +100,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
         )
     meant = there[0] if name is None else name
     made = registry.make(
-        plan.members[meant].kind,
+        plan.participants[meant].kind,
         meant,
         recording.scenario().participants[meant].params,
         recording.directory(),
@@ -111,11 +113,11 @@ def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
 def _routes(plan: Plan, gateway: Gateway) -> _Routes:
     rows = {row.port.name: row for row in gateway.rows if row.port is not None}
     routes: defaultdict[str, list[tuple[Row, Port]]] = defaultdict(list)
-    for link in plan.outlets:
-        if link.device == gateway.name:
-            source = plan.members[link.source].port(link.source_port)
-            routes[topic(_KEYS.output("engine", link.source, source.name))].append(
-                (rows[link.device_port], source)
+    for connection in plan.to_devices:
+        if connection.target == gateway.name:
+            source = plan.participants[connection.source].port(connection.source_port)
+            routes[topic(_KEYS.output("engine", connection.source, source.name))].append(
+                (rows[connection.target_port], source)
             )
     for row in rows.values():
         if row.way == "subscribe" and row.port is not None:

@@ -54,7 +54,7 @@ def test_a_rigid_table_is_felt_through_a_link_and_the_hand_rests_on_it(tmp_path)
                 "kind": "simulated-touch",
                 "period": "4 ms",
                 "styluses": {"right": {"path": path}},
-                "link": {"preset": "100 ms"},
+                "network_link": {"preset": "100 ms"},
             },
             "teleop": {"kind": "teleoperation", "period": "4 ms", "engage": "held", "scale": 0.5},
             "robot": {

@@ -112,7 +112,7 @@ def test_its_scenario_is_driven_by_the_bag_of_a_real_arm(tmp_path):
     (tmp_path / "suturing.yaml").write_text(whole)
     loaded = load(str(tmp_path / "suturing.yaml"))
     plan, _ = plan_of(loaded.scenario, loaded.params)
-    assert {inlet.target_port for inlet in plan.inlets} == {"PSM1/servo_jp", "PSM1/jaw/servo_jp"}
+    assert {inlet.target_port for inlet in plan.from_devices} == {"PSM1/servo_jp", "PSM1/jaw/servo_jp"}
 
 
 def test_its_settings_of_zenoh_let_a_program_in(gated):

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from hub.devices.network_link import Link, LinkOrder, in_words
-from schemas.network_link import PRESETS, LinkSpec
+from hub.devices.network_link import NetworkLink, NetworkLinkOrder, in_words
+from schemas.network_link import PRESETS, NetworkLinkSpec
 from tests.hub.parts import into, out
 
 MS = 1_000_000
 SIGNAL, EVENTS, BACK = out("pose"), out("buttons", variability="event"), into("contact")
 MILLISECONDS = st.integers(0, 50).map(lambda ms: ms / 1000)
 SPECS = st.builds(
-    LinkSpec,
+    NetworkLinkSpec,
     delay=MILLISECONDS,
     jitter=MILLISECONDS,
     loss=st.floats(0.0, 0.9),
@@ -34,7 +34,7 @@ def travel(line, count=200, period=MS):
 
 @given(SPECS)
 def test_signals_may_be_lost_or_overtaken_but_take_no_longer_than_they_may(spec):
-    arrived = travel(Link(spec).line(SIGNAL))
+    arrived = travel(NetworkLink(spec).line(SIGNAL))
     assert len({message for message, _ in arrived}) == len(arrived) <= 200
     assert [time for _, time in arrived] == sorted(time for _, time in arrived)
     for message, arrival in arrived:
@@ -44,7 +44,7 @@ def test_signals_may_be_lost_or_overtaken_but_take_no_longer_than_they_may(spec)
 
 @given(SPECS)
 def test_events_all_arrive_in_order(spec):
-    arrived = travel(Link(spec).line(EVENTS))
+    arrived = travel(NetworkLink(spec).line(EVENTS))
     assert [message for message, _ in arrived] == list(range(200))
     assert all(arrival - message * MS >= spec.delay for message, arrival in arrived)
     for outage in spec.outages:
@@ -57,35 +57,35 @@ def test_events_all_arrive_in_order(spec):
 
 @given(SPECS)
 def test_chance_is_that_of_the_seed_the_port_and_the_direction_alone(spec):
-    alone, busy = Link(spec), Link(spec)
+    alone, busy = NetworkLink(spec), NetworkLink(spec)
     busy.line(EVENTS).send(0, "another port's message")
     travel(busy.line(BACK), 17)
     assert travel(alone.line(SIGNAL)) == travel(busy.line(SIGNAL))
 
 
 def test_loss_is_as_frequent_as_it_is_said_to_be():
-    spec, n = LinkSpec(loss=0.1, delay="10 ms", jitter="4 ms"), 20_000
-    arrived = travel(Link(spec).line(SIGNAL), n)
+    spec, n = NetworkLinkSpec(loss=0.1, delay="10 ms", jitter="4 ms"), 20_000
+    arrived = travel(NetworkLink(spec).line(SIGNAL), n)
     assert len(arrived) / n == pytest.approx(0.9, abs=4 * math.sqrt(0.09 / n))
     extra = [(arrival - m * MS - 10 * MS) / (4 * MS) for m, arrival in arrived]
     assert sum(extra) / len(extra) == pytest.approx(0.5, abs=4 * math.sqrt(1 / 12 / n))
     # sent again
-    late = [a - m * 10**9 > 20 * MS for m, a in travel(Link(spec).line(EVENTS), n, period=10**9)]
+    late = [a - m * 10**9 > 20 * MS for m, a in travel(NetworkLink(spec).line(EVENTS), n, period=10**9)]
     assert sum(late) / n == pytest.approx(0.1, abs=4 * math.sqrt(0.09 / n))
 
 
 def test_a_link_can_be_changed_while_messages_are_on_their_way():
-    link = Link(None)
+    link = NetworkLink(None)
     line = link.line(SIGNAL)
     assert link.clear
     assert link.idle
     line.send(0, "at once")
     assert list(line.arrived(0)) == [(0, "at once")]
-    link.order(LinkOrder(spec=LinkSpec(delay="100 ms")))
+    link.order(NetworkLinkOrder(spec=NetworkLinkSpec(delay="100 ms")))
     assert link.clear
     link.settle(MS)
     line.send(MS, "slow")
-    link.order(LinkOrder(spec=LinkSpec(), outage_ns=10 * MS))
+    link.order(NetworkLinkOrder(spec=NetworkLinkSpec(), outage_ns=10 * MS))
     link.settle(2 * MS)
     line.send(11 * MS, "lost")
     line.send(12 * MS, "after the outage")
@@ -95,22 +95,24 @@ def test_a_link_can_be_changed_while_messages_are_on_their_way():
 
 
 def test_a_link_in_words():
-    assert in_words(LinkSpec()) == ""
+    assert in_words(NetworkLinkSpec()) == ""
     assert (
-        in_words(LinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9)
+        in_words(NetworkLinkSpec(preset="70 ms", jitter="2 ms", loss=0.01), 3 * 10**9)
         == "70 ms each way, up to 2 ms more, 1 % lost, nothing at all for 3 s"
     )
 
 
 def test_overlapping_outages_are_one():
-    link = Link(LinkSpec(outages=({"at": 0.005, "duration": 0.01}, {"at": 0.0, "duration": 0.01})))
+    link = NetworkLink(
+        NetworkLinkSpec(outages=({"at": 0.005, "duration": 0.01}, {"at": 0.0, "duration": 0.01}))
+    )
     assert [link.cut_until(ms * MS) // MS for ms in (0, 9, 10, 14, 15)] == [15, 15, 15, 15, 15]
     assert link.cut_until(16 * MS) == 16 * MS
 
 
 def test_what_a_scenario_may_say():
-    assert [LinkSpec(preset=f"{ns // MS} ms").delay_ns for ns in PRESETS] == list(PRESETS)
-    assert LinkSpec.model_validate({"delay": "7 ms", "jitter": "1 ms"}).delay_ns == 7 * MS
+    assert [NetworkLinkSpec(preset=f"{ns // MS} ms").delay_ns for ns in PRESETS] == list(PRESETS)
+    assert NetworkLinkSpec.model_validate({"delay": "7 ms", "jitter": "1 ms"}).delay_ns == 7 * MS
     with pytest.raises(
         ValidationError,
         match=(
@@ -118,9 +120,9 @@ def test_what_a_scenario_may_say():
             " 'delay'"
         ),
     ):
-        LinkSpec(preset="150 ms")
+        NetworkLinkSpec(preset="150 ms")
     with pytest.raises(ValidationError, match="a preset or a delay, not both"):
-        LinkSpec(preset="100 ms", delay="100 ms")
+        NetworkLinkSpec(preset="100 ms", delay="100 ms")
     for wrong in (
         {"loss": 1.0},
         {"delay": -1},
@@ -129,4 +131,4 @@ def test_what_a_scenario_may_say():
         {"colour": "red"},
     ):
         with pytest.raises(ValidationError):
-            LinkSpec.model_validate(wrong)
+            NetworkLinkSpec.model_validate(wrong)

@@ -10,17 +10,17 @@ from time import monotonic, sleep
 import pytest
 
 from hub.command_line import main
-from hub.devices.network_link_control import LinkReply, LinkRequest
+from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
 from hub.remote.live_sessions import ask_about, live_sessions
 from schemas.errors import ConnectError, MessageError
-from schemas.network_link import LinkSpec
+from schemas.network_link import NetworkLinkSpec
 
 SCENARIO = """\
 name: hand
 step: 1 ms
 pace: realtime
 participants:
-  player: {kind: "toys:Player", clock: wall, max_age_ms: 60, link: {jitter: 1 ms}}
+  player: {kind: "toys:Player", clock: wall, max_age_ms: 60, network_link: {jitter: 1 ms}}
   hand: {kind: "toys:Hand"}
   deaf: {kind: "toys:Deaf"}
   mixer: {kind: "toys:Mixer"}
@@ -64,8 +64,8 @@ def relink(session, device="player", **change):
         device,
         [session.endpoint],
         "link",
-        LinkRequest.model_validate({"device": device, **change}),
-        LinkReply,
+        NetworkLinkRequest.model_validate({"device": device, **change}),
+        NetworkLinkReply,
     ).link
 
 
@@ -85,11 +85,11 @@ def test_a_link_is_changed_while_the_session_runs(prepare, host):
         return live_sessions([session.endpoint])[0]
 
     def act():
-        assert relink(session, preset="70 ms") == LinkSpec(preset="70 ms", jitter="1 ms")
+        assert relink(session, preset="70 ms") == NetworkLinkSpec(preset="70 ms", jitter="1 ms")
         until(lambda: any(device.link == "70 ms each way, up to 1 ms more" for device in status().devices))
         until(lambda: any(one.stream == "player.hand" and one.largest_s > 0.07 for one in status().latencies))
-        assert relink(session, "hand", delay="5 ms", loss=0.5) == LinkSpec(delay="5 ms", loss=0.5)
-        assert relink(session, delay="1 ms", jitter="0 ms") == LinkSpec(delay="1 ms")
+        assert relink(session, "hand", delay="5 ms", loss=0.5) == NetworkLinkSpec(delay="5 ms", loss=0.5)
+        assert relink(session, delay="1 ms", jitter="0 ms") == NetworkLinkSpec(delay="1 ms")
         with pytest.raises(MessageError, match=r"Input should be less than 1"):
             relink(session, loss=1.5)
         with pytest.raises(

@@ -44,7 +44,7 @@ def test_the_same_bits_wherever_its_sources_run(prepare):
 
 
 LINK = (
-    "participants.hand.link={delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}],"
+    "participants.hand.network_link={delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}],"
     " seed: 3}"
 )
 
@@ -69,7 +69,7 @@ def test_what_came_over_a_link_simulates_again(prepare, tmp_path):
 @pytest.mark.parametrize("delay", [0, 10])
 def test_how_long_things_take_is_told_in_simulated_time(prepare, delay):
     overrides = ["participants.hand.period=2 ms"] + (
-        [f"participants.hand.link.delay={delay} ms"] if delay else []
+        [f"participants.hand.network_link.delay={delay} ms"] if delay else []
     )
     latency = prepare(SCENARIO, *overrides).run().latency
     assert latency["device to grant"]["hand.out"]["p50_s"] == pytest.approx(delay * 1e-3, rel=0.02)

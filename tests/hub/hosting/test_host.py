@@ -9,7 +9,7 @@ from hub.hosting.host import Host
 from hub.participant import Params
 from hub.testing import run_in_process
 from schemas.errors import ParticipantError, StateError
-from schemas.lockstep import Permission
+from schemas.lockstep import Grant
 from tests.hub.parts import Part, into, out, plan_of
 
 MS = 1_000_000
@@ -45,8 +45,8 @@ def host_of(*parts, **scenario):
 def run(host, steps, start=0):
     reports = []
     host.run(
-        Permission(1, 0, start, start * MS, (start + steps) * MS),
-        lambda member, report: reports.append((member.name, report)),
+        Grant(1, 0, start, start * MS, (start + steps) * MS),
+        lambda planned, ack: reports.append((planned.name, ack)),
     )
     return reports
 
@@ -99,9 +99,9 @@ def test_reports_hold_the_steps_that_each_took():
     parts = [Part("one"), Part("three")]
     host = host_of(*parts, specs={"three": {"period": "3 ms"}})
     host.configure(Path())
-    assert [(name, len(report.state_hash)) for name, report in run(host, 4)] == [("one", 4), ("three", 2)]
-    assert [(name, len(report.state_hash)) for name, report in run(host, 2, start=4)] == [("one", 2)]
-    assert [(name, len(report.compute_ns)) for name, report in run(host, 1, start=6)] == [
+    assert [(name, len(ack.state_hash)) for name, ack in run(host, 4)] == [("one", 4), ("three", 2)]
+    assert [(name, len(ack.state_hash)) for name, ack in run(host, 2, start=4)] == [("one", 2)]
+    assert [(name, len(ack.compute_ns)) for name, ack in run(host, 1, start=6)] == [
         ("one", 1),
         ("three", 1),
     ]

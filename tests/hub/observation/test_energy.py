@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hub.observation.energy import EnergyBooks
 from hub.participant import BondPlan, ForceSide, Inputs, MotionSide
 from hub.planning.plan import Plan, PlannedBond
-from schemas.lockstep import Report
+from schemas.lockstep import Ack
 from schemas.ports import BondSide
 from schemas.scenario import Bond
 from tests.strategies import vectors
@@ -128,10 +128,10 @@ def test_the_books_take_the_columns_of_each_participant_in_declared_order():
     )
     books = EnergyBooks(plan)
     # two steps, two bonds: the last step counts
-    books.take("robot", Report(0, 0, 0, [1, 2], [1, 2], [9.0, 9.0, 1.0, 2.0]))
-    books.take("tissue", Report(0, 0, 0, [1], [1], [1.5]))
-    books.take("other", Report(0, 0, 0, [1], [1], [1.75]))
-    books.take("camera", Report(0, 0, 0, [1], [1], []))
+    books.take("robot", Ack(0, 0, 0, [1, 2], [1, 2], [9.0, 9.0, 1.0, 2.0]))
+    books.take("tissue", Ack(0, 0, 0, [1], [1], [1.5]))
+    books.take("other", Ack(0, 0, 0, [1], [1], [1.75]))
+    books.take("camera", Ack(0, 0, 0, [1], [1], []))
     assert books.residual_j == pytest.approx(0.5 - 0.25)
     left, right = books.messages(7)
     assert (left.bond, left.motion_work_j, left.force_work_j, left.residual_j, left.header.stamp.ns) == (

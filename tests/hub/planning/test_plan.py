@@ -75,7 +75,7 @@ def test_an_input_is_fed_once():
 def test_a_queue_of_events_may_have_several_sources():
     parts = Part("a", out(), out("other")), Part("b", into(variability="event"))
     plan = plan_of(*parts, connections=[*FROM_A_TO_B, "a.other -> b.in"])
-    assert [link.source_port for link in plan.links] == ["out", "other"]
+    assert [link.source_port for link in plan.connections] == ["out", "other"]
     with pytest.raises(ScenarioError, match=r"input 'b.in' is fed twice, by 'a.out' and by 'a.out'"):
         plan_of(*parts, connections=FROM_A_TO_B * 2)
 
@@ -99,12 +99,12 @@ def drives(*inputs):
 def test_a_wildcard_joins_what_has_the_same_rest_of_the_name():
     parts = drives("PSM1/servo_jp", "PSM1/other", "PSM2/servo_jp", "state")
     plan = plan_of(*parts, connections=["motion.drive/* -> robot.*"])
-    assert [(link.source_port, link.target_port) for link in plan.links] == [
+    assert [(link.source_port, link.target_port) for link in plan.connections] == [
         ("drive/PSM1/servo_jp", "PSM1/servo_jp"),
         ("drive/PSM2/servo_jp", "PSM2/servo_jp"),
     ]
     plan = plan_of(*parts, connections=["motion.drive/PSM1/* -> robot.PSM2/*", "motion.* -> robot.*"])
-    assert [(link.source_port, link.target_port) for link in plan.links] == [
+    assert [(link.source_port, link.target_port) for link in plan.connections] == [
         ("drive/PSM1/servo_jp", "PSM2/servo_jp"),
         ("state", "state"),
     ]
@@ -144,7 +144,7 @@ def test_what_a_wildcard_joins_is_checked_like_any_connection():
 def test_a_signal_may_feed_an_event_port_whatever_its_size():
     target = into(type=JOINTS, variability="event")
     plan = plan_of(Part("a", out(type=JOINTS, names=("x", "y"))), Part("b", target), connections=FROM_A_TO_B)
-    assert [link.target_port for link in plan.links] == ["in"]
+    assert [link.target_port for link in plan.connections] == ["in"]
     with pytest.raises(ScenarioError, match=r"events cannot be extrapolated, as 'a.out -> b.in' would"):
         plan_of(
             Part("a", out(type=JOINTS)),
@@ -187,8 +187,8 @@ def test_an_order_says_who_sees_whom_within_the_step(order):
     parts, connections = ring("a", "b", "c")
     plan = plan_of(*parts, connections=connections, order=order)
     assert plan.order == tuple(order)
-    assert [link.fresh for link in plan.links] == [
-        order.index(link.source) < order.index(link.target) for link in plan.links
+    assert [link.fresh for link in plan.connections] == [
+        order.index(link.source) < order.index(link.target) for link in plan.connections
     ]
 
 
@@ -196,7 +196,7 @@ def test_jacobi_makes_everything_late():
     parts, connections = ring("a", "b", "c")
     plan = plan_of(*parts, connections=connections, algorithm="jacobi")
     assert plan.order == ("a", "b", "c")
-    assert not any(link.fresh for link in plan.links)
+    assert not any(link.fresh for link in plan.connections)
 
 
 def test_without_a_cycle_the_order_follows_the_connections_and_oneself_is_never_fresh():
@@ -206,7 +206,7 @@ def test_without_a_cycle_the_order_follows_the_connections_and_oneself_is_never_
         connections=["first.out -> last.in", "first.out -> first.own"],
     )
     assert plan.order == ("first", "last")
-    assert [link.fresh for link in plan.links] == [True, False]
+    assert [link.fresh for link in plan.connections] == [True, False]
 
 
 def test_an_order_names_stepped_participants():
@@ -222,12 +222,12 @@ def test_devices():
     plan = plan_of(
         stylus, engine, connections=["stylus.pose -> a.in", "stylus.pose -> a.other", "a.out -> stylus.force"]
     )
-    assert [(inlet.target_port, inlet.max_age_ns) for inlet in plan.inlets] == [
+    assert [(inlet.target_port, inlet.max_age_ns) for inlet in plan.from_devices] == [
         ("in", tighter),
         ("other", age),
     ]
-    assert [(outlet.source, outlet.device_port) for outlet in plan.outlets] == [("a", "force")]
-    assert plan.links == plan.meetings() == ()
+    assert [(outlet.source, outlet.target_port) for outlet in plan.to_devices] == [("a", "force")]
+    assert plan.connections == plan.meetings() == ()
     assert plan.order == ("a",)
     with pytest.raises(ScenarioError, match="a device cannot feed a device"):
         plan_of(stylus, connections=["stylus.pose -> stylus.force"])
@@ -243,7 +243,7 @@ def test_simulated_time_is_the_hubs():
         Stylus("u", into()),
         specs={"s": {"host": "remote"}},
     )
-    assert [plan.members[name].follows_clock for name in "stu"] == [False, True, False]
+    assert [plan.participants[name].simulated_time for name in "stu"] == [False, True, False]
 
 
 def test_only_vectors_are_extrapolated():
@@ -309,12 +309,12 @@ def test_the_force_side_takes_whole_steps_of_the_motion_side():
         plan_of(motion(), force(), specs={"a": {"period": "2 ms"}, "b": {"period": "3 ms"}}, bonds=bonds)
     plan = plan_of(motion(), force(), specs={"b": {"period": "3 ms"}}, bonds=bonds)
     assert plan.order == ("b", "a")
-    assert [(link.source_port, link.fresh) for link in plan.links] == [
+    assert [(link.source_port, link.fresh) for link in plan.connections] == [
         ("tip/pose", False),
         ("tip/twist", False),
         ("tip/wrench", True),
     ]
-    assert {port.name for port in plan.members["a"].ports} == {"tip/pose", "tip/twist", "tip/wrench"}
+    assert {port.name for port in plan.participants["a"].ports} == {"tip/pose", "tip/twist", "tip/wrench"}
 
 
 @pytest.mark.parametrize(
@@ -355,9 +355,9 @@ def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
         Part("a", into(type=POSE), out(type=POSE)),
         connections=["stylus.pose -> a.in", "a.out -> stylus.force"],
     )
-    assert plan.outlets == ()
-    assert [(link.source, link.target, link.fresh) for link in plan.links] == [("a", "stylus", False)]
-    assert [member.name for member in plan.meetings()] == ["stylus"]
+    assert plan.to_devices == ()
+    assert [(link.source, link.target, link.fresh) for link in plan.connections] == [("a", "stylus", False)]
+    assert [planned.name for planned in plan.meetings()] == ["stylus"]
     assert plan.order == ("a",)
 
 
@@ -373,9 +373,9 @@ def test_nothing_is_extrapolated_for_a_device():
 
 def test_a_device_in_wall_time_is_read_at_a_rate_of_its_own():
     stylus = Stylus("stylus", out("pose", type=POSE, clock="wall"))
-    assert plan_of(stylus).members["stylus"].read_ns == 1_000_000
-    member = plan_of(stylus, specs={"stylus": {"period": "1.5 ms"}}).members["stylus"]
-    assert (member.period, member.read_ns) == (1, 1_500_000)
+    assert plan_of(stylus).participants["stylus"].read_ns == 1_000_000
+    planned = plan_of(stylus, specs={"stylus": {"period": "1.5 ms"}}).participants["stylus"]
+    assert (planned.period, planned.read_ns) == (1, 1_500_000)
     with pytest.raises(ScenarioError, match=r"period 0.01 ms: a device is read every 0.1 ms at most"):
         plan_of(stylus, specs={"stylus": {"period": "0.01 ms"}})
     with pytest.raises(ScenarioError, match=r"period 1.5 ms is no multiple of the step 1 ms"):
@@ -384,8 +384,8 @@ def test_a_device_in_wall_time_is_read_at_a_rate_of_its_own():
 
 def test_a_link_is_for_devices():
     link = {"preset": "100 ms", "loss": 0.01}
-    device = plan_of(Stylus("s", out("pose", type=POSE)), specs={"s": {"link": link}})
-    assert device.members["s"].link.delay_ns == 100_000_000
-    assert [member.name for member in device.meetings()] == ["s"]
+    device = plan_of(Stylus("s", out("pose", type=POSE)), specs={"s": {"network_link": link}})
+    assert device.participants["s"].network_link.delay_ns == 100_000_000
+    assert [planned.name for planned in device.meetings()] == ["s"]
     with pytest.raises(ScenarioError, match=r"a link lies between a device and the hub, but 'a' is a engine"):
-        plan_of(Part("a", out()), specs={"a": {"link": link}})
+        plan_of(Part("a", out()), specs={"a": {"network_link": link}})

@@ -25,7 +25,7 @@ from hub.recording.recover import recover
 from schemas.codec import decode, encode
 from schemas.errors import RecordingError
 from schemas.ros import Float64Message, Header, PoseStamped, Time
-from schemas.trocar_msgs import Ack
+from schemas.trocar_msgs import AckMessage
 
 POSE = "geometry_msgs/msg/PoseStamped"
 
@@ -45,7 +45,7 @@ def test_a_recording_reads_back_in_order(tmp_path: Path) -> None:
         ack = recorder.channel("/engine/robot/ack", "trocar_msgs/msg/Ack")
         for message in given[1500:]:
             recorder.write(*message)
-        recorder.write(ack, 5, encode(Ack(run=1, epoch=0, step=4)))
+        recorder.write(ack, 5, encode(AckMessage(run=1, epoch=0, step=4)))
         summary = recorder.close()
     assert (summary.complete, summary.messages, summary.dropped, summary.error) == (True, 3001, 0, None)
     assert summary.bytes == (tmp_path / "run" / "run_0.mcap").stat().st_size
@@ -53,7 +53,7 @@ def test_a_recording_reads_back_in_order(tmp_path: Path) -> None:
     assert bag.topics == {"/engine/robot/out/tip": POSE, "/engine/robot/ack": "trocar_msgs/msg/Ack"}
     assert bag.counts == {"/engine/robot/out/tip": 3000, "/engine/robot/ack": 1}
     assert [(m.time_ns, m.payload) for m in bag.messages("/engine/robot/out/tip")] == [m[1:] for m in given]
-    assert [decode(Ack, m.payload).step for m in bag.messages("/engine/robot/ack")] == [4]
+    assert [decode(AckMessage, m.payload).step for m in bag.messages("/engine/robot/ack")] == [4]
     assert bag.attachments == {"scenario.yaml": b"name: x\n", "versions.json": b"{}"}
 
 

@@ -17,7 +17,7 @@ from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
 from tests.hub.authorities import Authority, free_port
 
-PLAN = Plan(step_ns=1, order=(), members={}, links=(), inlets=(), outlets=(), bonds=())
+PLAN = Plan(step_ns=1, order=(), participants={}, connections=(), from_devices=(), to_devices=(), bonds=())
 
 
 @pytest.fixture(scope="module")

@@ -94,8 +94,8 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     file = loaded()
     plan, _ = plan_of(file.scenario, file.params)
     seen = plan.seen_from("remote/hand")
-    assert set(seen.members) == {"hand", "deaf"}
-    assert [port.name for port in seen.members["deaf"].ports] == ["hand"]
+    assert set(seen.participants) == {"hand", "deaf"}
+    assert [port.name for port in seen.participants["deaf"].ports] == ["hand"]
     assert (seen.links, len(seen.inlets)) == ((), 1)
     membership = Membership(
         file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None
@@ -112,7 +112,7 @@ def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded)
     seen = plan.seen_from("remote/far")
     assert seen.order == ("near", "far")
     assert {(k.source, k.target) for k in seen.links} == {("near", "far"), ("far", "near")}
-    assert seen.members["far"] == plan.members["far"]
+    assert seen.participants["far"] == plan.participants["far"]
     assert seen.stride("far", "out") == plan.stride("far", "out")
 
 

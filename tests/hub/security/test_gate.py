@@ -13,7 +13,13 @@ import pytest
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.planning.plan import Inlet, Link, Member, Outlet, Plan
+from hub.planning.plan import (
+    ConnectionFromDevice,
+    ConnectionToDevice,
+    Plan,
+    PlannedConnection,
+    PlannedParticipant,
+)
 from hub.security.access import access_settings
 from hub.security.credentials import Credentials
 from hub.security.gate import Gate
@@ -28,8 +34,8 @@ KEYS = Keys("s")
 PLAN = Plan(
     step_ns=1_000_000,
     order=("robot", "far"),
-    members={
-        "touch": Member(
+    participants={
+        "touch": PlannedParticipant(
             name="touch",
             kind="touch",
             role="device",
@@ -37,7 +43,7 @@ PLAN = Plan(
             period=1,
             ports=(Port(name="pose", causality="output"), Port(name="contact", causality="input")),
         ),
-        "head": Member(
+        "head": PlannedParticipant(
             name="head",
             kind="openxr",
             role="device",
@@ -45,7 +51,7 @@ PLAN = Plan(
             period=1,
             ports=(Port(name="pose", causality="output"),),
         ),
-        "robot": Member(
+        "robot": PlannedParticipant(
             name="robot",
             kind="mujoco",
             role="engine",
@@ -57,7 +63,7 @@ PLAN = Plan(
                 Port(name="secret", causality="output"),
             ),
         ),
-        "far": Member(
+        "far": PlannedParticipant(
             name="far",
             kind="fmu",
             role="engine",
@@ -66,11 +72,19 @@ PLAN = Plan(
             ports=(Port(name="in", causality="input"),),
         ),
     },
-    links=(
-        Link(source="robot", source_port="contact", target="far", target_port="in", fresh=True, linear=False),
+    connections=(
+        PlannedConnection(
+            source="robot", source_port="contact", target="far", target_port="in", fresh=True, linear=False
+        ),
     ),
-    inlets=(Inlet(device="touch", device_port="pose", target="robot", target_port="goal", max_age_ns=0),),
-    outlets=(Outlet(source="robot", source_port="contact", device="touch", device_port="contact"),),
+    inlets=(
+        ConnectionFromDevice(
+            device="touch", device_port="pose", target="robot", target_port="goal", max_age_ns=0
+        ),
+    ),
+    to_devices=(
+        ConnectionToDevice(source="robot", source_port="contact", device="touch", device_port="contact"),
+    ),
     bonds=(),
 )
 CONTACT, SECRET = (KEYS.output("engine", "robot", port) for port in ("contact", "secret"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from devices.ros.zenoh.gateway import ZenohGateway
-from hub.planning.plan import Member, Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.security.access import access_settings
 from hub.security.gate import Gate
 from hub.transport.zenoh_session import open_session
@@ -32,10 +32,14 @@ KEYS = Keys("s")
 PLAN = Plan(
     step_ns=1_000_000,
     order=(),
-    members={"ros": Member(name="ros", kind="ros2-zenoh", role="device", host="hub", period=1, ports=())},
-    links=(),
-    inlets=(),
-    outlets=(),
+    participants={
+        "ros": PlannedParticipant(
+            name="ros", kind="ros2-zenoh", role="device", host="hub", period=1, ports=()
+        )
+    },
+    connections=(),
+    from_devices=(),
+    to_devices=(),
     bonds=(),
 )
 
@@ -107,7 +111,9 @@ def test_a_gateway_on_another_machine_is_seen_at_the_hub(tmp_path):
     with router() as inside:
         gateway = ZenohGateway("ros", ZenohGateway.params_model.model_validate(ARM))
         far = PLAN.model_copy(
-            update={"members": {"ros": PLAN.members["ros"].model_copy(update={"host": "remote/ros"})}}
+            update={
+                "participants": {"ros": PLAN.participants["ros"].model_copy(update={"host": "remote/ros"})}
+            }
         )
         gate = Gate(
             [outside], authority.hub.listening() | access_settings(far, "s", {"ros": gateway.foreign_keys})
