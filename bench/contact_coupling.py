@@ -22,7 +22,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from engines.bullet.engine import BulletEngine, BulletParams
+from engines.bullet.engine import BulletEngine
+from engines.bullet.params import BulletParams
 from hub.participant import Inputs, MotionSide, Outputs, Params, Setup, Stepped, state_hash
 from hub.testing import run_in_process
 from schemas.errors import TrocarError

@@ -22,9 +22,9 @@ from typing import Any
 
 import mujoco
 
-from engines.mujoco import opengl
-from engines.mujoco.endoscope_params import EndoscopeParams
-from engines.mujoco.endoscope_scene import EndoscopeScene
+from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 
 ROUNDS, PAIRS_A_ROUND = 15, 20
 ARMS: dict[str, Any] = {

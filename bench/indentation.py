@@ -23,7 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for the tests' truth
 
-from engines.bullet.engine import BulletParams
+from engines.bullet.params import BulletParams
 from schemas.vectors import Vector
 from tests.engines.bullet.finite_elements import Body
 from tests.engines.bullet.rig import Rig

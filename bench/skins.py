@@ -25,13 +25,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from engines.bullet.mesh import TetMesh
-from engines.bullet.organs.grid import block
-from engines.mujoco import opengl
-from engines.mujoco.endoscope_params import EndoscopeParams
-from engines.mujoco.endoscope_scene import EndoscopeScene
-from engines.mujoco.skin_mesh import SkinMesh
-from engines.mujoco.skins import SoftBody
+from engines.bullet.meshing.grid import block
+from engines.bullet.meshing.tet_mesh import TetMesh
+from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+from engines.mujoco.pictures.skin_mesh import SkinMesh
+from engines.mujoco.pictures.skins import SoftBody
 from schemas.ros import Header
 from schemas.trocar_msgs import SoftBodyState
 from schemas.vectors import Vector

@@ -35,7 +35,7 @@ def organs(
 def _shapes(nodes: int) -> dict[str, Any]:
     import numpy as np
 
-    from engines.bullet.mesh import dihedral_angles, shape_quality
+    from engines.bullet.meshing.tet_mesh import dihedral_angles, shape_quality
     from engines.bullet.organs.catalogue import SHAPES
 
     shapes: dict[str, Any] = {}

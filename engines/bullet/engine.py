@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from math import ceil, pi, sin
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from engines.bullet.anchor import WORLD, RigidParams, add_rigid
-from engines.bullet.client import connect, disconnect
-from engines.bullet.contact import CONTACT_PERIOD_NS, Contacts, Tissue
-from engines.bullet.grasp import Grasp, grasp_ports, nothing_held
-from engines.bullet.material import longest_step
-from engines.bullet.organ import Organ, OrganParams
-from engines.bullet.proxy import Coupling, Probe, ProbeParams
+from engines.bullet.elasticity.stable_step import longest_step
+from engines.bullet.organs.anchors import add_rigid
+from engines.bullet.organs.organ import Organ
+from engines.bullet.params import BulletParams
+from engines.bullet.probes.contact_gain import CONTACT_PERIOD_NS, Contacts, Tissue
+from engines.bullet.probes.grasp import Grasp, grasp_ports, nothing_held
+from engines.bullet.probes.params import Coupling, ProbeParams
+from engines.bullet.probes.probe import Probe
+from engines.bullet.world import connect, disconnect
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
-from schemas.errors import ScenarioError, StateError, did_you_mean
+from schemas.errors import ScenarioError, StateError
 from schemas.ports import BondSide, Port
-from schemas.quantity import Acceleration, Duration
 from schemas.ros import Header, Time
-from schemas.scenario import Name
 from schemas.trocar_msgs import SoftBodyState
 
-__all__ = ["BulletEngine", "BulletParams"]
+__all__ = ["BulletEngine"]
 
 _RAMP_S = 0.2
 """Gravity grows over this time before time 0, or over two periods of the slowest organ if they are longer;
@@ -34,37 +33,6 @@ _GRAVITY_DIGITS = 6
 """Digits to which the growing gravity is rounded: sines differ in their last bit between processors."""
 
 _NO_CLIENT = -1
-
-
-class BulletParams(Params):
-    """Organs, the probes that may touch them, and the numerics."""
-
-    organs: dict[Name, OrganParams] = Field(min_length=1)
-    rigid: dict[Name, RigidParams] = Field(
-        default_factory=dict[Name, RigidParams],
-        description="parts that do not move, and to which organs may be anchored",
-    )
-    probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
-    timestep: Duration = Field(
-        default=1_000_000, gt=0, description="sub-step; the period is a multiple of it"
-    )
-    node_period: Duration = Field(
-        default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period"
-    )
-    gravity: Acceleration = Field(
-        default=9.80665, ge=0, description="along -z of `world`; default: standard gravity"
-    )
-
-    @model_validator(mode="after")
-    def _known_parts(self) -> Self:
-        for name, organ in self.organs.items():
-            for part in organ.anchored_nodes:
-                if part != WORLD and part not in self.rigid:
-                    raise ValueError(
-                        f"organ '{name}' is anchored to '{part}', which is no rigid"
-                        f" part.{did_you_mean(part, [WORLD, *self.rigid])}"
-                    )
-        return self
 
 
 class BulletEngine(Stepped):

@@ -58,7 +58,7 @@ def fmi2_callbacks() -> Any:
 
 
 def _fmi2_log(
-    environment: int | None,
+    environment: int | None,  # noqa: ARG001
     instance: bytes | None,
     status: int,
     category: bytes | None,

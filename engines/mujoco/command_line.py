@@ -17,8 +17,8 @@ import typer
 from pydantic import ValidationError
 from typer.core import TyperCommand
 
-from engines.mujoco.opengl import import_mujoco
 from engines.mujoco.params import SceneParams
+from engines.mujoco.pictures.opengl import import_mujoco
 from robots import command_line as kinematics
 from robots.dvrk.arms import ARMS, DEFAULT_INSTRUMENT
 from robots.dvrk.setup_joints import CartArm

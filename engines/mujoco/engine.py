@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from engines.mujoco import opengl
 from engines.mujoco.params import MujocoParams, PsmParams
+from engines.mujoco.pictures.opengl import import_mujoco
 from engines.mujoco.ports import bond_sides, scene_ports
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
@@ -23,8 +23,8 @@ from schemas.ports import BondSide, Port
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
-    from engines.mujoco.probe import Probe
-    from engines.mujoco.spheres import Spheres
+    from engines.mujoco.interaction.contact_spheres import Spheres
+    from engines.mujoco.interaction.probe import Probe
 
 __all__ = ["MujocoEngine"]
 
@@ -81,26 +81,29 @@ class MujocoEngine(Stepped):
             raise ScenarioError(problem, path=("participants", self.name, "timestep"))
         if find_spec("mujoco") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind mujoco)", "mujoco", "mujoco")
-        opengl.import_mujoco()
+        import_mujoco()
         import mujoco
 
-        from engines.mujoco import holding, model
-        from engines.mujoco.readings import Readings, place
-        from engines.mujoco.rigid_contact import RigidContact
-        from engines.mujoco.servos import Servos
+        from engines.mujoco import model
+        from engines.mujoco.arms import brakes
+        from engines.mujoco.arms.readings import Readings
+        from engines.mujoco.arms.servos import Servos
+        from engines.mujoco.interaction import holding
+        from engines.mujoco.interaction.rigid_contact import RigidContact
 
         # else MuJoCo writes MUJOCO_LOG.TXT where the user stands
         mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
         spec = model.spec(self.params)
+        brakes.prepare(spec, self.params)
         holding.prepare(spec, self.params)
         spec.option.timestep = timestep * 1e-9
         self._mujoco, self._model = mujoco, spec.compile()
         self._data = mujoco.MjData(self._model)
-        place(self._model, self._data, self.params.arms)
+        model.place(self._model, self._data, self.params.arms)
         self._servos = Servos(self._model, self._data, self.params.arms, period * 1e-9)
         mujoco.mj_forward(self._model, self._data)
         self._readings = Readings(self._model, self._data, self.params.arms, self._servos)
-        self._brakes = holding.Brakes(self._model, self._data, self.params)
+        self._brakes = brakes.Brakes(self._model, self._data, self.params)
         self._holding = holding.Holding(
             self._model, self._data, self.params, self.params.publish_period * 1e-9
         )
@@ -124,8 +127,8 @@ class MujocoEngine(Stepped):
         return self._outputs
 
     def _couple(self, setup: Setup) -> None:
-        from engines.mujoco.probe import Probe
-        from engines.mujoco.spheres import Spheres
+        from engines.mujoco.interaction.contact_spheres import Spheres
+        from engines.mujoco.interaction.probe import Probe
         from hub.participant import MotionSide
 
         kinds = {"probe": Probe, "contact": Spheres}

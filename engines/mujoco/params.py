@@ -19,7 +19,16 @@ from robots.dvrk.setup_joints import CartArm
 from schemas.keys import valid_name
 from schemas.quantity import Duration, Length
 
-__all__ = ["EcmParams", "MujocoParams", "PsmParams", "SceneParams"]
+__all__ = [
+    "EcmParams",
+    "MujocoParams",
+    "PsmParams",
+    "SceneParams",
+    "has_hand",
+    "has_jaw",
+    "has_probe",
+    "has_spheres",
+]
 
 
 class PsmParams(MountedPsm):
@@ -140,3 +149,23 @@ class MujocoParams(SceneParams):
             " period"
         ),
     )
+
+
+def has_jaw(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds an instrument that opens and closes."""
+    return isinstance(params, PsmParams) and params.tool.jaw is not None
+
+
+def has_hand(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds a hand."""
+    return isinstance(params, PsmParams) and params.tool.hand is not None
+
+
+def has_spheres(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds an instrument with contact spheres."""
+    return isinstance(params, PsmParams) and bool(params.tool.spheres)
+
+
+def has_probe(params: PsmParams | EcmParams) -> bool:
+    """Say whether the arm holds a palpation probe."""
+    return isinstance(params, PsmParams) and params.tool.name == "palpation-probe"

@@ -4,42 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from engines.mujoco.params import EcmParams, MujocoParams, PsmParams
-from engines.mujoco.positions import position_count
-from schemas.ports import BondSide, Port
-
-__all__ = ["bond_sides", "has_hand", "has_jaw", "has_probe", "has_spheres", "scene_ports"]
-
-_JOINT_STATE, _POSE, _WRENCH = (
-    "sensor_msgs/msg/JointState",
-    "geometry_msgs/msg/PoseStamped",
-    "geometry_msgs/msg/WrenchStamped",
+from engines.mujoco.params import (
+    EcmParams,
+    MujocoParams,
+    PsmParams,
+    SceneParams,
+    has_jaw,
+    has_probe,
+    has_spheres,
 )
+from robots.dvrk import ecm
+from robots.dvrk.linkage import LINKAGES
+from robots.dvrk.rolling_needle_driver import PADS
+from schemas.ports import BondSide, Port
+from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
+
+__all__ = ["bond_sides", "position_count", "scene_ports"]
+
+_JOINT_STATE, _POSE, _WRENCH = JointState.ros_type, PoseStamped.ros_type, WrenchStamped.ros_type
 _ALL = ("position", "velocity", "effort")
 _MODES = (
     "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort; 3 and 4 the last two"
     " without gravity compensation"
 )
-
-
-def has_jaw(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds an instrument that opens and closes."""
-    return isinstance(params, PsmParams) and params.tool.jaw is not None
-
-
-def has_hand(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds a hand."""
-    return isinstance(params, PsmParams) and params.tool.hand is not None
-
-
-def has_spheres(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds an instrument with contact spheres."""
-    return isinstance(params, PsmParams) and bool(params.tool.spheres)
-
-
-def has_probe(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds a palpation probe."""
-    return isinstance(params, PsmParams) and params.tool.name == "palpation-probe"
+_FREE_BODY = 7
+"""Position and quaternion."""
 
 
 def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
@@ -204,7 +193,7 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(
         name=f"{thing}/held_by",
         causality="output",
-        type="std_msgs/msg/Float64",
+        type=Float64Message.ros_type,
         period_ns=slow,
         description=holder,
     )
@@ -212,7 +201,7 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(
         name=f"{thing}/slip",
         causality="output",
-        type="std_msgs/msg/Float64",
+        type=Float64Message.ros_type,
         unit="m",
         period_ns=slow,
         description=slip,
@@ -221,7 +210,7 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(
         name=f"{thing}/turn",
         causality="output",
-        type="std_msgs/msg/Float64",
+        type=Float64Message.ros_type,
         unit="rad",
         period_ns=slow,
         description=turn,
@@ -229,8 +218,28 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(
         name=f"{thing}/lift",
         causality="output",
-        type="std_msgs/msg/Float64",
+        type=Float64Message.ros_type,
         unit="m",
         period_ns=slow,
         description="height over where it started",
     )
+
+
+def position_count(scene: SceneParams) -> int:
+    """Return the size of `qpos`: joints, linkage and fingers with pads or phalanges of every arm, then the
+    pose of every object.
+    """
+    count = _FREE_BODY * len(scene.objects)
+    for name, arm in scene.arms.items():
+        if isinstance(arm, EcmParams):
+            count += len(ecm.JOINT_NAMES)
+        else:
+            tool = arm.tool
+            count += (
+                len(arm.chain.joints)
+                + (0 if tool.jaw is None else 2)
+                + (0 if tool.hand is None else len(tool.hand.links))
+            )
+            count += 0 if tool.roller is None else len(PADS)
+        count += len(LINKAGES[name].joints)
+    return count

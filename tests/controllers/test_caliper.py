@@ -7,7 +7,8 @@ from controllers.caliper import Caliper, CaliperParams, width_of_mesh
 from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
 from controllers.routine import Routine, RoutineParams
-from engines.bullet.engine import BulletEngine, BulletParams
+from engines.bullet.engine import BulletEngine
+from engines.bullet.params import BulletParams
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams
 from hub.participant import Inputs, Setup

@@ -9,7 +9,8 @@ import pytest
 from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.params import TeleoperationParams
 from devices.scripted.device import ScriptedDevice, ScriptedParams
-from engines.bullet.engine import BulletEngine, BulletParams
+from engines.bullet.engine import BulletEngine
+from engines.bullet.params import BulletParams
 from engines.fmu.engine import FmuEngine, FmuParams
 from engines.mujoco.engine import MujocoEngine
 from engines.mujoco.params import MujocoParams

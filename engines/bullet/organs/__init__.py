@@ -1,1 +1,1 @@
-"""The shapes of organs and the materials they are made of."""
+"""Organs: their shapes, their materials, what holds them, and their bodies in Bullet."""

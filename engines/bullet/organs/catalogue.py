@@ -1,11 +1,28 @@
-"""The organs that a scenario may name."""
+"""The organs that a scenario may name, and the block of tissue of any size."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from engines.bullet.meshing.grid import block
 from engines.bullet.organs.colon import COLON
 from engines.bullet.organs.kidney import KIDNEY_WITH_ADRENAL
 from engines.bullet.organs.liver import LIVER_LOBE
+from engines.bullet.organs.shape import SIDES, Shape, on_side
 
-__all__ = ["SHAPES"]
+__all__ = ["SHAPES", "block_shape"]
 
 SHAPES = {"kidney-with-adrenal": KIDNEY_WITH_ADRENAL, "colon": COLON, "liver-lobe": LIVER_LOBE}
+
+
+def block_shape(size: tuple[float, float, float]) -> Shape:
+    """Return a block of edge lengths `size` (m)."""
+    return Shape(
+        description=(
+            "a block of the given size along the axes of its frame; the origin is in the middle of its top"
+        ),
+        mesh=lambda nodes: block(np.array(size), nodes),
+        surfaces={side: lambda nodes, side=side: on_side(nodes, side, 0.0) for side in SIDES},
+        anchors=("bottom",),
+        material=None,
+    )

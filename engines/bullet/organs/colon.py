@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.mesh import TetMesh
-from engines.bullet.organs.grid import tetrahedra_of_cells
+from engines.bullet.meshing.grid import tetrahedra_of_cells
+from engines.bullet.meshing.tet_mesh import TetMesh
 from engines.bullet.organs.shape import ROUNDING_DIGITS, Shape
 from schemas.vectors import Vector
 

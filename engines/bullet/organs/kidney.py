@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engines.bullet.organs.shape import Shape, smooth_union, stuffed
+from engines.bullet.organs.shape import Shape, mesher, smooth_union
 from schemas.vectors import Vector
 
 __all__ = ["KIDNEY_WITH_ADRENAL"]
@@ -72,7 +72,7 @@ KIDNEY_WITH_ADRENAL = Shape(
         " adrenal gland, 38 x 36 x 10 mm (Bergman et al., Encyclopedia of Human Anatomic Variation IV), on"
         " the upper pole; it lies on its back around the origin: +x is cranial, +y medial, +z anterior"
     ),
-    mesh=stuffed(_field, _formed, low=(-0.055, -0.030, -0.026), high=(0.085, 0.030, 0.026)),
+    mesh=mesher(_field, _formed, low=(-0.055, -0.030, -0.026), high=(0.085, 0.030, 0.026)),
     surfaces={
         "posterior": (
             lambda nodes: (nodes[:, 2] < -0.5 * _HALF_KIDNEY_M[2]) & (nodes[:, 0] < _HALF_KIDNEY_M[0])

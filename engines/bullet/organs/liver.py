@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.organs.shape import Shape, stuffed
+from engines.bullet.organs.shape import Shape, mesher
 from schemas.vectors import Vector
 
 __all__ = ["LIVER_LOBE"]
@@ -69,7 +69,7 @@ LIVER_LOBE = Shape(
         " 14 mm at the edge, 0.2 kg: a seventh of a liver (Gray, Anatomy of the Human Body, 20th edition,"
         " 1918). It hangs under the diaphragm, its middle at the origin: +x is towards the edge, +z anterior"
     ),
-    mesh=stuffed(_field, _formed, low=(-0.050, -0.066, -0.030), high=(0.050, 0.066, 0.030)),
+    mesh=mesher(_field, _formed, low=(-0.050, -0.066, -0.030), high=(0.050, 0.066, 0.030)),
     surfaces={
         "diaphragm": _on_diaphragm,
         "edge": lambda nodes: nodes[:, 0] > 0.7 * _HALF_M[0],

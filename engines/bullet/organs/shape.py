@@ -9,12 +9,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.bullet.mesh import TetMesh
-from engines.bullet.organs.stuffing import Field, smoothed, stuff
+from engines.bullet.meshing.isosurface_stuffing import Field, fill
+from engines.bullet.meshing.smoothing import smoothed
+from engines.bullet.meshing.tet_mesh import TetMesh
 from schemas.errors import did_you_mean
 from schemas.vectors import Vector
 
-__all__ = ["ROUNDING_DIGITS", "SIDES", "Shape", "Surface", "on_side", "smooth_union", "stuffed"]
+__all__ = ["ROUNDING_DIGITS", "SIDES", "Shape", "Surface", "mesher", "on_side", "smooth_union"]
 
 Surface = Callable[[Vector], NDArray[np.bool_]]
 """Of nodes on the surface at rest, shape (n, 3), m, in the organ's own frame: which of them belong to a named
@@ -82,7 +83,7 @@ def on_side(nodes: Vector, side: str, share: float) -> NDArray[np.bool_]:
     return along >= along.max() - share * np.ptp(along)
 
 
-def stuffed(
+def mesher(
     field: Field,
     formed: Callable[[Vector], Vector],
     low: tuple[float, float, float],
@@ -106,7 +107,7 @@ def stuffed(
         spacing = float(np.cbrt(1.5 * np.prod(corners[1] - corners[0]) / nodes))
         tried: dict[int, tuple[float, TetMesh]] = {}
         for _ in range(_SEARCHES):
-            found = stuff(field, *corners, spacing)
+            found = fill(field, *corners, spacing)
             count = len(found.nodes)
             tried[count] = spacing, found
             if abs(count / nodes - 1.0) <= _COUNT_TOLERANCE:

@@ -10,13 +10,12 @@ from xml.etree import ElementTree
 import mujoco
 
 from engines.mujoco.export.assets import FOLDER, meshes
-from engines.mujoco.export.keyframe import add_start
 from engines.mujoco.export.mjcf import mjcf
 from engines.mujoco.export.urdf import urdf
-from engines.mujoco.model import spec
+from engines.mujoco.model import place, spec
 from engines.mujoco.params import SceneParams
 
-__all__ = ["FORMATS", "Format", "write"]
+__all__ = ["FORMATS", "START", "Format", "write"]
 
 Format = Literal["mjcf", "urdf"]
 
@@ -25,11 +24,14 @@ _WRITERS: Mapping[Format, Callable[[mujoco.MjSpec], ElementTree.Element]] = {"mj
 FORMATS: Mapping[str, Format] = {".xml": "mjcf", ".mjcf": "mjcf", ".urdf": "urdf"}
 """By the suffix of the file."""
 
+START = "start"
+"""Name of the keyframe with which a loaded model begins."""
+
 
 def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
     """Write the model of `scene` to `path` and its meshes to the folder `assets` beside it; return all files."""
     model = spec(scene)
-    add_start(model, scene)
+    _add_start(model, scene)
     root = _WRITERS[form](model)
     ElementTree.indent(root)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -40,3 +42,16 @@ def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
         written[-1].parent.mkdir(exist_ok=True)
         written[-1].write_text(content, encoding="ascii")
     return written
+
+
+def _add_start(spec: mujoco.MjSpec, scene: SceneParams) -> None:
+    """Add the keyframe `START`: joints where the scene starts, and servos whose goals hold them there.
+
+    Without it a loaded model would begin with instruments drawn back and servos that pull them there.
+    """
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    place(model, data, scene.arms)
+    for actuator, (joint, _) in enumerate(model.actuator_trnid):
+        data.ctrl[model.actuator_ctrladr[actuator]] = data.qpos[model.jnt_qposadr[joint]]
+    spec.add_key(name=START, qpos=data.qpos, ctrl=data.ctrl)

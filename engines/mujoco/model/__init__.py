@@ -3,6 +3,16 @@
 """
 
 from engines.mujoco.model.names import CONTACT, FINGERS, finger, first_sensor, instrument_body, probe_body
-from engines.mujoco.model.scene import build, spec
+from engines.mujoco.model.scene import build, place, spec
 
-__all__ = ["CONTACT", "FINGERS", "build", "finger", "first_sensor", "instrument_body", "probe_body", "spec"]
+__all__ = [
+    "CONTACT",
+    "FINGERS",
+    "build",
+    "finger",
+    "first_sensor",
+    "instrument_body",
+    "place",
+    "probe_body",
+    "spec",
+]

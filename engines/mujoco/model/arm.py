@@ -7,8 +7,8 @@ import numpy as np
 
 from engines.mujoco.model import hand as hands
 from engines.mujoco.model import roller as rollers
-from engines.mujoco.model import transform
 from engines.mujoco.model.names import FINGERS, sphere_site
+from engines.mujoco.model.poses import placed
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
 from engines.mujoco.params import EcmParams, PsmParams
@@ -45,22 +45,20 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     """Add the arm called `name`, its base frame at `base_pose`, shape (4, 4), in the world; return its bodies
     by link.
     """
-    base = spec.worldbody.add_body(name=f"{name}/{BASE}", **transform.placed(base_pose))
+    base = spec.worldbody.add_body(name=f"{name}/{BASE}", **placed(base_pose))
     base.add_site(name=f"{name}/base", group=_HIDDEN)
     bodies = {BASE: (base, np.eye(4))}
     for link in links(name, params):
         above, above_pose = bodies[link.parent]
         body = above.add_body(
-            name=f"{name}/{link.name}", gravcomp=1.0, **transform.placed(inverse_pose(above_pose) @ link.pose)
+            name=f"{name}/{link.name}", gravcomp=1.0, **placed(inverse_pose(above_pose) @ link.pose)
         )
         bodies[link.name] = body, link.pose
         _add_joint(spec, body, name, link)
     _add_drives(spec, name, params)
     _set_inertias(bodies, params)
     chain = params.chain
-    bodies[chain.joints[-1].name][0].add_site(
-        name=f"{name}/tip", group=_HIDDEN, **transform.placed(chain.tip)
-    )
+    bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **placed(chain.tip))
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
     if isinstance(params, PsmParams):
         if (hand := params.tool.hand) is not None:

@@ -12,7 +12,7 @@ from robots.dvrk.rolling_needle_driver import PADS, ROLLER, Roller
 __all__ = ["add_drive"]
 
 _TIE = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
-"""As of the fingers of a jaw (`engines.mujoco.holding`): all but rigid."""
+"""As of the fingers of a jaw (`engines.mujoco.interaction.holding`): all but rigid."""
 
 
 def add_drive(spec: mujoco.MjSpec, arm: str, roller: Roller, drive: Drive) -> None:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 
-from engines.mujoco import objects
-from engines.mujoco.model import arm, setup_joints, shapes
-from engines.mujoco.params import SceneParams
-from engines.mujoco.ports import has_hand
+from engines.mujoco.model import arm, objects, setup_joints, shapes
+from engines.mujoco.model.names import FINGERS
+from engines.mujoco.model.tree import links
+from engines.mujoco.params import EcmParams, PsmParams, SceneParams, has_hand
 from robots import rotation
 from robots.dvrk.mounted import MountedArm
+from robots.dvrk.rolling_needle_driver import PADS
+from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
-__all__ = ["build", "spec"]
+__all__ = ["build", "place", "spec"]
 
 _TIMESTEP = 5e-4
 """s, unless whoever steps the model sets another: what `MujocoParams` has."""
@@ -45,6 +49,29 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     for name, thing in scene.objects.items():
         objects.add(result, name, thing)
     return result
+
+
+def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams]) -> None:
+    """Put the joints of `arms`, with linkages and fingers, where they start."""
+    for name, params in arms.items():
+        start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
+        if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+            start |= dict(
+                zip(
+                    (link.name for link in hand.links),
+                    hand.unloaded(np.array(params.hand)).ravel().tolist(),
+                    strict=True,
+                )
+            )
+        start |= dict.fromkeys(PADS, 0.0)
+        for link in links(name, params):
+            if link.follow is not None:
+                q = link.follow.ratio * start[link.follow.joint]
+            elif link.name in FINGERS and isinstance(params, PsmParams):
+                q = params.jaw / 2.0
+            else:
+                q = start[link.name]
+            data.qpos[int(model.joint(f"{name}/{link.name}").qposadr[0])] = q
 
 
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from engines.mujoco.model import shapes, transform
+from engines.mujoco.model import shapes
+from engines.mujoco.model.poses import placed
 from engines.mujoco.params import SceneParams
 from robots.dvrk import setup_joints
 from robots.dvrk.cart import inverse_pose
@@ -31,7 +32,7 @@ def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
         drawn = chain.frames(np.zeros(len(setup_joints.JOINT_NAMES)))
         body, above, bodies = cart, np.eye(4), dict[str, tuple[mujoco.MjsBody, Vector]]()
         for joint, pose, zero in zip(setup_joints.JOINT_NAMES, poses, drawn[:-1], strict=True):
-            body = body.add_body(name=f"SUJ/{arm}/{joint}", **transform.placed(inverse_pose(above) @ pose))
+            body = body.add_body(name=f"SUJ/{arm}/{joint}", **placed(inverse_pose(above) @ pose))
             bodies[joint], above = (body, zero), pose
         shapes.add(spec, f"suj/{arm}", f"SUJ/{arm}", bodies, seen=scene.looks)
     return mounts

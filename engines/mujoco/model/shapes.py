@@ -16,9 +16,8 @@ import mujoco
 import numpy as np
 
 from engines.mujoco import looks
-from engines.mujoco.model import transform
-from engines.mujoco.params import EcmParams, PsmParams
-from engines.mujoco.ports import has_probe
+from engines.mujoco.model.poses import placed
+from engines.mujoco.params import EcmParams, PsmParams, has_probe
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
@@ -97,7 +96,7 @@ def _add_collision(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *
                     type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, contype=0, conaffinity=_THINGS, **common
                 )
             else:
-                place = transform.placed(inverse_pose(pose) @ shape.pose)
+                place = placed(inverse_pose(pose) @ shape.pose)
                 body.add_geom(
                     type=_KINDS[shape.kind],
                     size=[*shape.size, 0.0, 0.0][:3],

@@ -8,7 +8,8 @@ from math import sqrt
 
 import numpy as np
 
-from engines.bullet.engine import BulletEngine, BulletParams
+from engines.bullet.engine import BulletEngine
+from engines.bullet.params import BulletParams
 from hub.participant import MotionSide, Params, Stepped, state_hash
 from hub.testing import run_in_process
 from schemas.errors import TrocarError

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engines.bullet.engine import BulletEngine, BulletParams
+from engines.bullet.engine import BulletEngine
+from engines.bullet.params import BulletParams
 from hub.participant import BondPlan, Inputs, Setup
 
 MS = 1_000_000

@@ -1,0 +1,1 @@
+"""The elastic material of tissue: constants, forces, and the time step they allow."""

@@ -1,0 +1,1 @@
+"""Tetrahedral meshes: made, read, checked, measured."""

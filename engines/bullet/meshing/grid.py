@@ -1,0 +1,91 @@
+"""Tetrahedra of regular grids: blocks and tubes."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from schemas.vectors import Vector
+
+__all__ = ["FEWEST_NODES", "block", "block_cells", "tetrahedra_of_cells"]
+
+FEWEST_NODES = 18
+"""Nodes of the smallest symmetric block, 2 x 2 x 1 cells."""
+
+_COUNT_TOLERANCE = 0.05
+"""Of all grids whose node count is this near to the requested one, the one with the most cubic cells is
+taken.
+"""
+
+# (8, 3): corner number 4 i + 2 j + k stands at (i, j, k)
+_CORNERS = np.array(list(product((0, 1), repeat=3)))
+_CELL = np.array([[0, 4, 2, 1], [6, 2, 4, 7], [5, 4, 1, 7], [3, 1, 2, 7], [4, 2, 1, 7]])
+"""Five positively oriented tetrahedra of a cube, four at the corners and one in the middle."""
+_MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
+"""The same, mirrored in x: neighbouring cells must alternate for their diagonals to meet."""
+
+
+def block(size: Vector, nodes: int) -> TetMesh:
+    """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes; its top face is centred
+    on the origin.
+
+    A regular grid whose cells are cut into five tetrahedra each, the fewest there are, mirrored from cell to
+    cell. With an even number of cells along x and y the mesh is its own mirror image in both, so it has no
+    preferred diagonal.
+    """
+    cells = block_cells(size, nodes)
+    points = (_grid(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
+    return TetMesh(points, tetrahedra_of_cells(cells))
+
+
+def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) -> Indices:
+    """Return the tetrahedra of a grid of `cells`, shape (5 cells, 4); its nodes are numbered with the last
+    index the fastest.
+
+    Args:
+        cells: along the three directions, which must be right-handed.
+        closed: the second direction runs around: its last cells, of which there must be an even number, end
+        on the first nodes.
+    """
+    rows = cells[1] + (0 if closed else 1)
+    origins = _grid(*cells)  # (c, 3)
+    corners = origins[:, None] + _CORNERS  # (c, 8, 3)
+    corners[:, :, 1] %= rows if closed else rows + 1
+    numbers = corners @ np.array([rows * (cells[2] + 1), cells[2] + 1, 1])  # (c, 8)
+    odd = origins.sum(axis=1) % 2 == 1
+    return np.where(odd[:, None, None], numbers[:, _MIRRORED_CELL], numbers[:, _CELL]).reshape(-1, 4)
+
+
+def block_cells(size: Vector, nodes: int) -> tuple[int, int, int]:
+    """Return the cells along x, y (even) and z of the grid that suits a box of `size` (m) and about `nodes`
+    nodes.
+    """
+
+    def unfitness(cells: tuple[int, int, int]) -> tuple[float, ...]:
+        edges = size / cells
+        miss = abs(np.prod(np.add(cells, 1)) / nodes - 1.0)
+        elongation = edges.max() / edges.min()
+        return (
+            (0.0, elongation, miss, *cells) if miss <= _COUNT_TOLERANCE else (1.0, miss, elongation, *cells)
+        )
+
+    most = max(1, nodes // 9)
+    layouts = ((ny, nz) for nz in range(1, most + 1) for ny in range(2, nodes // (3 * (nz + 1)) + 2, 2))
+    candidates = (
+        (nx, ny, nz) for ny, nz in layouts for nx in _even_neighbours(nodes / ((ny + 1) * (nz + 1)) - 1.0)
+    )
+    return min(candidates, key=unfitness)
+
+
+def _grid(nx: int, ny: int, nz: int) -> Indices:
+    """Return all (i, j, k) of a grid, shape (nx ny nz, 3), k the fastest."""
+    return np.stack(np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"), axis=-1).reshape(
+        -1, 3
+    )
+
+
+def _even_neighbours(x: float) -> tuple[int, int]:
+    lower = max(2, 2 * int(x // 2))
+    return lower, lower + 2

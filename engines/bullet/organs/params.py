@@ -1,0 +1,208 @@
+"""What a scenario says about an organ."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+
+from engines.bullet.elasticity.material import Material
+from engines.bullet.meshing.grid import FEWEST_NODES
+from engines.bullet.meshing.mesh_check import MOST_NODES, checked_mesh
+from engines.bullet.meshing.tet_mesh import TetMesh
+from engines.bullet.meshing.vtk_file import read_vtk
+from engines.bullet.organs.anchors import AnchorParams, Edges
+from engines.bullet.organs.catalogue import SHAPES, block_shape
+from engines.bullet.organs.materials import TissueDensity, TissueModulus, TissuePoissonRatio, preset
+from engines.bullet.organs.shape import Shape
+from robots import rotation
+from robots.dvrk.parameters import UnitQuaternion
+from schemas.quantity import Duration, Length
+
+__all__ = ["OrganParams"]
+
+_NODES = 250
+_POISSON_RATIO = 0.4
+_DENSITY = 1000.0
+"""Of water, kg/m^3."""
+
+_UNITS = {"m": 1.0, "mm": 1e-3}
+
+
+class OrganParams(BaseModel):
+    """An organ of soft tissue: its shape, its material, where it lies and what holds it.
+
+    SI units after validation.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    size: Edges | None = Field(default=None, description="of a block of tissue: edge lengths along x, y, z")
+    shape: Literal["kidney-with-adrenal", "colon", "liver-lobe"] | None = Field(
+        default=None, description="instead: an organ; `trocar organs` shows them"
+    )
+    mesh: Path | None = Field(
+        default=None, description="instead: a .vtk file of tetrahedra; a relative path starts at the scenario"
+    )
+    unit: Literal["m", "mm"] | None = Field(default=None, description="of the .vtk file; default: m")
+    material: str | None = Field(
+        default=None,
+        description=(
+            "name of a material that `trocar organs` shows with its source; default: that of the shape"
+        ),
+    )
+    young_modulus: TissueModulus | None = Field(default=None, description="instead of a material")
+    poisson_ratio: TissuePoissonRatio | None = Field(
+        default=None, description=f"with young_modulus; default: {_POISSON_RATIO}"
+    )
+    density: TissueDensity | None = Field(default=None, description="with young_modulus; default: water")
+    nodes: int | None = Field(
+        default=None,
+        ge=FEWEST_NODES,
+        le=MOST_NODES,
+        description=f"about how many; default: {_NODES}, which run in real time at sub-steps of 1 ms",
+    )
+    position: tuple[Length, Length, Length] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="of the organ's frame in `world`; that of a block is in the middle of its top",
+    )
+    orientation: UnitQuaternion = Field(
+        default=(0.0, 0.0, 0.0, 1.0), description="of the organ's frame in `world`: quaternion x, y, z, w"
+    )
+    anchors: tuple[AnchorParams, ...] | None = Field(
+        default=None, description="what holds the organ; default: the shape's own surfaces, tied to `world`"
+    )
+    damping: Duration = Field(
+        default=1_000_000,
+        ge=0,
+        description="stiffness-proportional damping: ratio of damping to stiffness, a time",
+    )
+    friction: float = Field(default=0.3, ge=0, le=2, description="Coulomb coefficient against probes")
+
+    @field_validator("mesh")
+    @classmethod
+    def _from_scenario(cls, path: Path | None, info: ValidationInfo) -> Path | None:
+        directory: Path = info.context["directory"] if info.context else Path.cwd()
+        return path and (directory / path).resolve()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if sum(part is not None for part in (self.size, self.shape, self.mesh)) != 1:
+            raise ValueError(
+                f"an organ has a size (a block), a shape ({', '.join(SHAPES)}) or a mesh (a .vtk file), one"
+                " of them"
+            )
+        if self.mesh is None and self.unit is not None:
+            raise ValueError("unit is that of a mesh file; elsewhere units stand with the numbers")
+        if self.mesh is not None and self.nodes is not None:
+            raise ValueError("nodes are those of the mesh file: leave them out")
+        if self.mesh is not None and self.anchors is None:
+            raise ValueError(
+                "say what holds the organ: for instance anchors: [{surface: bottom}], or [] if it lies freely"
+                " on rigid parts"
+            )
+        if self.young_modulus is None and (self.poisson_ratio is not None or self.density is not None):
+            raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
+        if self.material is not None and self.young_modulus is not None:
+            raise ValueError("an organ has a material or a young_modulus, not both")
+        _ = self.elastic, self.local, self.anchored_nodes
+        return self
+
+    @cached_property
+    def elastic(self) -> Material:
+        """The material in numbers. Raises ValueError where none is given."""
+        damping = self.damping * 1e-9
+        if self.young_modulus is not None:
+            poisson_ratio, density = self.poisson_ratio, self.density
+            return Material(
+                self.young_modulus,
+                _POISSON_RATIO if poisson_ratio is None else poisson_ratio,
+                _DENSITY if density is None else density,
+                damping,
+            )
+        name = self.material or self.body.material
+        if name is None:
+            raise ValueError(
+                "say what the organ is made of: young_modulus, or a material (`trocar organs` lists them)"
+            )
+        known = preset(name)
+        return Material(known.young_modulus, known.poisson_ratio, known.density, damping)
+
+    @cached_property
+    def body(self) -> Shape:
+        """The shape. Raises ValueError where the mesh file is unusable."""
+        if self.size is not None:
+            return block_shape(self.size)
+        if self.mesh is not None:
+            mesh = _from_file(self.mesh, _UNITS[self.unit or "m"])
+            return Shape(
+                description=str(self.mesh), mesh=lambda _: mesh, surfaces={}, anchors=(), material=None
+            )
+        return SHAPES[self.shape or ""]
+
+    @cached_property
+    def local(self) -> TetMesh:
+        """The mesh at rest in the organ's own frame."""
+        return self.body.mesh(self.nodes or _NODES)
+
+    @cached_property
+    def rest(self) -> TetMesh:
+        """The mesh at rest in `world`."""
+        turned = np.einsum("ij,nj->ni", rotation.matrix(np.array(self.orientation)), self.local.nodes)
+        return TetMesh(turned + np.array(self.position), self.local.tetrahedra)
+
+    @property
+    def anchored_nodes(self) -> dict[str, NDArray[np.bool_]]:
+        """Which nodes are tied to `world` and to rigid parts, shapes (n,).
+
+        Raises ValueError where a surface is unknown or has no node.
+        """
+        anchors = (
+            [AnchorParams(surface=name) for name in self.body.anchors]
+            if self.anchors is None
+            else self.anchors
+        )
+        tied: dict[str, NDArray[np.bool_]] = {}
+        for anchor in anchors:
+            tied[anchor.to] = tied.get(anchor.to, np.zeros(len(self.local.nodes), np.bool_)) | self.surface(
+                anchor
+            )
+        return tied
+
+    def surface(self, part: AnchorParams) -> NDArray[np.bool_]:
+        """Return which nodes belong to a part of the surface, shape (n,).
+
+        Raises ValueError where it is unknown or has no node.
+        """
+        nodes, chosen = np.unique(self.local.triangles), np.zeros(len(self.local.nodes), np.bool_)
+        points = self.local.nodes[nodes]
+        chosen[nodes] = (
+            part.box.depth(points) >= 0.0 if part.box else self.body.surface(part.surface or "", points)
+        )
+        if not chosen.any():
+            raise ValueError(
+                f"no node of the surface lies in {part.surface or 'the box'}; the organ reaches from"
+                f" {points.min(axis=0)} to {points.max(axis=0)} m"
+            )
+        return chosen
+
+    def contact_stiffness(self, radius: float) -> float:
+        """Estimate the stiffness (N/m) against a sphere of `radius` (m): that of a punch as wide as the
+        sphere, or as a usual edge of the surface.
+        """
+        triangles = self.local.triangles
+        edges = self.local.nodes[triangles] - self.local.nodes[np.roll(triangles, 1, axis=1)]
+        return self.elastic.contact_stiffness(max(radius, float(np.median(np.linalg.norm(edges, axis=2)))))
+
+
+@lru_cache(maxsize=16)
+def _from_file(path: Path, unit: float) -> TetMesh:
+    nodes, tetrahedra = read_vtk(path)
+    try:
+        return checked_mesh(nodes * unit, tetrahedra)
+    except ValueError as error:
+        raise ValueError(f"mesh {path}: {error}") from error

@@ -1,0 +1,48 @@
+"""What a scenario may say about the tissue engine: organs, rigid parts, probes, and how they are stepped."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from engines.bullet.organs.anchors import WORLD, RigidParams
+from engines.bullet.organs.params import OrganParams
+from engines.bullet.probes.params import ProbeParams
+from hub.participant import Params
+from schemas.errors import did_you_mean
+from schemas.quantity import Acceleration, Duration
+from schemas.scenario import Name
+
+__all__ = ["BulletParams"]
+
+
+class BulletParams(Params):
+    """Organs, the probes that may touch them, and the numerics."""
+
+    organs: dict[Name, OrganParams] = Field(min_length=1)
+    rigid: dict[Name, RigidParams] = Field(
+        default_factory=dict[Name, RigidParams],
+        description="parts that do not move, and to which organs may be anchored",
+    )
+    probes: dict[Name, ProbeParams] = Field(default_factory=lambda: {"probe": ProbeParams()})
+    timestep: Duration = Field(
+        default=1_000_000, gt=0, description="sub-step; the period is a multiple of it"
+    )
+    node_period: Duration = Field(
+        default=16_000_000, gt=0, description="how often the nodes are output; a multiple of the period"
+    )
+    gravity: Acceleration = Field(
+        default=9.80665, ge=0, description="along -z of `world`; default: standard gravity"
+    )
+
+    @model_validator(mode="after")
+    def _known_parts(self) -> Self:
+        for name, organ in self.organs.items():
+            for part in organ.anchored_nodes:
+                if part != WORLD and part not in self.rigid:
+                    raise ValueError(
+                        f"organ '{name}' is anchored to '{part}', which is no rigid"
+                        f" part.{did_you_mean(part, [WORLD, *self.rigid])}"
+                    )
+        return self

@@ -1,0 +1,1 @@
+"""The probes that press on tissue and grasp it."""

@@ -1,0 +1,207 @@
+"""What Bullet's contacts lose of a force, and the gain that makes up for it.
+
+Where a rigid body touches a face of a soft body at barycentric coordinates w, Bullet spreads the impulse over
+the three nodes with weights 2 w / (1 + s), s = w . w, and takes the sum of w times weight as the inverse mass
+of the face (btSoftBodyInternals.h, CollideSDF_RDF). Of an impulse J on the rigid body the soft body then
+receives only 4 s / (1 + s)^2 J: all of it at a node, 8/9 in the middle of an edge, 3/4 in the middle of a
+face. A force on the rigid body must be larger by the inverse for the tissue to feel it whole: by 1 to 4/3.
+How several faces share the force of a sphere is not to be seen from outside; so the gain is measured, from
+what the elastic forces say that the touched nodes receive. docs/decisions/0015-contact-force.md
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from engines.bullet.elasticity.forces import Elasticity
+from engines.bullet.elasticity.material import Material
+from engines.bullet.meshing.tet_mesh import Indices
+from engines.bullet.organs.organ import Organ
+from engines.bullet.probes.probe import Probe
+from schemas.vectors import Vector
+
+__all__ = ["CONTACT_PERIOD_NS", "Contacts", "Tissue", "closest_points", "touched_faces"]
+
+CONTACT_PERIOD_NS = 8_000_000
+"""How often the nodes are read to see where probes touch and what they receive."""
+
+_BAND_M = 6e-4
+"""Faces nearer to the sphere than this may share its force; the first guess is that the nearest bears most.
+"""
+
+_LARGEST_GAIN = 4.0 / 3.0
+
+_FILTER = 0.2
+"""Share of the way to the measured gain gone at each reading: a time constant of 36 ms, in which waves in the
+tissue even out.
+"""
+
+_LEAST_PART = 1e-3
+"""Of a force, on every node of the faces that may be touched."""
+
+_LEAST_FORCE_N = 5e-3
+"""Below this the inertia of the touched nodes, of some 0.1 g each, counts in what they receive."""
+
+
+class Tissue:
+    """An organ as far as contacts go: where it is touched, and what its nodes receive."""
+
+    def __init__(self, organ: Organ, material: Material, gravity: float) -> None:
+        """Watch `organ`, in `gravity` (m/s^2) along -z."""
+        self.organ = organ
+        self._elasticity = Elasticity(organ.mesh, material)
+        # Bullet gives all nodes the same mass
+        self._node_weight = material.density * organ.mesh.volume / len(organ.mesh.nodes) * gravity
+        self._ahead = material.damping / (CONTACT_PERIOD_NS * 1e-9)
+        self._before = organ.nodes
+
+    def received(self, nodes: Indices) -> Vector:
+        """Return the force (N) with which contacts push these nodes, shape (n, 3), zero for all others: what
+        balances elasticity, damping and weight.
+
+        Damping being proportional to stiffness, elasticity is taken where the nodes will be a damping time
+        later.
+        """
+        at = np.zeros(len(self.organ.nodes), dtype=np.bool_)
+        at[nodes] = True
+        force = -self._elasticity.forces(
+            self.organ.nodes + self._ahead * (self.organ.nodes - self._before), at
+        )
+        force[nodes, 2] += self._node_weight
+        return force
+
+    def advance(self) -> None:
+        """Take the nodes as they are now for those before the next ones."""
+        self._before = self.organ.nodes
+
+
+@dataclass(frozen=True)
+class _Touch:
+    """A sphere near the faces of an organ."""
+
+    probe: Probe
+    sphere: int
+    distance: float
+    """Of its centre from the nearest face, m."""
+    guess: float
+    """Gain that the faces' distances suggest."""
+    nodes: Indices
+    """Of these faces, shape (k,)."""
+    parts: Vector
+    """Of the force, that fall to each of the nodes by the same guess, shape (k,)."""
+
+    @property
+    def push(self) -> Vector:
+        """Force (N) with which Bullet let it press, shape (3,)."""
+        return self.probe.contacts[self.sphere]
+
+
+class Contacts:
+    """Sees which spheres touch organs, and sets their gains."""
+
+    def __init__(self, tissues: Sequence[Tissue]) -> None:
+        """Take the organs."""
+        self._tissues = tissues
+
+    def update(self, probes: Sequence[Probe]) -> None:
+        """Bring every gain nearer to what it should be; the organs' nodes have just been read."""
+        touches: list[list[_Touch]] = [[] for _ in self._tissues]
+        for probe in probes:
+            for sphere in range(len(probe.radii)):
+                found = (
+                    []
+                    if probe.held[sphere]
+                    else [
+                        (touch.distance, i, touch)
+                        for i, t in enumerate(self._tissues)
+                        if (touch := _touch(t, probe, sphere))
+                    ]
+                )
+                probe.touching[sphere] = bool(found)
+                if found:
+                    _, i, touch = min(found, key=lambda item: item[:2])
+                    touches[i].append(touch)
+                else:
+                    probe.gains[sphere] = probe.corrections[sphere] = 1.0
+        for tissue, here in zip(self._tissues, touches, strict=True):
+            if here:
+                _correct(tissue, here)
+            tissue.advance()
+
+
+def touched_faces(
+    centre: Vector, reach: float, nodes: Vector, faces: Indices
+) -> tuple[Indices, Vector, Vector]:
+    """Return the faces nearer than `reach` (m) to `centre`, shape (f, 3), the barycentric coordinates of
+    their nearest points, and their distances (m).
+    """
+    corners = nodes[faces]  # (f, 3, 3)
+    near = ((corners.min(axis=1) < centre + reach) & (corners.max(axis=1) > centre - reach)).all(axis=1)
+    weights, distance = closest_points(centre, corners[near])
+    within = distance < reach
+    return faces[near][within], weights[within], distance[within]
+
+
+def _touch(tissue: Tissue, probe: Probe, sphere: int) -> _Touch | None:
+    reach = float(probe.radii[sphere]) + _BAND_M
+    faces, weights, distance = touched_faces(
+        probe.positions[sphere], reach, tissue.organ.nodes, tissue.organ.touchable
+    )
+    if not len(faces):
+        return None
+    share, s = reach - distance, np.einsum("fi,fi->f", weights, weights)
+    guess = float(share @ ((1.0 + s) ** 2 / (4.0 * s)) / share.sum())
+    touched, place = np.unique(faces, return_inverse=True)
+    parts = np.bincount(place.ravel(), (share[:, None] * weights).ravel()) / share.sum() + _LEAST_PART
+    return _Touch(probe, sphere, float(distance.min()), guess, touched, parts)
+
+
+def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
+    """Correct the guesses by what the nodes receive; where spheres share a node, by the parts that should
+    fall to it.
+    """
+    tied = tissue.organ.anchored | tissue.organ.held
+    received = tissue.received(np.unique(np.concatenate([touch.nodes for touch in touches])))
+    size = [float(np.linalg.norm(touch.push)) for touch in touches]
+    pushed = np.zeros(len(received))
+    for touch, force in zip(touches, size, strict=True):
+        pushed[touch.nodes] += force * touch.parts
+    for touch, force in zip(touches, size, strict=True):
+        probe, i = touch.probe, touch.sphere
+        if force > _LEAST_FORCE_N and not tied[touch.nodes].any():
+            felt = (force * touch.parts / pushed[touch.nodes]) @ received[touch.nodes] @ touch.push / force
+            needed = force / max(felt, force / _LARGEST_GAIN)
+            probe.corrections[i] += _FILTER * (
+                min(max(needed, 1.0), _LARGEST_GAIN) / touch.guess - probe.corrections[i]
+            )
+        probe.gains[i] = min(max(touch.guess * probe.corrections[i], 1.0), _LARGEST_GAIN)
+
+
+def closest_points(point: Vector, corners: Vector) -> tuple[Vector, Vector]:
+    """Return the barycentric coordinates, shape (f, 3), of the points of triangles nearest to `point` (m),
+    and their distances (m).
+
+    The nearest point is the foot of the perpendicular if that lies inside, else it lies on an edge.
+    """
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal, to_point = np.cross(b - a, c - a), point - a
+    square = np.einsum("fi,fi->f", normal, normal)
+    on_c = np.einsum("fi,fi->f", np.cross(b - a, to_point), normal) / square
+    on_b = np.einsum("fi,fi->f", np.cross(to_point, c - a), normal) / square
+    candidates = np.zeros((4, len(corners), 3))
+    candidates[0] = np.stack([1.0 - on_b - on_c, on_b, on_c], axis=1)
+    for i, (start, end) in enumerate(((0, 1), (1, 2), (2, 0)), start=1):
+        edge = corners[:, end] - corners[:, start]
+        along = np.clip(
+            np.einsum("fi,fi->f", point - corners[:, start], edge) / np.einsum("fi,fi->f", edge, edge),
+            0.0,
+            1.0,
+        )
+        candidates[i, :, start], candidates[i, :, end] = 1.0 - along, along
+    distance = np.linalg.norm(np.einsum("kfi,fij->kfj", candidates, corners) - point, axis=2)
+    distance[0, (candidates[0] < 0.0).any(axis=1)] = np.inf
+    best, face = distance.argmin(axis=0), np.arange(len(corners))
+    return candidates[best, face], distance[best, face]

@@ -1,0 +1,260 @@
+"""Grasp of tissue: fingers that close on an organ take hold of its nodes, opening lets go, too strong a pull
+tears loose.
+
+Friction of spheres on Bullet's tissue creeps, so what is held is tied: nodes are anchored to the proxies, and
+an anchor passes a force on whole. Rules and figures: docs/decisions/0016-tissue-grasp.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.bullet.organs.organ import Organ
+from engines.bullet.probes.params import GraspParams
+from engines.bullet.probes.probe import Probe
+from hub.participant import Value
+from schemas.ports import Port
+from schemas.ros import Header, Time
+from schemas.trocar_msgs import TissueGrasp
+from schemas.vectors import Vector
+
+__all__ = ["Grasp", "grasp_ports", "nothing_held"]
+
+_CLOSING_M = 0.5e-3
+"""By how much the fingers must have closed on tissue to take hold, and opened from there to let go: half of
+what two jaws come nearer.
+"""
+
+_SHUT_M = 0.5e-3
+"""Gap between fingers that have closed as far as they go."""
+
+_SQUEEZE_N = 0.1
+"""Force with which tissue between fingers keeps each of them from closing, from which on they have it."""
+
+
+def grasp_ports(probe: str) -> tuple[Port, ...]:
+    """Return the ports of a probe that may grasp."""
+    return (
+        Port(
+            name=f"{probe}/held",
+            causality="output",
+            type="std_msgs/msg/Float64",
+            description="1 while tissue is held, else 0",
+        ),
+        Port(
+            name=f"{probe}/pull",
+            causality="output",
+            size=3,
+            unit="N",
+            frame="world",
+            description="force on the tissue that is held",
+        ),
+        Port(
+            name=f"{probe}/lift",
+            causality="output",
+            type="std_msgs/msg/Float64",
+            unit="m",
+            description="mean rise of the nodes held, since time 0",
+        ),
+        Port(
+            name=f"{probe}/events",
+            causality="output",
+            type=TissueGrasp.ros_type,
+            variability="event",
+            description="grasped, released, torn",
+        ),
+    )
+
+
+def nothing_held(probe: str) -> dict[str, Value]:
+    """Return what the ports say of a probe that touches nothing."""
+    return {
+        f"{probe}/held": np.zeros(1),
+        f"{probe}/pull": np.zeros(3),
+        f"{probe}/lift": np.zeros(1),
+        f"{probe}/events": (),
+    }
+
+
+@dataclass(frozen=True)
+class _Hold:
+    """What is held of one organ."""
+
+    organ: Organ
+    nodes: NDArray[np.int64]
+    anchors: list[int]
+    rest: Vector
+    """Heights of the nodes at time 0, m."""
+
+
+class Grasp:
+    """Watches the fingers of one probe, and ties tissue to them."""
+
+    def __init__(self, params: GraspParams, probe: Probe, organs: list[Organ]) -> None:
+        """Watch `probe`, whose fingers may take hold of `organs`."""
+        self._params, self._probe, self._organs = params, probe, organs
+        self._spheres = np.arange(len(probe.radii)).reshape(params.fingers, -1)  # (fingers, spheres of each)
+        self._rest = [organ.nodes[:, 2].copy() for organ in organs]
+        self._holds: list[_Hold] = []
+        self._widest = 0.0
+        """Spread of the fingers when they were widest since they touch tissue, or, while they hold it, when
+        they took hold, m.
+        """
+        self._held, self._pull, self._lift = np.zeros(1), np.zeros(3), np.zeros(1)
+        self.outputs = nothing_held(probe.name)
+
+    def update(self, t: int, *, looked: bool) -> None:
+        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches
+        them, are those of now.
+        """
+        events: tuple[TissueGrasp, ...] = ()
+        if self._holds:
+            self._pull[:] = self._probe.forces[self._probe.held].sum(axis=0)
+            if float(self._pull @ self._pull) > self._params.hold**2:
+                events = self._let_go("torn", t)
+            elif looked:
+                events = self._watch_hold(t)
+        elif looked:
+            events = self._watch(t)
+        self._say(events)
+
+    @property
+    def state(self) -> tuple[Vector, ...]:
+        """What it remembers: the spread it compares with, outputs, and the nodes held."""
+        return (
+            np.array([self._widest]),
+            self._pull,
+            self._lift,
+            *(hold.nodes.astype(np.float64) for hold in self._holds),
+        )
+
+    def _spread(self) -> float:
+        """Return how far the middles of the instrument's fingers are from the middle of all (m), on average."""
+        middles = self._probe.targets[self._spheres].mean(axis=1)  # (fingers, 3)
+        return float(np.linalg.norm(middles - middles.mean(axis=0), axis=1).mean())
+
+    def _watch_hold(self, t: int) -> tuple[TissueGrasp, ...]:
+        """Let go if the fingers have opened; else see how far the tissue is lifted."""
+        if self._spread() > self._widest + _CLOSING_M:
+            return self._let_go("released", t)
+        self._lift[0] = np.concatenate(
+            [hold.organ.nodes[hold.nodes, 2] - hold.rest for hold in self._holds]
+        ).mean()
+        return ()
+
+    def _watch(self, t: int) -> tuple[TissueGrasp, ...]:
+        """Take hold if at least two fingers touch tissue, have closed since they do, and cannot close any
+        further.
+        """
+        touching = self._probe.touching[self._spheres].max(axis=1)
+        if touching.sum() < 2:
+            self._widest = 0.0
+            return ()
+        spread = self._spread()
+        self._widest = max(self._widest, spread)
+        if spread > self._widest - _CLOSING_M:
+            return ()
+        outward = self._outward()
+        squeezed = touching & (
+            -(self._probe.forces[self._spheres].sum(axis=1) * outward).sum(axis=1) >= _SQUEEZE_N
+        )
+        if squeezed.sum() >= 2:
+            return self._take(squeezed, outward, spread, t)
+        if self._gap(touching) <= _SHUT_M:
+            return self._take(touching, outward, spread, t)
+        return ()
+
+    def _outward(self) -> Vector:
+        """Return the direction from the middle of all fingers to each, shape (fingers, 3)."""
+        middles = self._probe.positions[self._spheres].mean(axis=1)
+        arms = middles - middles.mean(axis=0)
+        return arms / np.maximum(np.linalg.norm(arms, axis=1, keepdims=True), 1e-12)
+
+    def _gap(self, fingers: NDArray[np.bool_]) -> float:
+        """Return the least gap (m) between spheres of different ones of these fingers."""
+        spheres = self._spheres[fingers]
+        of = np.repeat(np.arange(len(spheres)), spheres.shape[1])
+        positions, radii = self._probe.positions[spheres.ravel()], self._probe.radii[spheres.ravel()]
+        gaps = np.linalg.norm(positions[:, None] - positions, axis=2) - radii[:, None] - radii
+        return float(gaps[of[:, None] != of].min())
+
+    def _take(
+        self, fingers: NDArray[np.bool_], outward: Vector, spread: float, t: int
+    ) -> tuple[TissueGrasp, ...]:
+        """Tie the nodes that are within reach of where these fingers face the others, each to the nearest
+        sphere.
+        """
+        probe, spheres = self._probe, self._spheres[fingers].ravel()
+        radii = probe.radii[spheres]
+        # (k, 3): where the spheres face the other fingers
+        pads = probe.positions[spheres] - radii[:, None] * np.repeat(
+            outward[fingers], self._spheres.shape[1], axis=0
+        )
+        for organ, rest in zip(self._organs, self._rest, strict=True):
+            distances = np.linalg.norm(organ.nodes[:, None] - pads, axis=2) - radii  # (n, k)
+            nodes = np.flatnonzero(
+                (distances.min(axis=1) <= self._reach(organ)) & ~organ.anchored & ~organ.held
+            )
+            if nodes.size:
+                nearest: list[int] = spheres[distances[nodes].argmin(axis=1)].tolist()
+                anchors = [
+                    organ.anchor(node, probe.bodies[sphere])
+                    for node, sphere in zip(nodes.tolist(), nearest, strict=True)
+                ]
+                self._holds.append(_Hold(organ, nodes, anchors, rest[nodes]))
+        if self._holds:
+            self._widest = spread
+            self._set_held(spheres, held=True)
+        return self._events("grasped", t)
+
+    def _reach(self, organ: Organ) -> float:
+        return organ.mean_edge / sqrt(3.0) if self._params.reach is None else self._params.reach
+
+    def _let_go(self, why: str, t: int) -> tuple[TissueGrasp, ...]:
+        events = self._events(why, t)
+        for hold in self._holds:
+            for node, anchor in zip(hold.nodes.tolist(), hold.anchors, strict=True):
+                hold.organ.release(node, anchor)
+        self._set_held(np.flatnonzero(self._probe.held), held=False)
+        self._holds.clear()
+        self._widest = 0.0
+        self._pull[:], self._lift[:] = 0.0, 0.0
+        return events
+
+    def _set_held(self, spheres: NDArray[np.int64], *, held: bool) -> None:
+        """Let these spheres pass through what they hold, so that all force goes through the anchors, or touch
+        it again.
+        """
+        self._probe.held[spheres] = held
+        self._probe.gains[spheres] = 1.0
+        numbers: list[int] = spheres.tolist()
+        for hold in self._holds:
+            for sphere in numbers:
+                hold.organ.let_touch(self._probe.bodies[sphere], on=not held)
+
+    def _events(self, event: str, t: int) -> tuple[TissueGrasp, ...]:
+        header, force = Header(stamp=Time.from_ns(t), frame_id="world"), float(np.linalg.norm(self._pull))
+        return tuple(
+            TissueGrasp(
+                header=header,
+                event=event,
+                body=hold.organ.name,
+                nodes=hold.nodes.astype(np.uint32),
+                force_n=force,
+            )
+            for hold in self._holds
+        )
+
+    def _say(self, events: tuple[TissueGrasp, ...]) -> None:
+        name = self._probe.name
+        self._held[0] = float(bool(self._holds))
+        self.outputs = {
+            f"{name}/held": self._held,
+            f"{name}/pull": self._pull,
+            f"{name}/lift": self._lift,
+            f"{name}/events": events,
+        }

@@ -1,0 +1,156 @@
+"""What a scenario may say about a probe: its spheres, their virtual coupling, and fingers that grasp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from schemas.quantity import Damping, Force, Length, Mass, Stiffness
+from schemas.vectors import Vector
+
+__all__ = ["Coupling", "GraspParams", "ProbeParams"]
+
+_STIFFNESS_RATIO = 20.0
+"""Virtual coupling to contact: a quick press loses 1/21, 5 %, of its way to the coupling; what lasts loses
+nothing, see `Coupling.reset_time`.
+"""
+
+_STEP_SHARE = 0.5
+"""Sub-step times sqrt(k / m): keeps the explicit spring and damper of a proxy well inside stability (explicit
+limit with critical damping: 2 (sqrt(2) - 1)).
+"""
+
+_RESET_SHARE = 4.0
+"""Reset time times sqrt(k / m): slow beside the proxy's own oscillation."""
+
+_PASSIVE_SHARE = 0.5
+"""Of the tissue's damping, what the reset may use up: contacts may be twice as stiff as estimated, and a
+scheme of finite steps lags too.
+"""
+
+Radius = Annotated[Length, Field(ge=0.5e-3)]
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """The spring and damper between each proxy and its sphere on the instrument, and the mass of the proxy."""
+
+    stiffness: float
+    """k, N/m."""
+    mass: float
+    """m, kg."""
+    damping: float
+    """b, N s/m."""
+    reset_time: float | None
+    """T, s, of a spring that is proportional and integral: with it, the proxy of an instrument at rest stands
+    where its sphere is, whatever the force.
+
+    None: the spring is proportional, and yields by force / k.
+    """
+
+    @property
+    def longest_step(self) -> float:
+        """Longest sub-step (s) of the proxy: 0.5 sqrt(m / k)."""
+        return _STEP_SHARE * sqrt(self.mass / self.stiffness)
+
+
+class GraspParams(BaseModel):
+    """Fingers that may take hold of tissue. SI units after validation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    fingers: int = Field(
+        default=2,
+        ge=2,
+        description="how many; each has the same number of the probe's spheres, finger after finger",
+    )
+    hold: Force = Field(
+        default=5.0,
+        gt=0,
+        description=(
+            "pull at which the tissue tears loose; default: that for which the jaws of laparoscopic graspers"
+            " are compared (Heijnsdijk et al. 2004)"
+        ),
+    )
+    reach: Length | None = Field(
+        default=None,
+        ge=0,
+        description=(
+            "from a sphere to the nodes it takes; default: of an organ's mean edge 1 / sqrt(3), within which"
+            " every point has a node"
+        ),
+    )
+
+
+class ProbeParams(BaseModel):
+    """The spheres of an instrument and their virtual coupling. SI units after validation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    spheres: int | None = Field(
+        default=None,
+        ge=1,
+        le=100,
+        description="contact spheres bonded as points; without it the probe is one sphere on a frame",
+    )
+    radius: Radius | tuple[Radius, ...] = Field(
+        default=5e-3, description="one for all spheres, or one for each"
+    )
+    stiffness: Stiffness | None = Field(
+        default=None,
+        gt=0,
+        description="k of the virtual coupling; default: 20 times that of the stiffest organ at the contact",
+    )
+    mass: Mass | None = Field(
+        default=None,
+        gt=0,
+        description="m of each proxy; default: the least for which the sub-step is at most 0.5 sqrt(m / k)",
+    )
+    damping: Damping | None = Field(
+        default=None, gt=0, description="b of the virtual coupling; default: critical, 2 sqrt(k m)"
+    )
+    grasp: GraspParams | None = Field(
+        default=None, description="lets the spheres take hold of tissue, as fingers"
+    )
+
+    @model_validator(mode="after")
+    def _a_radius_for_each(self) -> ProbeParams:
+        if isinstance(self.radius, tuple) and len(self.radius) != (self.spheres or 1):
+            raise ValueError(
+                f"{len(self.radius)} radii for {self.spheres or 1} spheres: state one radius for all, or one"
+                " for each"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _spheres_for_each_finger(self) -> ProbeParams:
+        if self.grasp is not None and (self.spheres or 1) % self.grasp.fingers:
+            raise ValueError(
+                f"{self.spheres or 1} spheres on {self.grasp.fingers} fingers: every finger needs the same"
+                " number of them"
+            )
+        return self
+
+    @property
+    def radii(self) -> Vector:
+        """Radius (m) of every sphere, shape (n,)."""
+        return np.full(self.spheres or 1, self.radius, dtype=np.float64)
+
+    def coupling(self, contact_stiffness: float, contact_damping: float, timestep: float) -> Coupling:
+        """Return what is stated, and the rest by rule from the tissue and the sub-step (s).
+
+        contact_stiffness: k_c of the tissue, N/m. contact_damping: its ratio d of damping to stiffness, s. A
+        spring with reset gives back more than it took, in cycles of frequency w at most the share w T k_c /
+        k; the tissue's damping takes up w d. So there is a reset where T <= 0.5 d k / k_c.
+        """
+        stiffness = self.stiffness or _STIFFNESS_RATIO * contact_stiffness
+        mass = self.mass or stiffness * (timestep / _STEP_SHARE) ** 2
+        reset = _RESET_SHARE * sqrt(mass / stiffness)
+        passive = reset <= _PASSIVE_SHARE * contact_damping * stiffness / contact_stiffness
+        return Coupling(
+            stiffness, mass, self.damping or 2.0 * sqrt(stiffness * mass), reset if passive else None
+        )

@@ -1,0 +1,221 @@
+"""A probe: the spheres that stand in the tissue's world for those of an instrument that moves in another
+engine.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engines.bullet.probes.params import Coupling, ProbeParams
+from engines.bullet.world import COLLISION_MARGIN_M
+from hub.participant import BondPlan, ForceSide, Inputs
+from schemas.errors import SessionError
+from schemas.ports import BondSide
+from schemas.vectors import Vector
+
+__all__ = ["Probe"]
+
+_LOCKED_INERTIA = 1e3
+"""Moment of inertia (kg m^2) that keeps a sphere from rolling off on friction, which the instrument does not
+let it do.
+"""
+
+_PROXY_GROUP, _ALL_BUT_PROXIES = 1 << 6, ~(1 << 6)
+"""Collision filter: proxies pass through each other, as neighbours on an instrument overlap.
+
+Bullet's own groups end at 1 << 5.
+"""
+
+
+class Probe:
+    """Proxies in Bullet, each drawn by a virtual coupling after the predicted motion of its sphere on the
+    instrument.
+    """
+
+    def __init__(
+        self,
+        params: ProbeParams,
+        coupling: Coupling,
+        bond: BondSide,
+        plan: BondPlan,
+        gravity: float,
+        client: int,
+    ) -> None:
+        """Create the spheres far above everything; the first step puts them where the other side is."""
+        import pybullet as bullet
+
+        self.name = bond.name
+        self.radii = params.radii
+        """m, shape (n,)."""
+        n = len(self.radii)
+        self.positions = np.full((n, 3), 1e3)
+        """Centres, m, frame `world`, shape (n, 3)."""
+        self.velocities = np.zeros((n, 3))
+        """m/s, frame `world`, shape (n, 3)."""
+        self.gains = np.ones(n)
+        """How much larger the force in Bullet is than that of the coupling, to make up for what contacts lose
+        (see `contact`), shape (n,).
+        """
+        self.corrections = np.ones(n)
+        """How much the measured gains differ from those that the geometry of the contact suggests, shape
+        (n,).
+        """
+        self.held = np.zeros(n, dtype=np.bool_)
+        """Which spheres have tissue anchored to them; anchors lose nothing of a force, so their gain is 1.
+
+        Shape (n,).
+        """
+        self.touching = np.zeros(n, dtype=np.bool_)
+        """Which spheres were at an organ when last looked at, shape (n,)."""
+        self.contacts = np.zeros((n, 3))
+        """Force (N) with which each proxy pressed on what it touched in the last sub-step, as Bullet has it,
+        shape (n, 3).
+        """
+        self._side = ForceSide(bond, plan)
+        self._coupling = coupling
+        self._weight = np.array([0.0, 0.0, coupling.mass * gravity])
+        self._spring, self._damper = np.zeros(bond.size), np.zeros(bond.size)
+        # (n, 3) each: views of the same numbers
+        self._springs, self._dampers = (
+            forces[: 3 * n].reshape(n, 3) for forces in (self._spring, self._damper)
+        )
+        self.targets = self.positions
+        """Centres of the spheres on the instrument at the end of the step, as predicted, m, frame `world`,
+        shape (n, 3).
+        """
+        self._reset = np.zeros((n, 3))  # force of the spring when the proxy is at its target
+        self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
+        self._placed = False
+        self._client = client
+        self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
+        """Bullet's number of every proxy."""
+        self._read_pose, self._read_velocity, self._apply, self._frame = (
+            bullet.getBasePositionAndOrientation,
+            bullet.getBaseVelocity,
+            bullet.applyExternalForce,
+            bullet.WORLD_FRAME,
+        )
+
+    @property
+    def forces(self) -> Vector:
+        """Force (N) of the coupling on every proxy in the last sub-step, or at the end of the last step,
+        shape (n, 3).
+        """
+        return self._springs + self._dampers
+
+    def begin(self, inputs: Inputs, h: float) -> None:
+        """Take the other side's motion at the start of a step of `h` seconds."""
+        self._side.begin(inputs, h)
+        if not self._placed:
+            self._place()
+
+    def push(self, tau: float, dt: float) -> None:
+        """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, taken at its middle."""
+        self._stretch(tau, 0.5 * dt)
+        self._side.add(self._spring, self._damper, tau, dt)
+        self._reset += self._reset_rate * dt * (self._springs - self._reset)
+        self._applied = self.gains[:, None] * (self._springs + self._dampers)
+        for body, force, position in zip(
+            self.bodies, (self._applied + self._weight).tolist(), self.positions.tolist(), strict=True
+        ):
+            self._apply(body, -1, force, position, self._frame, physicsClientId=self._client)
+
+    def read(self, dt: float) -> None:
+        """Take positions and velocities from Bullet after a sub-step of `dt` seconds."""
+        client, before = self._client, self.velocities
+        self.positions = np.array([self._read_pose(body, physicsClientId=client)[0] for body in self.bodies])
+        self.velocities = np.array(
+            [self._read_velocity(body, physicsClientId=client)[0] for body in self.bodies]
+        )
+        self.contacts = self._applied - self._coupling.mass / dt * (self.velocities - before)
+
+    def result(self, t: int, h: float) -> dict[str, Vector]:
+        """Return force or wrench, and work, at the end `t` (ns) of a step of `h` seconds.
+
+        Raises SessionError if they are not finite.
+
+        A wrench acts at the centre of its sphere: its torque is zero, as the sphere does not resist being
+        turned.
+        """
+        self._stretch(h, 0.0)
+        if not np.isfinite(self._spring).all():
+            sphere = int(np.flatnonzero(~np.isfinite(self._springs).all(axis=1))[0])
+            raise SessionError(
+                f"probe '{self.name}', sphere {sphere}, is at {self.positions[sphere]} at {t * 1e-9:.6g} s."
+                " The likeliest cause is a contact that became unstable: shorten the timestep, or lower the"
+                " probe's stiffness"
+            )
+        return self._side.result(self._spring, self._damper)
+
+    @property
+    def idle(self) -> dict[str, Vector]:
+        """Force or wrench, and work, before anything has moved."""
+        return {self._side.force_port: np.zeros(len(self._spring)), self._side.work_port: np.zeros(1)}
+
+    @property
+    def state(self) -> tuple[Vector, ...]:
+        """Positions, velocities, gains and what the bond remembers."""
+        return self.positions, self.velocities, self.gains, self.corrections, self._reset, self._side.state
+
+    def _stretch(self, tau: float, ahead: float) -> None:
+        """Set spring and damper `tau` seconds into the step, with the proxies where they will be `ahead`
+        seconds from now.
+        """
+        self.targets, velocities = self._motion(tau)
+        self._springs[:] = (
+            self._coupling.stiffness * (self.targets - self.positions - ahead * self.velocities) + self._reset
+        )
+        self._dampers[:] = self._coupling.damping * (velocities - self.velocities)
+
+    def _motion(self, tau: float) -> tuple[Vector, Vector]:
+        """Return where the spheres of the instrument are (m) and their velocities (m/s), shapes (n, 3), `tau`
+        seconds into the step.
+        """
+        shape = self.positions.shape
+        return self._side.position(tau).reshape(shape), self._side.velocity(tau)[
+            : self.positions.size
+        ].reshape(shape)
+
+    def _place(self) -> None:
+        import pybullet as bullet
+
+        positions, velocities = self._motion(0.0)
+        self.positions, self.velocities = positions.copy(), velocities.copy()
+        for body, position, velocity in zip(
+            self.bodies, positions.tolist(), velocities.tolist(), strict=True
+        ):
+            bullet.resetBasePositionAndOrientation(
+                body, position, [0.0, 0.0, 0.0, 1.0], physicsClientId=self._client
+            )
+            bullet.resetBaseVelocity(body, velocity, [0.0, 0.0, 0.0], physicsClientId=self._client)
+        self._placed = True
+
+    def _sphere(self, radius: float) -> int:
+        """Create a proxy of `radius` (m); return its number."""
+        import pybullet as bullet
+
+        client = self._client
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_SPHERE, radius=radius - COLLISION_MARGIN_M, physicsClientId=client
+        )
+        # A multi-body: with maximal coordinates the sphere is not finite after its first step (pybullet
+        # 3.2.7).
+        body = bullet.createMultiBody(
+            self._coupling.mass,
+            shape,
+            basePosition=self.positions[0].tolist(),
+            useMaximalCoordinates=False,
+            physicsClientId=client,
+        )
+        bullet.setCollisionFilterGroupMask(body, -1, _PROXY_GROUP, _ALL_BUT_PROXIES, physicsClientId=client)
+        bullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=1.0,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            localInertiaDiagonal=[_LOCKED_INERTIA] * 3,
+            activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=client,
+        )
+        return int(body)

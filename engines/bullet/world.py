@@ -1,0 +1,70 @@
+"""Worlds of Bullet: physics servers inside this process, several side by side, and what holds in all of them."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from schemas.errors import MissingExtraError, SessionError
+
+__all__ = ["COLLISION_MARGIN_M", "connect", "disconnect", "quiet"]
+
+COLLISION_MARGIN_M = 1e-4
+"""Distance at which Bullet lets contact begin; the spheres of probes are smaller by it."""
+
+
+@contextmanager
+def quiet(descriptor: int = 1) -> Generator[None]:
+    """Keep what Bullet prints while it connects and loads off a file descriptor: stdout, which may carry
+    JSON, or stderr (2).
+
+    Bullet prints through C's buffers, which therefore are flushed before the descriptor is put back.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    libc = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
+    saved = os.dup(descriptor)
+    try:
+        with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  a device, not a file
+            os.dup2(nowhere.fileno(), descriptor)
+        yield
+    finally:
+        libc.fflush(None)
+        os.dup2(saved, descriptor)
+        os.close(saved)
+
+
+def connect(part: str, timestep: float, gravity: float) -> int:
+    """Return a new world of deformable bodies, stepped by `timestep` (s), with `gravity` (m/s^2) along -z.
+
+    Raises MissingExtraError, naming `part`, where pybullet is not installed.
+    """
+    try:
+        with quiet(2):  # on import it tells its build time
+            import pybullet as bullet
+    except ImportError as error:
+        raise MissingExtraError(part, "bullet", "pybullet") from error
+    with quiet():
+        client = bullet.connect(bullet.DIRECT)
+        if client < 0:
+            raise SessionError(
+                f"{part}: Bullet gave no physics client; it allows a limited number in one process, so spread"
+                " the engines over hosts"
+            )
+        bullet.resetSimulation(bullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
+    bullet.setTimeStep(timestep, physicsClientId=client)
+    # With split impulses, spheres sink twice as deep into faces of soft bodies.
+    bullet.setPhysicsEngineParameter(useSplitImpulse=0, physicsClientId=client)
+    bullet.setGravity(0.0, 0.0, -gravity, physicsClientId=client)
+    return client
+
+
+def disconnect(client: int) -> None:
+    """Give a world back."""
+    import pybullet as bullet
+
+    with quiet():
+        bullet.disconnect(physicsClientId=client)

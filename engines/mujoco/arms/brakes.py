@@ -1,0 +1,61 @@
+"""The brakes of the ECM, which hold its joints where they are when its drives go off."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.params import SceneParams
+from schemas.vectors import Vector
+
+__all__ = ["Brakes", "prepare"]
+
+_BRAKED = "ECM"
+_RIGID = {"solref": [1e-3, 1.0], "solimp": [0.999, 0.9999, 1e-4, 0.5, 2.0]}
+
+
+def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
+    """Add the brakes to the model of `scene`, open."""
+    if _BRAKED in scene.arms:
+        for joint in scene.arms[_BRAKED].chain.joints:
+            name = f"{_BRAKED}/{joint.name}"
+            spec.add_equality(
+                name=f"{name}/brake",
+                type=mujoco.mjtEq.mjEQ_JOINT,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                name1=name,
+                active=False,
+                **_RIGID,
+            )
+
+
+class Brakes:
+    """The brakes of the ECM, which hold its joints where they are when its drives go off."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams) -> None:
+        """Find the brakes that `prepare` added."""
+        joints = [joint.name for joint in scene.arms[_BRAKED].chain.joints] if _BRAKED in scene.arms else []
+        self._model, self._data = model, data
+        self._locks = [model.equality(f"{_BRAKED}/{joint}/brake").id for joint in joints]
+        self._positions = [int(model.joint(f"{_BRAKED}/{joint}").qposadr[0]) for joint in joints]
+        self._on = False
+        self._state = np.array([*model.eq_data[self._locks, 0], self._on], float)
+
+    def set(self, on: bool) -> None:
+        """Close or open the brakes; closed ones stay where they closed."""
+        if on != self._on:
+            self._data.eq_active[self._locks] = on
+            self.state = np.array([*self._data.qpos[self._positions], on])
+
+    @property
+    def state(self) -> Vector:
+        """What MuJoCo's own state does not hold: where the brakes closed, and whether they are; the same
+        array at every call.
+        """
+        return self._state
+
+    @state.setter
+    def state(self, state: Vector) -> None:
+        self._state[:] = state
+        self._model.eq_data[self._locks, 0] = state[:-1]
+        self._on = bool(state[-1])

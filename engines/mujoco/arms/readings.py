@@ -1,0 +1,80 @@
+"""What the arms report, out of the model's sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.mujoco.arms.servos import Servos
+from engines.mujoco.model import FINGERS, first_sensor
+from engines.mujoco.model.poses import ROS_ORDER
+from engines.mujoco.params import EcmParams, PsmParams, has_jaw
+from robots.dvrk.setup_joints import CartArm
+from schemas.vectors import Vector
+
+__all__ = ["Readings"]
+
+_JAW = np.array(
+    [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.5, 0.5]]
+)
+"""Position, velocity and effort of a jaw of those of its two fingers: opened by both, with the torque of
+either.
+"""
+_ROLLING_JAW = np.zeros((6, 9))
+"""The same of a jaw and its roller by turns, of those of the two fingers and the roller."""
+_ROLLING_JAW[::2, :6], _ROLLING_JAW[1::2, 6:] = _JAW, np.eye(3)
+
+
+class Readings:
+    """Views of the model's sensors by output port; what is no view is copied when it is due."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        arms: Mapping[CartArm, PsmParams | EcmParams],
+        servos: Servos,
+    ) -> None:
+        """Report on `arms`."""
+        self._sensors, self._qpos = data.sensordata, np.empty(model.nq)
+        self._positions = data.qpos
+        self._jaws: list[tuple[Vector, Vector, Vector]] = []
+        poses: list[NDArray[np.intp]] = []
+        self._poses = np.empty(7 * len(arms))
+        self.outputs: dict[str, Vector] = {"qpos": self._qpos}
+        for i, (arm, params) in enumerate(arms.items()):
+            first, n = int(model.sensor(first_sensor(arm)).adr[0]), len(params.chain.joints)
+            poses.append(first + 3 * n + ROS_ORDER)
+            self.outputs[f"{arm}/measured_js"] = self._sensors[first : first + 3 * n]
+            self.outputs[f"{arm}/setpoint_js"] = servos.arm_setpoint(arm)
+            self.outputs[f"{arm}/measured_cp"] = self._poses[7 * i : 7 * i + 7]
+            if isinstance(params, PsmParams) and has_jaw(params):
+                fingers = int(model.sensor(f"{arm}/position/{FINGERS[0]}").adr[0])
+                jaw = self.outputs[f"{arm}/jaw/measured_js"] = np.empty(3 * len(params.tool.jaw_joints))
+                matrix = _JAW if params.tool.roller is None else _ROLLING_JAW
+                self._jaws.append((matrix, self._sensors[fingers : fingers + matrix.shape[1]], jaw))
+            elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+                fingers, k, m = (
+                    int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]),
+                    3 * len(hand.joints),
+                    3 * len(hand.links),
+                )
+                self.outputs[f"{arm}/hand/measured_js"] = self._sensors[fingers : fingers + k]
+                self.outputs[f"{arm}/hand/phalanges/measured_js"] = self._sensors[
+                    fingers + k : fingers + k + m
+                ]
+        self._where = np.concatenate(poses)
+        self.update()
+
+    def update(self) -> None:
+        """Bring up to date what is due in every step."""
+        for matrix, fingers, jaw in self._jaws:
+            matrix.dot(fingers, jaw)
+
+    def refresh(self) -> None:
+        """Bring up to date what is published more seldom: the tips' poses and the model's positions."""
+        self._sensors.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
+        self._qpos[:] = self._positions

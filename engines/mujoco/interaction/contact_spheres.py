@@ -1,0 +1,104 @@
+"""The bond at the contact spheres of an instrument inside the running model."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.interaction.mechanics import effective_mass, moment
+from engines.mujoco.model import CONTACT
+from hub.participant import Inputs, MotionSide
+
+__all__ = ["Spheres"]
+
+
+class Spheres:
+    """Views of the model's data that belong to the spheres of one instrument.
+
+    A force stays with the sphere's centre, which moves against the centre of mass of the link that carries
+    it.
+    """
+
+    acts_off_centre = True
+    """So its moment is renewed in every sub-step."""
+
+    def __init__(self, arm: str, motion: MotionSide, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Let `motion` act on the spheres of the instrument of `arm`."""
+        self.motion, self.bond = motion, f"{arm}/{CONTACT}"
+        sites = _sites(arm, model)
+        n, self._carriers = len(sites), model.site_bodyid[sites]
+        first = int(model.sensor(f"{model.site(sites[0]).name}/position").adr[0])
+        self._position, self._velocity = (
+            data.sensordata[first : first + 3 * n],
+            data.sensordata[first + 3 * n : first + 6 * n],
+        )
+        self._centres = self._position.reshape(n, 3)
+        self._bodies = np.unique(self._carriers)
+        self._share = (self._carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
+        self._applied, self._masses = data.xfrc_applied, data.xipos
+        # force, and its moment about the centre of mass of the link that carries the sphere
+        self._loads = np.zeros((n, 6))
+        self._forces, self._moments = self._loads[:, :3], self._loads[:, 3:]
+        self._force = np.zeros(3 * n)
+        self._last = self._position.copy()
+        tip, base = int(model.sensor(f"{arm}/tip/position").adr[0]), model.site(f"{arm}/base").id
+        self._tip, self._to_base = data.sensordata[tip : tip + 3], data.site_xmat[base].reshape(3, 3).T.copy()
+        self._tip_wrench = np.zeros(6)
+        self.outputs = {
+            **motion.result(self._position, self._velocity),
+            f"{arm}/tip_wrench": self._tip_wrench,
+        }
+
+    def begin(self, inputs: Inputs) -> None:
+        """Take the reaction for the step that begins."""
+        self.motion.begin(inputs, self._position, self._velocity)
+        self._push(0.0)
+
+    def renew(self, tau: float) -> None:
+        """Book what was done, and push from `tau` seconds into the step on from where the spheres are."""
+        self._book()
+        self._push(tau)
+
+    def end(self) -> None:
+        """Book what was done, and say what the tip feels."""
+        self._book()
+        self._feel()
+
+    def refresh(self) -> None:
+        """Bring what is remembered of the model up to its present state."""
+        self._last[:] = self._position
+
+    @staticmethod
+    def least_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+        """Return the least mass (kg) that forces on the spheres of `arm` meet, whatever their directions."""
+        sites = _sites(arm, model)
+        jacobian = np.zeros((len(sites), 3, model.nv))
+        for rows, site in zip(jacobian, sites, strict=True):
+            mujoco.mj_jacSite(model, data, rows, None, site)
+        return effective_mass(jacobian.reshape(-1, model.nv), model, data)
+
+    def _push(self, tau: float) -> None:
+        self._force = self.motion.force(tau, self._position, self._velocity)
+        self._forces[:] = self._force.reshape(-1, 3)
+        self._moments[:] = moment(self._centres - self._masses.take(self._carriers, 0), self._forces)
+        self._applied[self._bodies] = self._share @ self._loads
+
+    def _book(self) -> None:
+        self.motion.add(self._force, self._position - self._last)
+        self._last[:] = self._position
+
+    def _feel(self) -> None:
+        self._to_base.dot(self._forces.sum(axis=0), self._tip_wrench[:3])
+        self._to_base.dot(moment(self._centres - self._tip, self._forces).sum(axis=0), self._tip_wrench[3:])
+
+
+def _sites(arm: str, model: mujoco.MjModel) -> list[int]:
+    """Return the sites of the spheres in the order in which the instrument lists them, which is that of their
+    sensors.
+    """
+    sensors = [model.sensor(i) for i in range(model.nsensor)]
+    return [
+        int(sensor.objid[0])
+        for sensor in sensors
+        if sensor.name.startswith(f"{arm}/{CONTACT}/") and sensor.name.endswith("/position")
+    ]

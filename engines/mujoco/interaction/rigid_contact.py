@@ -1,0 +1,115 @@
+"""What rigid things do to an instrument: table, objects, cart and other arms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.mujoco.interaction.mechanics import moment
+from engines.mujoco.model import instrument_body
+from schemas.vectors import Vector
+
+__all__ = ["RigidContact"]
+
+
+class RigidContact:
+    """Sums the contact forces on the instruments of some arms over the sub-steps of a step, and gives their
+    means.
+
+    What an instrument holds counts through its contacts with it, or through the weld. Contacts of an
+    instrument with itself do not.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Iterable[str]) -> None:
+        """Watch the instruments of `arms`."""
+        self._model, self._data, arms = model, data, list(arms)
+        self._owner = _owners(model, arms)
+        self._welds = [
+            (weld, arms.index(arm)) for weld in range(model.neq) if (arm := _welded_to(model, weld)) in arms
+        ]
+        tips = np.array([int(model.sensor(f"{arm}/tip/position").adr[0]) for arm in arms], int)
+        self._tips = tips[:, None] + np.arange(3)
+        self._to_base: list[Vector] = [
+            np.kron(np.eye(2), data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).T) for arm in arms
+        ]
+        self._arms = np.arange(len(arms))
+        self._sums, self._means = np.zeros((len(arms), 6)), np.zeros((len(arms), 6))
+        self._substeps = 0
+        self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
+
+    def add(self) -> None:
+        """Add the sub-step whose forces are solved and whose contacts are not yet found anew: between
+        `mj_step2` and `mj_step1`.
+        """
+        self._substeps += 1
+        if self._data.ncon:
+            self._add_contacts()
+        for weld, owner in self._welds:
+            if self._data.eq_active[weld]:
+                self._add_weld(weld, owner)
+
+    def end(self) -> None:
+        """Bring the outputs up to the mean over the sub-steps since the last call."""
+        for to_base, total, mean in zip(self._to_base, self._sums, self._means, strict=True):
+            to_base.dot(total, mean)
+        self._means /= self._substeps
+        self._sums[:] = 0.0
+        self._substeps = 0
+
+    def _add_contacts(self) -> None:
+        model, data, contact = self._model, self._data, self._data.contact
+        owners = self._owner[contact.geom]  # (contacts, 2)
+        found = (owners[:, 0] != owners[:, 1]).nonzero()[0]
+        if not len(found):
+            return
+        loads = np.empty((len(found), 6))  # on the second geom: force and torque
+        for load, i in zip(loads, found.tolist(), strict=True):
+            mujoco.mj_contactForce(model, data, i, load)
+        loads.reshape(-1, 2, 3)[:] = loads.reshape(-1, 2, 3) @ contact.frame[found].reshape(-1, 3, 3)
+        owners, at, tips = (
+            owners[found, :, None] == self._arms,
+            contact.pos[found],
+            data.sensordata[self._tips],
+        )
+        sides = owners[:, 1] * 1.0 - owners[:, 0]  # (found, arms)
+        loads[:, 3:] += moment(at, loads[:, :3])
+        total = sides.T @ loads
+        total[:, 3:] -= moment(tips, total[:, :3])
+        self._sums += total
+
+    def _add_weld(self, weld: int, owner: int) -> None:
+        """Add the reaction of the object in a weld, whose free joint has the force at its origin in the world
+        and the torque in its own frame.
+        """
+        model, data = self._model, self._data
+        of_weld = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == weld)
+        generalised = np.zeros(model.nv)
+        mujoco.mj_mulJacTVec(model, data, generalised, np.where(of_weld, data.efc_force, 0.0))
+        thing = int(model.eq_obj2id[weld])
+        first = int(model.body_dofadr[thing])
+        force, torque = (
+            generalised[first : first + 3],
+            data.xmat[thing].reshape(3, 3) @ generalised[first + 3 : first + 6],
+        )
+        arm = data.xpos[thing] - data.sensordata[self._tips[owner]]
+        self._sums[owner, :3] -= force
+        self._sums[owner, 3:] -= torque + moment(arm, force)
+
+
+def _owners(model: mujoco.MjModel, arms: list[str]) -> NDArray[np.intp]:
+    """Return for every geom of `model` the index of the arm whose instrument it belongs to, else -1."""
+    owners = np.full(model.nbody, -1)
+    for i, arm in enumerate(arms):
+        owners[model.body(instrument_body(arm)).id] = i
+    for body, parent in enumerate(model.body_parentid.tolist()):  # which comes before it
+        owners[body] = max(owners[body], owners[parent])
+    return owners[model.geom_bodyid]
+
+
+def _welded_to(model: mujoco.MjModel, equality: int) -> str | None:
+    """Return the arm that an equality would weld an object to, if it is such a weld."""
+    is_weld = model.eq_type[equality] == mujoco.mjtEq.mjEQ_WELD
+    return model.body(int(model.eq_obj1id[equality])).name.partition("/")[0] if is_weld else None

@@ -1,0 +1,1 @@
+"""Pictures of a scene: the stereo endoscope, and `trocar render` for recordings."""

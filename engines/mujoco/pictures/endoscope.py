@@ -1,0 +1,227 @@
+"""The stereo endoscope: draws the scene at the joint positions it is given, at a period of its own.
+
+A picture of the state at `t` comes out at the end of the step that begins there, stamped `t`, as a camera
+delivers a frame one period after it was exposed (docs/decisions/0013).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from io import BytesIO
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams
+from engines.mujoco.pictures.skins import SoftBody
+from engines.mujoco.ports import position_count
+from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
+from robots.dvrk.endoscope import EYES, Eye, StereoCamera
+from schemas.errors import MissingExtraError, StateError
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
+from schemas.trocar_msgs import SoftBodyState
+
+if TYPE_CHECKING:
+    from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+
+__all__ = ["Endoscope", "camera_info"]
+
+_log = logging.getLogger(__name__)
+
+
+class Endoscope(Stepped):
+    """Two cameras at the tip of the ECM, or where the scenario puts them."""
+
+    params_model: ClassVar[type[Params]] = EndoscopeParams
+    params: EndoscopeParams
+
+    def __init__(self, name: str, params: EndoscopeParams) -> None:
+        """Take the participant's name and its parameters."""
+        super().__init__(name, params)
+        self._positions = np.zeros(position_count(params))
+        self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.skins}
+        self._frame = f"{name}_left_optical"
+        kinds: dict[str, type[Message]] = {} if params.images == "none" else {"camera_info": CameraInfo}
+        if params.images in ("raw", "both"):
+            kinds["image_raw"] = Image
+        if params.images in ("compressed", "both"):
+            kinds["image_raw/compressed"] = CompressedImage
+        self._pictures = tuple(
+            Port(
+                name=f"{eye}/{kind}",
+                causality="output",
+                type=model.ros_type,
+                variability="event",
+                frame=self._frame,
+            )
+            for eye in EYES
+            for kind, model in kinds.items()
+        )
+        self._scene: EndoscopeScene | None = None
+        self._gl = ""
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """`qpos` of the same scene and the nodes of soft bodies in; per eye, with ROS's names, pictures and
+        their calibration out.
+
+        Pictures are events: none comes before the first step, and none at all on a machine without OpenGL.
+        """
+        qpos = Port(
+            name="qpos",
+            causality="input",
+            size=self._positions.size,
+            description="joint positions of the scene, as the mujoco engine publishes them",
+        )
+        nodes = "positions of the nodes of a soft body; the first message brings its surface"
+        bodies = (
+            Port(
+                name=f"{organ}/nodes",
+                causality="input",
+                type=SoftBodyState.ros_type,
+                frame="world",
+                description=nodes,
+            )
+            for organ in self._bodies
+        )
+        return (qpos, *bodies, *self._pictures)
+
+    def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
+        """Build the scene, unless soft bodies are missing from it.
+
+        Where there is no OpenGL, say so once and publish no pictures.
+        """
+        if not self._pictures:
+            return {}
+        for package in ("mujoco", "PIL"):
+            if find_spec(package) is None:
+                raise MissingExtraError(
+                    f"participant '{self.name}' (kind endoscope)",
+                    "mujoco",
+                    "pillow" if package == "PIL" else package,
+                )
+        opengl.import_mujoco()
+        found = opengl.find()
+        self._gl = found.name
+        if found.name and not self._bodies:
+            self._build()
+        elif not found.name:
+            _log.warning(
+                "participant '%s' publishes no pictures: no OpenGL works here (%s). To mend it: %s",
+                self.name,
+                found.detail,
+                opengl.REMEDY,
+            )
+        return self._outputs({})
+
+    def _build(self) -> EndoscopeScene:
+        from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+
+        self._scene = EndoscopeScene(self.params, self._gl, self._bodies)
+        return self._scene
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
+        """Draw the state at `t`.
+
+        Raises SessionError if a soft body is not what it was, or its surface unknown.
+        """
+        self._positions[:] = inputs["qpos"]
+        for organ, body in self._bodies.items():
+            body.take(inputs.message(f"{organ}/nodes"))
+        if not self._gl:
+            return self._outputs({})
+        scene = self._scene or self._build()
+        header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
+        pictures = scene.draw(self._positions)
+        return self._outputs(
+            {
+                f"{eye}/{name}": message
+                for eye, pixels in zip(EYES, pictures, strict=True)
+                for name, message in self._messages(eye, pixels, header)
+            }
+        )
+
+    def _messages(self, eye: Eye, pixels: NDArray[np.uint8], header: Header) -> Iterator[tuple[str, Message]]:
+        params = self.params
+        yield "camera_info", camera_info(params.camera, eye, header)
+        if params.images != "compressed":
+            yield (
+                "image_raw",
+                Image(
+                    header=header,
+                    height=params.height,
+                    width=params.width,
+                    encoding="rgb8",
+                    step=3 * params.width,
+                    data=pixels.reshape(-1),
+                ),
+            )
+        if params.images != "raw":
+            yield (
+                "image_raw/compressed",
+                CompressedImage(header=header, format=params.format, data=self._compressed(pixels)),
+            )
+
+    def _outputs(self, messages: Mapping[str, Message]) -> Outputs:
+        return {port.name: (messages[port.name],) if messages else () for port in self._pictures}
+
+    def _compressed(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        from PIL import Image as Picture
+
+        file = BytesIO()
+        # PNG is lossless at every level; the lowest is several times as fast for a little more length.
+        options = {"quality": self.params.quality} if self.params.format == "jpeg" else {"compress_level": 1}
+        Picture.fromarray(pixels).save(file, self.params.format, **options)
+        return np.frombuffer(file.getvalue(), np.uint8)
+
+    def state_hash(self) -> int:
+        """Return the hash of what was last drawn, positions and nodes; of no pixel, since two machines need
+        not draw the same ones.
+        """
+        return state_hash(self.save())
+
+    def save(self) -> bytes:
+        """Return the positions last drawn, and what is known of the soft bodies."""
+        return self._positions.tobytes() + b"".join(body.save() for body in self._bodies.values())
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state. Raises StateError if it is none of this scene's."""
+        size, rest = self._positions.nbytes, state[self._positions.nbytes :]
+        for body in self._bodies.values():
+            rest = body.restore(rest)
+        if len(state) < size or rest:
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes is none of this scene; was"
+                " it saved elsewhere?"
+            )
+        self._positions[:] = np.frombuffer(state, np.float64, self._positions.size)
+        if self._bodies:
+            self.close()  # their surfaces may be others
+
+    def close(self) -> None:
+        """Give the OpenGL context back."""
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None
+
+
+def camera_info(camera: StereoCamera, eye: Eye, header: Header) -> CameraInfo:
+    """Return the calibration of one camera, as ROS has it for a rectified stereo pair: both in the left
+    camera's optical frame.
+    """
+    return CameraInfo(
+        header=header,
+        height=camera.height,
+        width=camera.width,
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=camera.intrinsics().reshape(-1),
+        r=np.eye(3).reshape(-1),
+        p=camera.projection(eye).reshape(-1),
+    )

@@ -1,0 +1,88 @@
+"""What a scenario may say about the endoscope."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from engines.mujoco.params import SceneParams
+from engines.mujoco.pictures.skin_params import SkinParams
+from hub.participant import Params
+from robots.dvrk import endoscope
+from robots.dvrk.endoscope import StereoCamera
+from schemas.quantity import Angle, Length
+from schemas.scenario import Name
+
+__all__ = ["EndoscopeParams", "ViewParams"]
+
+_MOST_PIXELS = 2048
+"""Of a side: an uncompressed picture of 2048 x 2048 is the largest that fits into a message."""
+
+
+class ViewParams(Params):
+    """Cameras that stand still in the world, upright."""
+
+    position: tuple[Length, Length, Length] = Field(
+        description="of the middle between the cameras, in the world"
+    )
+    target: tuple[Length, Length, Length] = Field(description="the point in the world they look at")
+
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> Self:
+        if self.position == self.target:
+            raise ValueError("position and target are the same point, so there is no direction to look in")
+        return self
+
+
+class EndoscopeParams(SceneParams):
+    """The scene it looks at, the same as the robot's, and its cameras."""
+
+    width: int = Field(default=endoscope.WIDTH, ge=16, le=_MOST_PIXELS, description="pixels of each picture")
+    height: int = Field(
+        default=endoscope.HEIGHT, ge=16, le=_MOST_PIXELS, description="pixels of each picture"
+    )
+    field_of_view: Angle = Field(default=endoscope.FIELD_OF_VIEW, gt=0.0, lt=3.0, description="horizontal")
+    baseline: Length = Field(default=endoscope.BASELINE, ge=0.0, description="distance of the two cameras")
+    near: Length = Field(default=endoscope.NEAR, gt=0.0, description="what is nearer is not seen")
+    far: Length | None = Field(
+        default=None,
+        gt=0.0,
+        description=(
+            "what is farther is not seen; 2 m from the endoscope's tip, all of the scene from elsewhere"
+        ),
+    )
+    view: ViewParams | None = Field(
+        default=None,
+        description=(
+            "cameras that stand in the world; without it they are at the ECM's tip or, in a scene without"
+            " ECM, look at all of it"
+        ),
+    )
+    skins: dict[Name, SkinParams] = Field(
+        default_factory=dict[Name, SkinParams],
+        description=(
+            "soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
+        ),
+    )
+    images: Literal["raw", "compressed", "both", "none"] = Field(
+        default="raw", description="what is published of each picture; none: the camera is off"
+    )
+    format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
+    quality: int = Field(
+        default=95, ge=1, le=95, description="of a JPEG; beyond 95 files grow and pictures do not get better"
+    )
+    shadows: bool = Field(
+        default=False, description="draw shadows and reflections: without a GPU several times as slow"
+    )
+
+    @property
+    def camera(self) -> StereoCamera:
+        """The two cameras."""
+        return StereoCamera(self.width, self.height, self.field_of_view, self.baseline)
+
+    @model_validator(mode="after")
+    def _sees_something(self) -> Self:
+        if self.far is not None and self.far <= self.near:
+            raise ValueError(f"far ({self.far:g} m) must be beyond near ({self.near:g} m)")
+        return self

@@ -1,0 +1,116 @@
+"""What the endoscope looks at: the model of its scene, the state it is given, and where its cameras are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.mujoco.model import spec
+from engines.mujoco.params import EcmParams
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
+from engines.mujoco.pictures.skins import Skins, SoftBody
+from engines.mujoco.pictures.stereo import StereoRenderer
+from robots.dvrk.endoscope import FAR, optical_in_roll
+from schemas.vectors import Vector
+
+__all__ = ["EndoscopeScene", "look_at"]
+
+_SKY, _GROUND = [0.75, 0.8, 0.85], [0.35, 0.37, 0.4]
+"""Behind everything seen from a room, above and below; an endoscope sees only what its own lamp lights."""
+
+
+class EndoscopeScene:
+    """The model of the scene, its state, and the cameras in it."""
+
+    def __init__(
+        self, params: EndoscopeParams, gl: str, bodies: Mapping[str, SoftBody] = MappingProxyType({})
+    ) -> None:
+        """Build the scene with the soft `bodies`, and prepare to draw it with the OpenGL that MUJOCO_GL calls
+        `gl`.
+        """
+        scene, ecm = spec(params), params.arms.get("ECM")
+        if params.view is not None or ecm is None:
+            _add_sky(scene)
+        self._skins = Skins(scene, bodies, params.skins)
+        self._model = scene.compile()
+        self._data = mujoco.MjData(self._model)
+        self._carrier = -1
+        far = params.far
+        if params.view is not None:
+            self._mounting = look_at(params.view)
+        elif isinstance(ecm, EcmParams):
+            self._carrier, self._mounting = self._model.body("ECM/roll").id, optical_in_roll(ecm.endoscope)
+            far = far or FAR
+        else:
+            self._mounting = look_at(_overview(self._model))
+        far = far or float(
+            np.linalg.norm(self._mounting[:3, 3] - self._model.stat.center) + 2.0 * self._model.stat.extent
+        )
+        self._renderer = StereoRenderer(
+            self._model, params.camera, (params.near, far), gl, shadows=params.shadows
+        )
+
+    def draw(self, positions: Vector) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,)."""
+        model, data = self._model, self._data
+        self._skins.show(model)
+        data.qpos[:] = positions
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_camlight(model, data)
+        return self._renderer.render(data, self._pose())
+
+    def close(self) -> None:
+        """Give the OpenGL context back."""
+        self._renderer.close()
+
+    def _pose(self) -> Vector:
+        """Return the optical frame midway between the cameras, in the world, shape (4, 4)."""
+        if self._carrier < 0:
+            return self._mounting
+        pose = np.eye(4)
+        pose[:3, :3] = self._data.xmat[self._carrier].reshape(3, 3)
+        pose[:3, 3] = self._data.xpos[self._carrier]
+        return pose @ self._mounting
+
+
+def look_at(view: ViewParams) -> Vector:
+    """Return the optical frame (x right, y down, z ahead) of cameras at `view`, shape (4, 4), upright unless
+    they look along the vertical.
+    """
+    position, target = np.array(view.position), np.array(view.target)
+    ahead = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    if np.linalg.norm(right) < 1e-9:
+        right = np.array([1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3] = np.column_stack([right, np.cross(ahead, right), ahead, position])
+    return pose
+
+
+def _overview(model: mujoco.MjModel) -> ViewParams:
+    """Return where MuJoCo's viewer would begin."""
+    camera = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, camera)
+    azimuth, elevation = np.radians([camera.azimuth, camera.elevation])
+    ahead = np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    )
+    x, y, z = camera.lookat - camera.distance * ahead
+    return ViewParams(position=(x, y, z), target=tuple(camera.lookat))
+
+
+def _add_sky(scene: mujoco.MjSpec) -> None:
+    scene.add_texture(
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=_SKY,
+        rgb2=_GROUND,
+        width=64,
+        height=6 * 64,
+    )

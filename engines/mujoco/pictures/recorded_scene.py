@@ -1,0 +1,202 @@
+"""A moment of a recorded session as a picture: the scene of its robot, with the soft bodies of its other
+engines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.mujoco.params import MujocoParams, SceneParams
+from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
+from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+from engines.mujoco.pictures.skins import SoftBody
+from hub.recording.bag import output_port
+from hub.recording.recording import Recording
+from schemas.codec import decode
+from schemas.errors import MessageError, RecordingError, TrocarError
+from schemas.scenario import ParticipantSpec
+from schemas.trocar_msgs import SoftBodyState
+from schemas.vectors import Vector, VectorCodec
+
+__all__ = ["Camera", "RecordedScene"]
+
+Camera = Literal["overview", "left", "right"]
+
+Point = tuple[float, float, float]
+
+_ASIDE = np.array([0.5, -0.72, 0.48])
+"""Direction from which the overview looks: between the axes and from above, so that three sides of a box are
+seen.
+"""
+_DISTANCE, _LEAST = 1.4, 0.1
+"""Of the overview, in diagonals of what is looked at; the least diagonal, m."""
+_LENS = ("field_of_view", "baseline", "near", "far")
+_OVERSAMPLING = 2
+"""Pixels drawn for each one of the picture, along either side: smooths edges."""
+
+
+class RecordedScene:
+    """The robot of a recording and all soft bodies in it."""
+
+    def __init__(self, recording: Recording, robot: str | None = None) -> None:
+        """Find the participant `robot`, by default the first of kind mujoco.
+
+        Raises RecordingError if there is none.
+        """
+        self._recording = recording
+        participants = recording.scenario().participants
+        robots = [name for name, spec in participants.items() if spec.kind == "mujoco"]
+        if not robots or robot not in (None, *robots):
+            asked = "" if robot is None else f" of '{robot}'"
+            raise RecordingError(
+                f"'{recording.file}': no scene{asked}; participants of kind mujoco:"
+                f" {', '.join(robots) or 'none'}"
+            )
+        name = robot or robots[0]
+        self._params = MujocoParams.model_validate(participants[name].params)
+        self._qpos = f"/engine/{name}/out/qpos"
+        self._looks, self._lens = _looks(participants), _lens(participants)
+        self._nodes = _by_body(
+            [topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type]
+        )
+
+    def picture(
+        self,
+        time_ns: int,
+        camera: Camera,
+        size: tuple[int, int],
+        position: Point | None = None,
+        target: Point | None = None,
+    ) -> NDArray[np.uint8]:
+        """Return what is seen at `time_ns`, shape (height, width, 3), RGB.
+
+        Args:
+            time_ns: simulated time; what is shown is the newest that was published by then.
+            camera: `left` or `right` of the endoscope, or `overview`.
+            size: width and height, pixels.
+            position: where the overview looks from, m in the world; by default from above and aside.
+            target: where it looks at, m in the world; by default at where the soft bodies and objects began.
+
+        Raises RecordingError if the recording does not say what is asked, TrocarError if nothing can be drawn
+        on this machine.
+        """
+        gl = opengl.find()
+        if not gl.name:
+            raise TrocarError(
+                f"no OpenGL works here ({gl.detail}), so there are no pictures. To mend it: {opengl.REMEDY}"
+            )
+        positions, bodies = self._positions(time_ns), self._bodies(time_ns)
+        width, height = size
+        shown: dict[str, Any] = {
+            "width": _OVERSAMPLING * width,
+            "height": _OVERSAMPLING * height,
+            "looks": True,
+        }
+        shown["skins"] = {name: self._looks.get(name, {}) for name in bodies}
+        if camera == "overview":
+            shown |= {"view": self._overview(bodies, position, target), "baseline": 0.0}
+        elif "ECM" not in self._params.arms:
+            raise RecordingError(
+                f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an"
+                " endoscope; take the overview"
+            )
+        else:
+            shown |= self._lens
+        # a default that is stated may be refused
+        stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)
+        scene = EndoscopeScene(EndoscopeParams.model_validate(stated | shown), gl.name, bodies)
+        try:
+            left, right = scene.draw(positions)
+        finally:
+            scene.close()
+        return _reduced(right if camera == "right" else left)
+
+    def _positions(self, time_ns: int) -> Vector:
+        newest = None
+        for message in self._recording.messages(self._qpos):
+            if message.time_ns <= time_ns:
+                newest = message
+        if newest is None:
+            raise RecordingError(
+                f"'{self._recording.file}': nothing on '{self._qpos}' up to {time_ns * 1e-9:g} s"
+            )
+        return VectorCodec(output_port(newest.topic, newest.type, newest.payload)).decode(newest.payload)
+
+    def _bodies(self, time_ns: int) -> Mapping[str, SoftBody]:
+        bodies: dict[str, SoftBody] = {}
+        for name, topic in self._nodes.items():
+            body, newest = SoftBody(topic), None
+            for message in self._recording.messages(topic):
+                if not len(body.rest):
+                    body.take(self._decoded(topic, message.payload))
+                if message.time_ns <= time_ns:
+                    newest = message
+            if newest is not None:
+                body.take(self._decoded(topic, newest.payload))
+                bodies[name] = body
+        return bodies
+
+    def _decoded(self, topic: str, payload: bytes) -> SoftBodyState:
+        try:
+            return decode(SoftBodyState, payload)
+        except MessageError as error:
+            raise RecordingError(f"'{self._recording.file}': topic '{topic}': {error}") from error
+
+    def _overview(
+        self, bodies: Mapping[str, SoftBody], position: Point | None, target: Point | None
+    ) -> ViewParams | None:
+        if position is not None and target is not None:
+            return ViewParams(position=position, target=target)
+        points = [body.rest.astype(np.float64) for body in bodies.values()]
+        points += [np.array([thing.position]) for thing in self._params.objects.values()]
+        if not points:
+            raise RecordingError(
+                f"'{self._recording.file}': neither soft bodies nor objects to look at; say where the"
+                " overview looks, from where and at what"
+            )
+        cloud = np.concatenate(points)
+        low, high = cloud.min(axis=0), cloud.max(axis=0)
+        centre = 0.5 * (low + high) if target is None else np.array(target)
+        away = _DISTANCE * max(float(np.linalg.norm(high - low)), _LEAST) * _ASIDE
+        return ViewParams(position=position or tuple(centre + away), target=tuple(centre))
+
+
+def _by_body(topics: list[str]) -> dict[str, str]:
+    """Return the topics of soft bodies by name: `<organ>`, or `<engine>_<organ>` where several engines have
+    one of that name.
+    """
+    ends = [topic.split("/") for topic in topics]  # /engine/<participant>/out/<organ>/nodes
+    organs = [end[-2] for end in ends]
+    return {
+        end[-2] if organs.count(end[-2]) == 1 else f"{end[2]}_{end[-2]}": topic
+        for end, topic in zip(ends, topics, strict=True)
+    }
+
+
+def _looks(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
+    """Return how the scenario's own cameras show each soft body."""
+    return {
+        name: look
+        for spec in participants.values()
+        if spec.kind == "endoscope"
+        for name, look in spec.params.get("skins", {}).items()
+    }
+
+
+def _lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
+    """Return what the scenario says of the cameras of its endoscope, if it has one."""
+    for spec in participants.values():
+        if spec.kind == "endoscope" and "view" not in spec.params:
+            return {name: value for name, value in spec.params.items() if name in _LENS}
+    return {}
+
+
+def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    height, width, _ = picture.shape
+    blocks = picture.reshape(height // _OVERSAMPLING, _OVERSAMPLING, width // _OVERSAMPLING, _OVERSAMPLING, 3)
+    return blocks.mean(axis=(1, 3)).astype(np.uint8)

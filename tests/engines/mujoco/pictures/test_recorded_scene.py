@@ -1,0 +1,173 @@
+"""Tissue of one engine in the pictures of another, and in pictures of the recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from typer.testing import CliRunner
+
+from engines.mujoco.pictures import opengl
+from engines.mujoco.pictures.command_line import app
+from engines.mujoco.pictures.recorded_scene import RecordedScene
+from hub.planning.scenario_file import load
+from hub.recording.recording import Recording
+from hub.session.launch import launch
+from hub.transport.endpoints import free_endpoint
+from schemas.codec import decode
+from schemas.errors import RecordingError
+from schemas.ros import Image as Picture
+
+SCENARIO = """
+name: seen
+step: 1 ms
+duration: 200 ms
+participants:
+  robot: &scene
+    kind: mujoco
+    arms:
+      PSM1: {instrument: palpation-probe, probe_radius: 5 mm, position: [0 mm, 0 mm, 118 mm]}
+      ECM: {position: [45 mm, 0 mm, 200 mm], start: [0, 0, 100 mm, 0]}
+    looks: false
+  tissue: {kind: bullet, organs: {liver: {size: [80 mm, 60 mm, 20 mm], young_modulus: 10 kPa, nodes: 60}}, probes: {probe: {radius: 5 mm}}}
+  other: {kind: bullet, organs: {liver: {size: [80 mm, 60 mm, 20 mm], young_modulus: 10 kPa, nodes: 60, position: [0 mm, 90 mm, 0 mm]}}, probes: {}}
+  camera:
+    <<: *scene
+    kind: endoscope
+    period: 40 ms
+    width: 120
+    height: 90
+    baseline: 0 mm
+    skins: {liver: {}, other_liver: {}}
+    view: {position: [90 mm, -110 mm, 70 mm], target: [0 mm, 0 mm, -5 mm]}
+connections:
+  - robot.qpos -> camera.qpos
+  - tissue.liver/nodes -> camera.liver/nodes
+  - other.liver/nodes -> camera.other_liver/nodes
+bonds:
+  - {motion: robot.PSM1/probe, force: tissue.probe}
+"""
+LIVER_RED_TO_GREEN = 0.52 / 0.20
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]:
+    """The same session with the tissue in the process of all others, and in one of its own."""
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+    place = tmp_path_factory.mktemp("seen")
+    (place / "seen.yaml").write_text(SCENARIO)
+    made: dict[str, Recording] = {}
+    for host in ("hub", "tissue"):
+        loaded = load(str(place / "seen.yaml"), [f"participants.tissue.host={host}"])
+        launch(loaded, endpoint=free_endpoint(range(1)), record=place / host).run()
+        made[host] = Recording(place / host)
+    return made
+
+
+def liver(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Where the colour of the liver is: nothing else in this scene is red."""
+    red, green = picture[:, :, 0].astype(float), picture[:, :, 1].astype(float)
+    return (red > 15.0) & (red > 0.7 * LIVER_RED_TO_GREEN * green)
+
+
+def pictures(recording: Recording) -> list[NDArray[np.uint8]]:
+    found = [
+        decode(Picture, message.payload)
+        for message in recording.messages("/engine/camera/out/left/image_raw")
+    ]
+    return [image.data.reshape(image.height, image.width, 3) for image in found]
+
+
+def test_the_camera_sees_the_tissue_wherever_that_runs(recordings: dict[str, Recording]) -> None:
+    assert [ack.state_hash.tolist() for ack in recordings["hub"].acks("camera")] == [
+        ack.state_hash.tolist() for ack in recordings["tissue"].acks("camera")
+    ]
+    one, other = pictures(recordings["hub"]), pictures(recordings["tissue"])
+    assert len(one) == 5
+    for left, right in zip(one, other, strict=True):
+        assert np.array_equal(left, right)
+        assert 0.1 < liver(left).mean() < 0.5
+    assert (one[0] != one[-1]).any()  # the probe starts in the tissue and pushes it away
+
+
+def test_a_recording_shows_what_the_camera_saw(recordings: dict[str, Recording]) -> None:
+    scene = RecordedScene(recordings["tissue"])
+    shown = scene.picture(160_000_000, "overview", (120, 90), (0.09, -0.11, 0.07), (0.0, 0.0, -0.005))
+    there, seen = liver(shown), liver(pictures(recordings["tissue"])[-1])
+    assert (there & seen).sum() > 0.95 * (there | seen).sum()
+
+
+def test_an_eye_of_the_endoscope_looks_along_its_shaft(recordings: dict[str, Recording]) -> None:
+    scene = RecordedScene(recordings["tissue"])
+    left, right = (liver(scene.picture(160_000_000, eye, (160, 120))) for eye in ("left", "right"))
+    assert left.any()
+    # what is near is further right in the left eye
+    assert np.flatnonzero(left.any(axis=0)).mean() > np.flatnonzero(right.any(axis=0)).mean()
+
+
+def test_all_soft_bodies_of_all_engines_are_shown(recordings: dict[str, Recording]) -> None:
+    aside = RecordedScene(recordings["hub"]).picture(
+        0, "overview", (120, 90), (0.2, 0.045, 0.06), (0.0, 0.045, 0.0)
+    )
+    assert len(np.flatnonzero(np.diff(liver(aside).any(axis=0)))) == 4, (
+        "one beside the other, with a gap between"
+    )
+
+
+def test_the_command_writes_a_picture(recordings: dict[str, Recording], tmp_path: Path) -> None:
+    file = tmp_path / "moment.png"
+    done = CliRunner().invoke(
+        app,
+        [
+            str(recordings["tissue"].file),
+            "-o",
+            str(file),
+            "--time",
+            "0.1",
+            "--width",
+            "160",
+            "--height",
+            "120",
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    assert done.stdout.strip() == str(file)
+    with Image.open(file) as picture:
+        assert picture.size == (160, 120)
+        assert 0.05 < liver(np.asarray(picture)).mean() < 0.7
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["-o", "moment.bmp"], ".png or .jpg"),
+        (["-o", "moment.png", "--from", "1,2"], "write x,y,z"),
+        (["-o", "moment.png", "--width", "5000"], "1024"),
+    ],
+)
+def test_bad_usage_is_refused(recordings: dict[str, Recording], arguments: list[str], problem: str) -> None:
+    done = CliRunner().invoke(app, [str(recordings["tissue"].file), *arguments])
+    assert done.exit_code == 2
+    assert problem in done.output
+
+
+def test_a_recording_without_a_scene_is_refused(recordings: dict[str, Recording]) -> None:
+    with pytest.raises(RecordingError, match="no scene of 'robo'; participants of kind mujoco: robot"):
+        RecordedScene(recordings["hub"], "robo")
+
+
+def test_a_scene_on_the_cart_is_drawn_as_it_was_stated(tmp_path: Path) -> None:
+    if not (found := opengl.find()).name:
+        pytest.skip(f"no OpenGL: {found.detail}")
+    file = tmp_path / "cart.yaml"
+    file.write_text(
+        "name: cart\nstep: 5 ms\nduration: 10 ms\nparticipants: {robot: {kind: mujoco, mounting: cart, looks:"
+        " false, arms: {PSM1: {instrument: palpation-probe}, ECM: {endoscope: up}}}}\n"
+    )
+    launch(load(str(file)), endpoint=free_endpoint(range(1)), record=tmp_path / "bag").run()
+    picture = RecordedScene(Recording(tmp_path / "bag")).picture(0, camera="left", size=(40, 30))
+    assert picture.shape == (30, 40, 3)
