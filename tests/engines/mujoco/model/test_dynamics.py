@@ -19,7 +19,7 @@ from robots.dvrk.dynamics import of_ecm, of_psm
 from robots.dvrk.instruments import instrument
 
 REFERENCE = json.loads(
-    (Path(__file__).parents[2] / "robots" / "data" / "reference_dynamics.json").read_text()
+    (Path(__file__).parents[3] / "robots" / "data" / "reference_dynamics.json").read_text()
 )
 NEEDLE_DRIVER = "LARGE_NEEDLE_DRIVER_400006"
 TILTS = [np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.2, -0.4, 0.1, 0.889])]

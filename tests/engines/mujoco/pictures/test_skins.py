@@ -9,16 +9,6 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.engines.mujoco.test_endoscope import (
-    AHEAD,
-    ECM_START,
-    PERIOD_NS,
-    SPREAD,
-    bright_spots,
-    camera_pose,
-    pixels,
-    state,
-)
 
 from engines.bullet.meshing.grid import block
 from engines.mujoco.pictures import opengl
@@ -33,6 +23,16 @@ from schemas.errors import SessionError, StateError
 from schemas.ros import CameraInfo, Header
 from schemas.trocar_msgs import SoftBodyState
 from schemas.vectors import Vector
+from tests.engines.mujoco.pictures.test_endoscope import (
+    AHEAD,
+    ECM_START,
+    PERIOD_NS,
+    SPREAD,
+    bright_spots,
+    camera_pose,
+    pixels,
+    state,
+)
 
 YELLOW = [0.9, 0.75, 0.0]
 OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]) * 1e-3
