@@ -1,12 +1,12 @@
-"""What the whole patient cart with six objects costs at 1 kHz: bare `mj_step`, the MuJoCo engine, and a
-session in pace `fast`.
+"""What the whole patient cart with six objects costs at 1 kHz.
 
-    python bench/cart.py --json
+python bench/cart.py --json
 
-All run in the same process in turns, on models of the same scene; the lowest of the rounds. `core_beyond` is
-the share of one core at 1 kHz that the engine (state hash included) takes beyond bare `mj_step`,
-`session_core_beyond` that of a session in one host that is not recorded. Processor time of the thread that
-steps, as others may use the machine; the real-time factors are those of a core of one's own.
+Measured are bare `mj_step`, the MuJoCo engine, and a session in pace `fast`, all in the same process in
+turns, on models of the same scene; the lowest of the rounds. `core_beyond` is the share of one core at 1 kHz
+that the engine (state hash included) takes beyond bare `mj_step`, `session_core_beyond` that of a session in
+one host that is not recorded. Times are processor time of the thread that steps, as others may use the
+machine; the real-time factors are those of an idle core.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def timed(work: Callable[[], object]) -> float:
 
 
 def session_us() -> float:
-    """Return the microseconds a step of a session, in its second half: in the first the objects come to rest."""
+    """Return the microseconds of a step of a session, in its second half, when the objects are at rest."""
     duration_s = 2 * STEPS_A_ROUND * STEP_NS / 1e9
     scenario = Scenario.model_validate(
         {

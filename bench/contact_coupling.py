@@ -1,11 +1,11 @@
-"""Coupling algorithms on contact: the largest stable communication step, the force error and the energy made,
-tool by tool.
+"""Coupling algorithms on contact: the largest stable communication step, the force error, the energy made.
 
 A MuJoCo tool with position servos presses, taps or strokes a block in Bullet (sub-steps of 0.5 ms) through a
 bond, both engines in one process. A step counts as stable if the run ends, the force error stays below 30 %
-and, where the tool holds still, the force ripples by less than 0.05 N; the largest stable step is that up to
-which all tried ones are. The error is the RMS difference of the force, averaged over the step, to a run by
-`impulse` at 0.25 ms, as a share of the RMS force. Written up in docs/decisions/0020-coupling-on-contact.md.
+and, where the tool is still, the force ripples by less than 0.05 N; the largest stable step is the largest
+below which all tried ones are stable. The error is the RMS difference of the force, averaged over the step,
+to a run by `impulse` at 0.25 ms, as a share of the RMS force. Results:
+docs/decisions/0020-coupling-on-contact.md.
 """
 
 from __future__ import annotations
@@ -51,13 +51,16 @@ ARM = """
 <geom type="capsule" fromto="0 0 0 .12 0 0" size=".004" mass="{mass}"/>
 <geom pos=".12 0 0" size=".005" mass=".015"/><site name="tip" pos=".12 0 0"/></body></body>"""
 ROD = """
-<body pos="0 0 .06"><joint name="x" type="slide" axis="1 0 0" damping="{damping}"/><joint name="y" type="slide" axis="0 1 0" damping="{damping}"/>
-<joint name="z" type="slide" axis="0 0 1" damping="{damping}"/><joint name="turn" type="ball" stiffness="1" damping=".002"/>
-<geom type="capsule" fromto="0 0 0 0 0 -.06" size=".004" mass="{mass}"/><site name="tip" pos="0 0 -.06"/></body>"""
+<body pos="0 0 .06"><joint name="x" type="slide" axis="1 0 0" damping="{damping}"/>
+<joint name="y" type="slide" axis="0 1 0" damping="{damping}"/>
+<joint name="z" type="slide" axis="0 0 1" damping="{damping}"/>
+<joint name="turn" type="ball" stiffness="1" damping=".002"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.06" size=".004" mass="{mass}"/>
+<site name="tip" pos="0 0 -.06"/></body>"""
 
 
 def press(t: float) -> float:
-    """Return the height (m) that a press wants at `t` (s): 8 mm down in 0.3 s, held, and up again."""
+    """Return the target height (m) of a press at `t` (s): 8 mm down in 0.3 s, held, and up again."""
     return START_M - 8e-3 * (
         min(max(t - 0.05, 0.0) / 0.3, 1.0) if t < 0.75 else max(1.0 - (t - 0.75) / 0.3, 0.0)
     )
@@ -70,7 +73,7 @@ def tap(t: float) -> float:
 
 @dataclass(frozen=True)
 class Case:
-    """A tool, what it is told to do, and the tissue and virtual coupling it meets; SI units."""
+    """A tool, its task, and the tissue and virtual coupling it meets; SI units."""
 
     probe_stiffness: float
     mass: float
@@ -172,7 +175,7 @@ class Tool(Stepped):
         self.side = MotionSide(self.bonds[0], setup.bonds["probe"])
         return self.side.result(*self.motion())
 
-    def wanted(self, t: float) -> np.ndarray:
+    def target(self, t: float) -> np.ndarray:
         """Return the servos' goals at `t` (s)."""
         case = self.case
         if case.body is SLIDER:
@@ -196,7 +199,7 @@ class Tool(Stepped):
         for i in range(count):
             self.waiting.append(self.side.force(i * dt, pose, twist))
             force, before = self.waiting.pop(0), pose
-            self.data.ctrl[:] = self.wanted(t * 1e-9 + i * dt)
+            self.data.ctrl[:] = self.target(t * 1e-9 + i * dt)
             self.data.qfrc_applied[:] = self.jacobian().T @ force
             mujoco.mj_step(self.model, self.data)
             mujoco.mj_forward(self.model, self.data)

@@ -1,10 +1,9 @@
-"""What a stereo pair of the whole cart costs, and how that compares with drawing two pictures by MuJoCo's own
-renderer.
+"""What a stereo pair of the whole cart costs, compared with two pictures by MuJoCo's own renderer.
 
-    python bench/endoscope.py --json
+python bench/endoscope.py --json
 
 The scene: patient cart, three instruments, endoscope and six objects; 320 x 288 pixels each, shadows off.
-Once from the tip of the endoscope, once from where everything is in the picture, the dearest view. Both
+Once from the tip of the endoscope, once with everything in the picture, the most expensive view. Both
 renderers draw the same state in the same process in turns; `ratio` is the median of the rounds' ratios of CPU
 time, all threads counted. `pairs_per_cpu_second` depends on the machine.
 """
@@ -101,7 +100,7 @@ def main() -> None:
     wants_json = parser.parse_args().json
     found = opengl.find()
     if not found.name:
-        sys.exit(f"no OpenGL works here ({found.detail}); to mend it: {opengl.REMEDY}")
+        sys.exit(f"no OpenGL works here ({found.detail}); to fix it: {opengl.REMEDY}")
     # mujoco.Renderer has asked for it already, when mujoco was imported
     if os.environ.get("MUJOCO_GL") != found.name:
         os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | {"MUJOCO_GL": found.name})

@@ -3,7 +3,7 @@
     python bench/engine_steps.py --json
 
 Both run in the same process in turns; the median of the rounds' ratios is reported, as single times move with
-the machine's load. `ratio` is at one sub-step of 1 ms a step, the dearest case; `ratio_10_ms` at ten
+the machine's load. `ratio` is at one sub-step of 1 ms a step, the worst case; `ratio_10_ms` at ten
 sub-steps a step.
 """
 
@@ -84,7 +84,7 @@ class Loop:
             mujoco.mj_step1(model, data)
 
         return {
-            "clip the command, lay out position and velocity setpoints": (
+            "clip the command, write position and velocity setpoints": (
                 each(lambda: arm.begin(self.inputs))
                 - each(lambda: motion.begin(self.inputs, arm._pose, arm._twist))
             ),

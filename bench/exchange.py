@@ -1,7 +1,4 @@
-"""A participant without any computation: takes 64 doubles, gives 64 doubles.
-
-For measuring what a step costs by itself.
-"""
+"""A participant without any computation, 64 doubles in and 64 out, to measure the cost of a step itself."""
 
 import numpy as np
 
@@ -12,7 +9,7 @@ SIZE = 64
 
 
 class Exchange(Stepped):
-    """Hands its input on."""
+    """Publishes its input."""
 
     ports = (
         Port(name="taken", causality="input", size=SIZE),

@@ -1,12 +1,11 @@
-"""The force on a sphere pressed into tissue, beside the finite-element truth: over depth, radius, mesh and
-place, at rest and at 5 Hz.
+"""The force on a sphere pressed into tissue, beside that of finite elements.
 
-    python bench/indentation.py --json indentation.json --picture docs/pictures/indentation.png
+python bench/indentation.py --json indentation.json --picture docs/pictures/indentation.png
 
-A block of 80 x 60 x 20 mm, 10 kPa, is pressed over a node, and in the middle of a face, where Bullet's
-contacts lose most. The truth is Newton's method on the same mesh with the same friction
-(tests/engines/bullet/finite_elements.py); `continuum` is that on a mesh of 2000 nodes, so it shows what the
-mesh costs. Written up in docs/decisions/0015-contact-force.md.
+Over depth, radius, mesh and place, at rest and at 5 Hz. A block of 80 x 60 x 20 mm, 10 kPa, is pressed over a
+node, and in the middle of a face, where Bullet's contacts lose most. The reference is Newton's method on the
+same mesh with the same friction (tests/engines/bullet/finite_elements.py); `continuum` is that on a mesh of
+2000 nodes, so it shows the error of the mesh. Results: docs/decisions/0015-contact-force.md.
 """
 
 from __future__ import annotations
@@ -62,9 +61,7 @@ def params(nodes: int, radius: float) -> BulletParams:
 
 
 def places(model: BulletParams) -> dict[str, Vector]:
-    """Return where to press, (x, y) in m: the node in the middle of the top, and the middle of a face beside
-    it.
-    """
+    """Return where to press, (x, y) in m: a node in the middle of the top, and a face beside it."""
     mesh = model.organs["block"].rest
     top = mesh.nodes[mesh.triangles]
     middles = top[(top[:, :, 2] == mesh.nodes[:, 2].max()).all(axis=1)].mean(axis=1)
@@ -87,8 +84,9 @@ def pressed(model: BulletParams, at: Vector, radius: float) -> Iterator[float]:
 
 
 def correlation(model: BulletParams, at: Vector, radius: float, curve: tuple[Vector, Vector]) -> float:
-    """Return the correlation of the force at 5 Hz with `curve`, depths (m) and forces (N) of the truth, over
-    two periods.
+    """Return the correlation of the force at 5 Hz with `curve`, over two periods.
+
+    `curve`: depths (m) and forces (N) of the finite elements.
     """
     w = 2.0 * np.pi * FREQUENCY_HZ
 

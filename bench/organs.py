@@ -1,11 +1,10 @@
-"""What an organ costs by its number of nodes: the tissue engine's step of 1 ms, idle and with a probe pressed
-into it.
+"""What an organ costs by its number of nodes: the tissue engine's step of 1 ms, idle and pressed.
 
-    python bench/organs.py --json
+python bench/organs.py --json
 
-A block of 80 x 60 x 20 mm of liver under a probe of 5 mm, 3 mm deep. Times are those of the processor in this
-process (Bullet has one thread), so that others on the machine count little; compare the ratios to 250 nodes,
-as single times move with the machine.
+A block of 80 x 60 x 20 mm of liver under a probe of 5 mm, 3 mm deep. Times are processor times of this
+process (Bullet has one thread), so that other load on the machine counts little; compare the ratios to 250
+nodes, as single times vary with the machine.
 """
 
 from __future__ import annotations

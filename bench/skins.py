@@ -1,14 +1,13 @@
-"""What a soft body in the picture costs: its surface, MuJoCo's scene, and the drawing, for three ways that
-MuJoCo has to show one.
+"""What a soft body in the picture costs: its surface, MuJoCo's scene, and the drawing.
 
-    python bench/skins.py --json
+python bench/skins.py --json
 
-A dented block of 80 x 60 x 20 mm of about 250, 1000 and 5000 nodes fills a picture of 320 x 288 pixels,
-shadows off. `surface_ms`: the displayed vertices from the nodes. `update_ms`: new vertices into MuJoCo's
-scene, by a skin whose vertices in the model are replaced (what Trocar does), a flex whose vertices in the
-data are replaced, and a mesh that is uploaded again, all of the body's own triangles. `pair_ms`: a stereo
-pair of the endoscope with the displayed surface in it, `empty_pair_ms`: without. CPU time of all threads,
-medians; compare rows of one run.
+For three ways in which MuJoCo can show one. A dented block of 80 x 60 x 20 mm of about 250, 1000 and 5000
+nodes fills a picture of 320 x 288 pixels, shadows off. `surface_ms`: the displayed vertices from the nodes.
+`update_ms`: new vertices into MuJoCo's scene, by a skin whose vertices in the model are replaced (what Trocar
+does), a flex whose vertices in the data are replaced, and a mesh that is uploaded again, all of the body's
+own triangles. `pair_ms`: a stereo pair of the endoscope with the displayed surface in it, `empty_pair_ms`:
+without. CPU time of all threads, medians; compare rows of one run.
 """
 
 from __future__ import annotations
@@ -134,7 +133,7 @@ def main() -> None:
     wants_json = parser.parse_args().json
     found = opengl.find()
     if not found.name:
-        sys.exit(f"no OpenGL works here ({found.detail}); to mend it: {opengl.REMEDY}")
+        sys.exit(f"no OpenGL works here ({found.detail}); to fix it: {opengl.REMEDY}")
     # mujoco.Renderer has asked for it already, when mujoco was imported
     if os.environ.get("MUJOCO_GL") != found.name:
         os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | {"MUJOCO_GL": found.name})

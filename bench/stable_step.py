@@ -1,10 +1,9 @@
-"""How well the stable-step rules of `hub.planning.coupling` predict the largest stable step: 108 linear cases
-for each algorithm.
+"""How well the stable-step rules of `hub.planning.coupling` predict the largest stable step.
 
-A tool of mass m on a servo, its virtual coupling (k, b = 2 sqrt(k m_p)) and a proxy of mass m_p that presses
-on a spring make a linear system of four states. One communication step of it, taken through the code of
-`hub.participant.bond`, is a matrix; the step is stable if its spectral radius is at most 1. A rule holds in a
-case if the step it allows is no longer than the largest stable one.
+In 108 linear cases for each algorithm: a tool of mass m on a servo, its virtual coupling (k, b = 2 sqrt(k
+m_p)) and a proxy of mass m_p that presses on a spring make a linear system of four states. One communication
+step of it, taken through the code of `hub.participant.bond`, is a matrix; the step is stable if its spectral
+radius is at most 1. A rule holds in a case if the step it allows is no longer than the largest stable one.
 """
 
 from __future__ import annotations
@@ -99,7 +98,7 @@ def advance(case: Case, bond: Bond, step_s: float, state: np.ndarray) -> np.ndar
 
 
 def is_stable(case: Case, bond: Bond, step_s: float) -> bool:
-    """Say whether no motion of the coupled system grows from step to step."""
+    """Return whether no motion of the coupled system grows from step to step."""
     matrix = np.stack([advance(case, bond, step_s, unit) for unit in np.eye(4)], axis=1)
     return bool(np.isfinite(matrix).all() and np.abs(np.linalg.eigvals(matrix)).max() <= 1.0 + 1e-9)
 
@@ -123,7 +122,7 @@ def largest_stable(case: Case, bond: Bond) -> float:
 
 
 def main() -> None:
-    """Print, for each algorithm, the share of cases in which its rule holds, and how much it leaves unused."""
+    """Print, for each algorithm, the share of cases in which its rule holds, and its unused margin."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
     figures: dict[str, dict[str, float]] = {}

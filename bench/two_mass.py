@@ -86,7 +86,7 @@ def rms_error(coupling: dict, step_ms: float, two: MassParams) -> float:
 
 
 def survives(coupling: dict, step_ms: float, two: MassParams) -> bool:
-    """Say whether a run stays bounded."""
+    """Return whether a run stays bounded."""
     try:
         x = positions(coupling, step_ms, two, duration_s=0.3 * step_ms)
     except Exception:  # noqa: BLE001  # an unstable run ends in overflow, in whichever part notices first

@@ -1,1 +1,1 @@
-"""Messages, ports, scenario, codecs and keys: what every part of Trocar agrees on. Imports nothing of ours."""
+"""Messages, ports, scenario, codecs and keys: what all parts of Trocar agree on. Imports none of them."""

@@ -1,4 +1,4 @@
-"""CDR codecs over `rosbags`: every message model to bytes and back, .msg text and RIHS01 hash of every type."""
+"""CDR codecs over `rosbags`: every message model to bytes and back, with .msg texts and RIHS01 hashes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ __all__ = [
 ]
 
 MAX_MESSAGE_BYTES = 16 * 2**20
-"""Larger payloads are refused unread: the largest honest message, an uncompressed 1080p stereo image, has 12
-MB.
+"""Larger payloads are rejected unread.
+
+The largest plausible message, an uncompressed 1080p stereo image, has 12 MB.
 """
 
 _PLAIN_CDR = (b"\x00\x00", b"\x00\x01")
@@ -85,7 +86,7 @@ def decode(model: type[M], payload: bytes) -> M:
         raw = typestore().deserialize_cdr(payload, model.ros_type)
     except (
         Exception
-    ) as error:  # rosbags lets struct.error, IndexError, AssertionError, UnicodeDecodeError and more through
+    ) as error:  # rosbags raises struct.error, IndexError, AssertionError, UnicodeDecodeError ...
         raise MessageError(
             f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})"
         ) from error
@@ -113,8 +114,6 @@ def rihs01(name: str) -> str:
 
 @cache
 def ros2msg_definition(name: str) -> str:
-    """Return the definition of `name` and of every type it holds, as MCAP's `ros2msg` schema encoding wants
-    it.
-    """
+    """Return the definition of `name` and of every type it contains, in MCAP's `ros2msg` schema encoding."""
     text, _ = typestore().generate_msgdef(name, ros_version=2)
     return text

@@ -1,5 +1,6 @@
-"""The message types of CRTK, the Collaborative Robotics Toolkit, field for field as
-collaborative-robotics/crtk_msgs (commit 14b04fcf) has them.
+"""The message types of CRTK, the Collaborative Robotics Toolkit.
+
+Field for field as in collaborative-robotics/crtk_msgs (commit 14b04fcf).
 """
 
 from __future__ import annotations
@@ -31,9 +32,7 @@ def _empty() -> NDArray[np.float64]:
 
 
 class OperatingState(Message):
-    """What a device is doing: `DISABLED`, `ENABLED`, `PAUSED` or `FAULT`, whether it is homed, and whether it
-    is busy.
-    """
+    """State of a device: `DISABLED`, `ENABLED`, `PAUSED` or `FAULT`; whether it is homed, and busy."""
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/OperatingState"
     header: Header = Header()
@@ -43,7 +42,10 @@ class OperatingState(Message):
 
 
 class StringStamped(Message):
-    """A text at a time; as `state_command` one of `enable`, `disable`, `home`, `unhome`, `pause`, `resume`."""
+    """A text at a time.
+
+    As `state_command` it is one of `enable`, `disable`, `home`, `unhome`, `pause`, `resume`.
+    """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/StringStamped"
     header: Header = Header()
@@ -64,8 +66,9 @@ class CartesianState(Message):
 
 
 class CartesianImpedanceHalfPlaneGains(Message):
-    """Gains per axis on one side of a goal: N/m and N s/m of a displacement, N m/rad and N m s/rad of a
-    rotation; a spring's are negative.
+    """Gains per axis on one side of a goal.
+
+    N/m and N s/m of a displacement, N m/rad and N m s/rad of a rotation; those of a spring are negative.
     """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedanceHalfPlaneGains"
@@ -74,12 +77,13 @@ class CartesianImpedanceHalfPlaneGains(Message):
     bias: Vector3 = Vector3()
     """What is added, N or N m."""
     deadband: Vector3 = Vector3()
-    """Distance from the goal, m or rad, from which on `p` counts."""
+    """Distance from the goal, m or rad, beyond which `p` acts."""
 
 
 class CartesianImpedance(Message):
-    """Springs and dampers between a tip and a goal, along the axes of one orientation for forces and of
-    another for torques.
+    """Springs and dampers between a tip and a goal.
+
+    Those of forces act along the axes of one orientation, those of torques along the axes of another.
     """
 
     ros_type: ClassVar[str] = "crtk_msgs/msg/CartesianImpedance"
@@ -87,7 +91,7 @@ class CartesianImpedance(Message):
     force_orientation: Quaternion = Quaternion()
     force_position: Vector3 = Vector3()
     torque_orientation: Quaternion = Quaternion()
-    """The goal of the rotation, too."""
+    """Also the goal of the rotation."""
     position_positive: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
     position_negative: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
     orientation_positive: CartesianImpedanceHalfPlaneGains = CartesianImpedanceHalfPlaneGains()
@@ -95,7 +99,7 @@ class CartesianImpedance(Message):
 
 
 class ForwardKinematicsRequest(Message):
-    """Asks where an arm is at joint positions `jp`; `cp` is not looked at."""
+    """Asks for the pose of an arm's tip at joint positions `jp`; `cp` is ignored."""
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryForwardKinematics_Request"
     jp: Float64Array = Field(default_factory=_empty)
@@ -103,7 +107,7 @@ class ForwardKinematicsRequest(Message):
 
 
 class ForwardKinematicsResponse(Message):
-    """Where it is, unless `result` is false: then `message` says why not."""
+    """The pose, unless `result` is false: then `message` has the reason."""
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryForwardKinematics_Response"
     cp: Pose = Pose()
@@ -112,7 +116,7 @@ class ForwardKinematicsResponse(Message):
 
 
 class InverseKinematicsRequest(Message):
-    """Asks for the joint positions, nearest to `jp`, at which an arm is at `cp`."""
+    """Asks for the joint positions nearest to `jp` at which the tip of an arm is at `cp`."""
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryInverseKinematics_Request"
     cp: Pose = Pose()
@@ -120,7 +124,7 @@ class InverseKinematicsRequest(Message):
 
 
 class InverseKinematicsResponse(Message):
-    """The joint positions, unless `result` is false: then `message` says why there are none."""
+    """The joint positions, unless `result` is false: then `message` has the reason."""
 
     ros_type: ClassVar[str] = "crtk_msgs/srv/QueryInverseKinematics_Response"
     jp: Float64Array = Field(default_factory=_empty)

@@ -4,7 +4,7 @@ TrocarError
 ├── ScenarioError          the scenario cannot be run as written (exit code 2)
 │   └── MissingExtraError  a package that an optional part needs is not installed
 ├── MessageError           bytes or values that are not a valid message
-│   └── LateError          a message that comes after a newer one
+│   └── LateError          a message that arrives after a newer one
 ├── SessionError           the running session ended before its time (exit code 1)
 │   ├── ParticipantError   a participant raised, died or stopped answering
 │   └── StateError         a participant cannot save or restore its state
@@ -41,12 +41,10 @@ class TrocarError(Exception):
 
 
 class ScenarioError(TrocarError):
-    """The scenario cannot be run as written; the message says where and what was allowed."""
+    """The scenario cannot be run as written; the message states where and what was allowed."""
 
     def __init__(self, message: str, *, path: tuple[str | int, ...] = ()) -> None:
-        """Take the message, and the path of the offending value inside the scenario: `("participants",
-        "robot", "kind")`.
-        """
+        """Raise with `path` of the invalid value in the scenario: `("participants", "robot", "kind")`."""
         super().__init__(message)
         self.path = path
 
@@ -55,7 +53,7 @@ class MissingExtraError(ScenarioError):
     """A part of the scenario needs a package that is not installed here."""
 
     def __init__(self, part: str, extra: str, package: str, distribution: str = "trocar") -> None:
-        """Name the part that was asked for and the pip line that brings what it needs."""
+        """Raise for `part`, which needs `package` from the extra `extra` of `distribution`."""
         super().__init__(
             f"{part} needs the package '{package}', which is not installed. Install it with: pip install"
             f" '{distribution}[{extra}]'"
@@ -68,7 +66,7 @@ class MessageError(TrocarError):
 
 
 class LateError(MessageError):
-    """A message that comes after a newer one."""
+    """A message that arrives after a newer one."""
 
 
 class SessionError(TrocarError):
@@ -76,10 +74,9 @@ class SessionError(TrocarError):
 
 
 class ParticipantError(SessionError):
-    """A participant raised, died or stopped answering; `participant` and `step` say which and when."""
+    """A participant raised, died or stopped answering; `participant` and `step` are which and when."""
 
     def __init__(self, participant: str, step: int, cause: str) -> None:
-        """Name the participant, the step it was in and the cause."""
         super().__init__(f"participant '{participant}' failed at step {step}: {cause}")
         self.participant = participant
         self.step = step
@@ -95,11 +92,11 @@ class RecordingError(TrocarError):
 
 
 class MotionError(TrocarError):
-    """An arm cannot be or go where it was asked to; the message says why and what was allowed."""
+    """An arm cannot be or go where it was asked to; the message states why and what was allowed."""
 
 
 class DeviceError(TrocarError):
-    """Hardware, or the program that drives it, cannot be used now; the message says what to do."""
+    """Hardware, or the program that drives it, cannot be used now; the message states what to do."""
 
 
 class ConnectError(TrocarError):

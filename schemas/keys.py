@@ -11,8 +11,9 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def valid_name(name: str) -> bool:
-    """Say whether `name` may name a session, a participant or a part of a port: a letter, then letters,
-    digits, underscores.
+    """Return whether `name` is a valid name of a session, a participant or a part of a port.
+
+    It begins with a letter; letters, digits and underscores follow.
     """
     return _NAME.fullmatch(name) is not None
 
@@ -26,7 +27,6 @@ class Keys:
     """The keys of one session."""
 
     def __init__(self, session: str) -> None:
-        """Take the session's name."""
         self.session = session
         self.prefix = f"{ROOT}/{session}"
         self.grant = f"{self.prefix}/hub/grant"
@@ -41,31 +41,30 @@ class Keys:
         return f"{self.prefix}/engine/{participant}/ack"
 
     def output(self, role: str, participant: str, port: str) -> str:
-        """Key of an output port; `role` is `engine` for all that is stepped, else `device`."""
+        """Key of an output port; `role` is `engine` for stepped participants, else `device`."""
         return f"{self.prefix}/{role}/{participant}/out/{port}"
 
     def feed(self, participant: str, port: str) -> str:
-        """Key on which the messages of an event port are for devices of the wall clock."""
+        """Key of the messages of an event port for wall-clock devices."""
         return f"{self.prefix}/engine/{participant}/feed/{port}"
 
     def signals(self, participant: str, device: str) -> str:
-        """Key on which the signals of a participant are for a device of the wall clock: one that does not
-        keep up misses some, and holds nobody up.
+        """Key of the signals of a participant for a wall-clock device.
+
+        A device that is too slow misses some of them, and delays no other participant.
         """
         return f"{self.prefix}/engine/{participant}/signals/{device}"
 
     def refused(self, role: str, participant: str) -> str:
-        """Key on which a host tells of messages that it had to drop, under the name of one of its
-        participants.
-        """
+        """Key on which a host reports messages that it dropped, under one of its participants' names."""
         return f"{self.prefix}/{role}/{participant}/refused"
 
     def device_status(self, device: str) -> str:
-        """Key on which the host of a device tells of it; `*` for all."""
+        """Key on which the host of a device publishes the device's status; `*` for all."""
         return f"{self.prefix}/device/{device}/status"
 
     def link(self, device: str) -> str:
-        """Key on which the hub says what is to lie between it and a device."""
+        """Key on which the hub publishes the network link that a device shall have."""
         return f"{self.prefix}/hub/link/{device}"
 
     def control(self, verb: str) -> str:
@@ -73,7 +72,7 @@ class Keys:
         return f"{self.prefix}/control/{verb}"
 
     def join(self, host: str) -> str:
-        """Key on which the host `host` presents itself, of which nobody else may make use; `**` for all."""
+        """Key on which the host `host` joins, which no other host may use; `**` for all."""
         return self.control(f"join/{host}")
 
     def alive(self, role: str, name: str) -> str:

@@ -1,7 +1,7 @@
 """The base of every message: a pydantic model that is also a ROS 2 message.
 
-A field's ROS type stands in its annotation, so the .msg text of a type is derived from the model and
-cannot drift from it. Numbers must be finite: a NaN never leaves or enters a simulation.
+A field's annotation has its ROS type, so the .msg text of a type is derived from the model and cannot drift
+from it. Numbers must be finite: a NaN never leaves or enters a simulation.
 """
 
 from __future__ import annotations
@@ -41,14 +41,12 @@ class RosType:
     """Marks an annotation with the ROS 2 type it stands for; for arrays also with the numpy type."""
 
     def __init__(self, name: str, dtype: Any = None) -> None:
-        """Take the type as it stands in a .msg file, and the element type of an array."""
+        """Mark with the type `name`, as in a .msg file, and the element type of an array."""
         self.name = name
         self.dtype = None if dtype is None else np.dtype(dtype)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Validate arrays as one-dimensional, of the right element type, finite and (if fixed) of the right
-        length.
-        """
+        """Validate arrays: one-dimensional, of the right element type and length (if fixed), finite."""
         if self.dtype is None:
             return handler(source)
         return core_schema.no_info_plain_validator_function(

@@ -1,10 +1,12 @@
-"""Ports and bonds: what a participant declares before anything is started."""
+"""Ports and bonds: what a participant declares before it is started."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from schemas.ros import Float64MultiArray, PoseStamped, TwistStamped, WrenchStamped
 
 __all__ = ["BondSide", "Port", "bond_ports"]
 
@@ -22,14 +24,12 @@ class Port(BaseModel):
     name: str
     """Parts separated by `/`, such as `PSM1/measured_js`."""
     causality: Literal["input", "output"]
-    type: str = "std_msgs/msg/Float64MultiArray"
+    type: str = Float64MultiArray.ros_type
     variability: Literal["signal", "event"] = "signal"
     size: int = Field(default=1, ge=1)
     """Number of elements where the type leaves it open (multi-arrays)."""
     shape: tuple[int, ...] = ()
-    """Of a multi-array that is a matrix, row after row: stands in the message's layout; the product is the
-    size.
-    """
+    """Of a multi-array that is a matrix, row after row: in the message's layout; the product is the size."""
     names: tuple[str, ...] = ()
     """Joint names of a `JointState`."""
     fields: tuple[Literal["position", "velocity", "effort"], ...] = ("position",)
@@ -37,9 +37,7 @@ class Port(BaseModel):
     unit: str = ""
     """Unit of a bare number or array; empty where the message type implies SI units."""
     frame: str = ""
-    """`frame_id` in which the value is expressed; empty where there is none. An input without a frame takes
-    any.
-    """
+    """`frame_id` in which the value is expressed, or empty. An input without a frame accepts any."""
     period_ns: int = Field(default=0, ge=0)
     """An output is produced at this period, a multiple of the step; 0: whenever the participant steps."""
     start: tuple[float, ...] | None = None
@@ -58,12 +56,13 @@ class Port(BaseModel):
 
 
 class BondSide(BaseModel):
-    """One end of a power bond: the motion side gives pose and twist and takes a wrench, the force side the
-    reverse.
+    """One end of a power bond.
+
+    The motion side gives pose and twist and takes a wrench, the force side the reverse.
 
     `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity,
     force). With `dof` 3 there may be several `points`, the contact spheres of one instrument: their
-    coordinates follow each other. The numbers feed the stable-step rule and the linearised coupling;
+    coordinates follow each other. The stable-step rule and the linearised coupling use the numbers;
     stiffness, damping and proxy mass are those at each point.
     """
 
@@ -118,14 +117,14 @@ def bond_ports(bond: BondSide) -> tuple[Port, Port, Port]:
     moves, takes = ("output", "input") if bond.side == "motion" else ("input", "output")
     if bond.dof == 6:
         rows = (
-            ("pose", "geometry_msgs/msg/PoseStamped", ""),
-            ("twist", "geometry_msgs/msg/TwistStamped", ""),
-            ("wrench", "geometry_msgs/msg/WrenchStamped", ""),
+            ("pose", PoseStamped.ros_type, ""),
+            ("twist", TwistStamped.ros_type, ""),
+            ("wrench", WrenchStamped.ros_type, ""),
         )
         size = 1
     else:
         rows = tuple(
-            (name, "std_msgs/msg/Float64MultiArray", unit)
+            (name, Float64MultiArray.ros_type, unit)
             for name, unit in (("position", "m"), ("velocity", "m/s"), ("force", "N"))
         )
         size = bond.size

@@ -1,7 +1,7 @@
-"""Physical quantities in scenarios: `80 mm`, `10 kPa`, `1 ms` become SI floats (durations: integer
-nanoseconds).
+"""Physical quantities in scenarios: `80 mm`, `10 kPa`, `1 ms` become SI floats.
 
-A bare number is taken in the SI unit of the field; another dimension is refused.
+Durations become integer nanoseconds. A bare number is taken in the SI unit of the field; a unit of another
+dimension is an error.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
 
 _FACTOR = r"(?:1|%|°?[^\W\d]\w*)(?:(?:\^|\*\*)-?\d)?"
 _UNIT = re.compile(rf"\(*{_FACTOR}\)*(?:(?:\s*[*/]\s*|\s+)\(*{_FACTOR}\)*)*")
-"""What is given to pint, which evaluates more than units: `9**9**9` would keep it busy for ever."""
+"""What is passed to pint, which evaluates more than units: `9**9**9` would keep it busy for ever."""
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.ASCII)
 
 
@@ -46,21 +46,21 @@ def _registry() -> Any:
 
 
 def _converted(number: float, unit: str, target: str) -> float:
-    """Return `number` in unit `target`. Raises ValueError where there is no way from `unit` to there."""
+    """Return `number` in unit `target`. Raises ValueError if `unit` cannot be converted to it."""
     from pint.errors import PintError
 
     if not _UNIT.fullmatch(unit) or not _UNIT.fullmatch(target):
-        raise ValueError(f"'{unit}' is no unit")
+        raise ValueError(f"'{unit}' is not a unit")
     try:
         return float(_registry().Quantity(number, unit).to(target).magnitude)
     except (PintError, AssertionError, TokenError, TypeError, ValueError, ArithmeticError) as error:
-        raise ValueError(str(error) or f"'{unit}' is no unit") from error
+        raise ValueError(str(error) or f"'{unit}' is not a unit") from error
 
 
 def to_si(value: Any, unit: str) -> float:
     """Return `value`, a number or a text such as `80 mm`, in the SI unit `unit`.
 
-    Raises ValueError if it is no such finite quantity.
+    Raises ValueError if it is not a finite quantity of that dimension.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit}, such as '1 {unit}'")
@@ -72,15 +72,15 @@ def to_si(value: Any, unit: str) -> float:
         if match and match[2]:
             number = _converted(number, match[2], unit)
     except (ValueError, OverflowError) as error:
-        raise ValueError(f"'{value}' is no quantity in {unit} ({error})") from error
+        raise ValueError(f"'{value}' is not a quantity in {unit} ({error})") from error
     if not math.isfinite(number):
-        raise ValueError(f"'{value}' is no quantity in {unit} (it is not finite)")
+        raise ValueError(f"'{value}' is not a quantity in {unit} (it is not finite)")
     return number
 
 
 @cache
 def same_unit(one: str, other: str) -> bool:
-    """Say whether two units are the same in dimension and size; an empty unit is the same as any."""
+    """Return whether two units are the same in dimension and size; an empty unit equals any."""
     if not one or not other or one == other:
         return True
     try:
@@ -101,10 +101,10 @@ def _quantity(unit: str, example: str) -> Any:
 def _nanoseconds(value: Any) -> int:
     nanoseconds = to_si(value, "s") * 1e9
     if abs(nanoseconds) >= 2**63:
-        raise ValueError(f"'{value}' is longer than 64 bits of nanoseconds hold, 292 years")
+        raise ValueError(f"'{value}' is longer than 64 bits of nanoseconds can represent, 292 years")
     whole = round(nanoseconds)
     if not math.isclose(whole, nanoseconds, rel_tol=4 * sys.float_info.epsilon, abs_tol=1e-3):
-        raise ValueError(f"'{value}' is no whole number of nanoseconds")
+        raise ValueError(f"'{value}' is not a whole number of nanoseconds")
     return whole
 
 

@@ -1,6 +1,6 @@
 """The standard ROS 2 message types that Trocar uses, field for field as ROS 2 Jazzy has them.
 
-`tests/schemas` holds each one against the type store of `rosbags`.
+`tests/schemas` compares each one with the type store of `rosbags`.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class BoolMessage(Message):
 
 
 class EmptyMessage(Message):
-    """A signal that something is to be done or has happened."""
+    """A signal that something shall be done or has happened."""
 
     ros_type: ClassVar[str] = "std_msgs/msg/Empty"
     structure_needs_at_least_one_member: UInt8 = 0
@@ -204,7 +204,7 @@ class QuaternionStamped(Message):
 
 
 class Transform(Message):
-    """Where a frame is in another one: translation in metres and rotation."""
+    """Pose of a frame in another one: translation in metres and rotation."""
 
     ros_type: ClassVar[str] = "geometry_msgs/msg/Transform"
     translation: Vector3 = Vector3()
@@ -212,7 +212,7 @@ class Transform(Message):
 
 
 class TransformStamped(Message):
-    """Where the frame `child_frame_id` is in the frame of the header."""
+    """Pose of the frame `child_frame_id` in the frame of the header."""
 
     ros_type: ClassVar[str] = "geometry_msgs/msg/TransformStamped"
     header: Header = Header()
@@ -221,7 +221,7 @@ class TransformStamped(Message):
 
 
 class TFMessage(Message):
-    """Where frames are."""
+    """Poses of frames."""
 
     ros_type: ClassVar[str] = "tf2_msgs/msg/TFMessage"
     transforms: list[TransformStamped] = Field(default_factory=list[TransformStamped])
@@ -276,7 +276,7 @@ class WrenchStamped(Message):
 
 
 class JointState(Message):
-    """Joint positions (rad, m), velocities (rad/s, m/s) and efforts (N m, N); an empty array is not stated."""
+    """Joint positions (rad, m), velocities (rad/s, m/s) and efforts (N m, N); an empty array is unknown."""
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/JointState"
     header: Header = Header()
@@ -296,8 +296,9 @@ class Joy(Message):
 
 
 class Image(Message):
-    """An uncompressed image, row after row from the top; the stamp is when it was taken, the frame the
-    camera's optical frame.
+    """An uncompressed image, row after row from the top.
+
+    The stamp is when it was taken, the frame the camera's optical frame.
     """
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/Image"
@@ -331,8 +332,9 @@ class RegionOfInterest(Message):
 
 
 class CameraInfo(Message):
-    """A camera's calibration: distortion d, intrinsics k (3 x 3), rectification r (3 x 3), projection p (3 x
-    4), row after row.
+    """A camera's calibration: distortion d, intrinsics k, rectification r and projection p.
+
+    k and r are 3 x 3, p is 3 x 4, row after row.
     """
 
     ros_type: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
@@ -358,7 +360,7 @@ class KeyValue(Message):
 
 
 class DiagnosticStatus(Message):
-    """How a piece of hardware fares."""
+    """The condition of a piece of hardware."""
 
     ros_type: ClassVar[str] = "diagnostic_msgs/msg/DiagnosticStatus"
     level: Byte = 0

@@ -21,7 +21,19 @@ from schemas.codec import encode, message_type
 from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.ros import Header, MultiArrayDimension, MultiArrayLayout, Time
+from schemas.ros import (
+    AccelStamped,
+    Float64Message,
+    Float64MultiArray,
+    Header,
+    JointState,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    PoseStamped,
+    Time,
+    TwistStamped,
+    WrenchStamped,
+)
 
 __all__ = ["Vector", "VectorCodec", "has_vector"]
 
@@ -29,13 +41,13 @@ Vector = NDArray[np.float64]
 
 _XYZ, _XYZW = ("x", "y", "z"), ("x", "y", "z", "w")
 _LAYOUTS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "std_msgs/msg/Float64": (("data", ()),),
-    "std_msgs/msg/Float64MultiArray": (("data", ()),),
-    "geometry_msgs/msg/PoseStamped": (("pose.position", _XYZ), ("pose.orientation", _XYZW)),
-    "geometry_msgs/msg/TwistStamped": (("twist.linear", _XYZ), ("twist.angular", _XYZ)),
-    "geometry_msgs/msg/WrenchStamped": (("wrench.force", _XYZ), ("wrench.torque", _XYZ)),
-    "geometry_msgs/msg/AccelStamped": (("accel.linear", _XYZ), ("accel.angular", _XYZ)),
-    "sensor_msgs/msg/JointState": (),
+    Float64Message.ros_type: (("data", ()),),
+    Float64MultiArray.ros_type: (("data", ()),),
+    PoseStamped.ros_type: (("pose.position", _XYZ), ("pose.orientation", _XYZW)),
+    TwistStamped.ros_type: (("twist.linear", _XYZ), ("twist.angular", _XYZ)),
+    WrenchStamped.ros_type: (("wrench.force", _XYZ), ("wrench.torque", _XYZ)),
+    AccelStamped.ros_type: (("accel.linear", _XYZ), ("accel.angular", _XYZ)),
+    JointState.ros_type: (),
 }
 """Per type: the blocks of numbers, each with the names of its elements (none: an array or a single number).
 """
@@ -45,7 +57,7 @@ _NANOSEC = struct.Struct("<I")
 
 
 def has_vector(type_name: str) -> bool:
-    """Say whether values of this ROS type are vectors."""
+    """Return whether values of this ROS type are vectors."""
     return type_name in _LAYOUTS
 
 
@@ -53,9 +65,9 @@ class VectorCodec:
     """The vector form of one port: `size` numbers, `fields` by name, to and from CDR and message models."""
 
     def __init__(self, port: Port) -> None:
-        """Work out the layout of `port`; raises MessageError if its type has none."""
+        """Find the layout of `port`; raises MessageError if its type has none."""
         if not has_vector(port.type):
-            raise MessageError(f"port '{port.name}': values of {port.type} are no vectors")
+            raise MessageError(f"port '{port.name}': values of {port.type} are not vectors")
         self.port = port
         self.model = message_type(port.type)
         self.fields: dict[str, slice] = {}
@@ -65,7 +77,7 @@ class VectorCodec:
         self._blocks = list(self._layout())
         self.size: int = self._blocks[-1][2].stop
         self.neutral = np.zeros(self.size)
-        """The value nobody has set: zeros, and the unit quaternion."""
+        """The value before any is set: zeros, and the unit quaternion."""
         self._is_pose = "pose.orientation" in self.fields
         if self._is_pose:
             self.neutral[6] = 1.0
@@ -73,7 +85,7 @@ class VectorCodec:
 
     def _layout(self) -> Iterator[tuple[str, tuple[str, ...], slice]]:
         port, at = self.port, 0
-        if port.type == "sensor_msgs/msg/JointState":
+        if port.type == JointState.ros_type:
             rows = tuple((field, (), max(len(port.names), port.size)) for field in port.fields)
         else:
             rows = tuple((path, names, len(names) or port.size) for path, names in _LAYOUTS[port.type])
@@ -86,8 +98,9 @@ class VectorCodec:
             at += count
 
     def _compile(self) -> None:
-        """Find where the stamp and the blocks stand in the CDR bytes, by serialising numbers that occur
-        nowhere else.
+        """Find the positions of the stamp and the blocks in the CDR bytes.
+
+        They are found by serialising numbers that occur nowhere else.
         """
         marks: Vector = np.random.default_rng(0).random(self.size)
         template = bytearray(encode(self.to_message(marks, 0)))
@@ -140,8 +153,9 @@ class VectorCodec:
         return self.checked(np.frombuffer(numbers))
 
     def fits(self, payload: bytes) -> bool:
-        """Say whether all bytes but the numbers and the stamp, which must be one, are as this codec writes
-        them.
+        """Return whether all bytes except the numbers and the stamp are as this codec writes them.
+
+        The stamp may have any valid value.
         """
         if len(payload) != self._length or (
             self._has_stamp and not _NANOSEC.unpack_from(payload, 8)[0] < 10**9
@@ -150,9 +164,7 @@ class VectorCodec:
         return all(payload[start:stop] == expected for start, stop, expected in self._fixed)
 
     def checked(self, value: Vector) -> Vector:
-        """Return `value` if it holds doubles, has the right shape, is finite and its quaternion (if any) is a
-        unit quaternion.
-        """
+        """Return `value` if it is valid: float64 of the right shape, finite, any quaternion a unit one."""
         if value.shape != (self.size,) or value.dtype != np.float64:
             raise MessageError(
                 f"port '{self.port.name}': {value.dtype} of shape {value.shape}, expected float64 of shape"
@@ -171,7 +183,7 @@ class VectorCodec:
         tree: dict[str, Any] = {}
         if "header" in self.model.model_fields:
             tree["header"] = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
-        if self.port.type == "sensor_msgs/msg/JointState":
+        if self.port.type == JointState.ros_type:
             tree["name"] = list(self.port.names)
         if self.port.shape:
             tree["layout"] = _layout_of(self.port.shape)
@@ -179,7 +191,7 @@ class VectorCodec:
             *parents, leaf = path.split(".")
             numbers = value[block]
             content: Any = dict(zip(names, numbers.tolist(), strict=True)) if names else numbers.copy()
-            if self.port.type == "std_msgs/msg/Float64":
+            if self.port.type == Float64Message.ros_type:
                 content = float(numbers[0])
             reduce(lambda node, key: node.setdefault(key, {}), parents, tree)[leaf] = content
         return self.model.model_validate(tree)
@@ -224,8 +236,10 @@ class VectorCodec:
 
 
 def _layout_of(shape: tuple[int, ...]) -> MultiArrayLayout:
-    """Return the layout of a dense array, row-major, as std_msgs/MultiArrayLayout defines strides: that of a
-    dimension counts it too.
+    """Return the layout of a dense array, row-major.
+
+    As in std_msgs/MultiArrayLayout, the stride of a dimension is the number of elements in it and all after
+    it.
     """
     labels = ("rows", "cols") if len(shape) == 2 else tuple(f"dim{axis}" for axis in range(len(shape)))
     rows = zip(labels, shape, strict=True)

@@ -1,6 +1,4 @@
-"""The command `trocar organs`: shapes and materials that a scenario may name, with where their numbers come
-from.
-"""
+"""The command `trocar organs`: the shapes and materials that a scenario may name, with their sources."""
 
 from __future__ import annotations
 
@@ -25,8 +23,9 @@ def organs(
     ] = 250,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")] = False,
 ) -> None:
-    """Print the organs that a scenario may name, their surfaces and meshes, and the materials with their
-    sources; SI units.
+    """Print the organs and the materials that a scenario may name.
+
+    Organs come with their surfaces and meshes, materials with their sources; SI units.
     """
     found = {"shapes": _shapes(nodes), "materials": _materials()}
     typer.echo(json.dumps(found, indent=2) if as_json else _text(found))

@@ -46,14 +46,13 @@ class BulletEngine(Stepped):
     params: BulletParams
 
     def __init__(self, name: str, params: BulletParams) -> None:
-        """Take the name and the parameters."""
         super().__init__(name, params)
         self._client = _NO_CLIENT
         self._organs: list[Organ] = []
         self._probes: list[Probe] = []
         self._grasps: list[Grasp] = []
         self._unused: dict[str, Value] = {}
-        """What probes say that might grasp, but are not bonded."""
+        """Outputs of the probes that might grasp, but are not bonded."""
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -131,9 +130,7 @@ class BulletEngine(Stepped):
         return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Press the probes along their predicted motion; return their reactions, and the nodes where they are
-        due.
-        """
+        """Press the probes along their predicted motion; return their reactions, and the nodes when due."""
         seconds, dt, probes = h * 1e-9, self._dt, self._probes
         for probe in probes:
             probe.begin(inputs, seconds)
@@ -173,7 +170,7 @@ class BulletEngine(Stepped):
         raise StateError(self._no_state)
 
     def close(self) -> None:
-        """Give the world back."""
+        """Close the world."""
         if self._client != _NO_CLIENT:
             disconnect(self._client)
         self._client = _NO_CLIENT
@@ -233,7 +230,7 @@ class BulletEngine(Stepped):
             organ.sample(t)
 
     def _settle(self) -> None:
-        """Let gravity grow as slowly as the organs can follow: seized at once, they would swing for long.
+        """Increase gravity as slowly as the organs can follow: applied at once, they would swing for long.
 
         It grows like the integral of a Hann window, whose spectrum is below 3 % from two periods per window
         on.

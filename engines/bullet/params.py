@@ -1,4 +1,4 @@
-"""What a scenario may say about the tissue engine: organs, rigid parts, probes, and how they are stepped."""
+"""Parameters of the tissue engine: organs, rigid parts, probes, and how they are stepped."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class BulletParams(Params):
             for part in organ.anchored_nodes:
                 if part != WORLD and part not in self.rigid:
                     raise ValueError(
-                        f"organ '{name}' is anchored to '{part}', which is no rigid"
+                        f"organ '{name}' is anchored to '{part}', which is not a rigid"
                         f" part.{did_you_mean(part, [WORLD, *self.rigid])}"
                     )
         return self

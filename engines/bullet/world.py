@@ -1,4 +1,4 @@
-"""Worlds of Bullet: physics servers inside this process, several side by side, and what holds in all of them."""
+"""Worlds of Bullet, of which one process may have several side by side."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ COLLISION_MARGIN_M = 1e-4
 
 @contextmanager
 def quiet(descriptor: int = 1) -> Generator[None]:
-    """Keep what Bullet prints while it connects and loads off a file descriptor: stdout, which may carry
-    JSON, or stderr (2).
+    """Discard what Bullet prints on a file descriptor: stdout (1), which may carry JSON, or stderr (2).
 
-    Bullet prints through C's buffers, which therefore are flushed before the descriptor is put back.
+    Bullet prints through C's buffers, so they are flushed before the descriptor is restored.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -43,7 +42,7 @@ def connect(part: str, timestep: float, gravity: float) -> int:
     Raises MissingExtraError, naming `part`, where pybullet is not installed.
     """
     try:
-        with quiet(2):  # on import it tells its build time
+        with quiet(2):  # on import it prints its build time
             import pybullet as bullet
     except ImportError as error:
         raise MissingExtraError(part, "bullet", "pybullet") from error
@@ -63,7 +62,7 @@ def connect(part: str, timestep: float, gravity: float) -> int:
 
 
 def disconnect(client: int) -> None:
-    """Give a world back."""
+    """Close a world."""
     import pybullet as bullet
 
     with quiet():

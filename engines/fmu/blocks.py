@@ -53,8 +53,9 @@ def prepared(
 
 
 def grouped(variables: Iterable[Variable]) -> Iterator[list[Variable]]:
-    """Yield the variables that can go through one call: of the same type, and alike in changing at events
-    only or at any time.
+    """Yield the variables that can go through one call.
+
+    They have the same type, and all change at events only, or all at any time.
     """
     groups: dict[tuple[str, bool], list[Variable]] = {}
     for variable in variables:
@@ -66,7 +67,7 @@ class Block:
     """Some variables of one type, all inputs or all outputs."""
 
     def __init__(self, verb: str, variables: Sequence[Variable], access: Access) -> None:
-        """Prepare the calls that `Set` or `Get` (the `verb`) the variables."""
+        """Prepare the calls on the variables; `verb` is `Set` or `Get`."""
         self.type = variables[0].type
         self.discrete = variables[0].discrete
         size = sum(variable.size for variable in variables)
@@ -96,14 +97,16 @@ class Block:
         return ", ".join(self._names.values())
 
     def refused(self) -> str:
-        """Return the name of the first variable that the FMU refuses to set or get, after it has discarded a
-        call on all of them.
+        """Return the name of the first variable that the FMU refuses to set or get.
+
+        Called after the FMU has discarded a call on all of them.
         """
         return next((name for name, call in self._single.items() if call() > WARNING), self.names)
 
     def take(self, inputs: Inputs, tau: float) -> None:
-        """Take the inputs as they are `tau` seconds after the start of the step; those that change at events
-        only as they are at its start.
+        """Take the inputs as they are `tau` seconds after the start of the step.
+
+        Inputs that change at events only are taken at the start of the step.
         """
         for port, part in self.parts.items():
             self.values[part] = inputs[port] if self.discrete else inputs.at(port, tau)
@@ -118,7 +121,7 @@ class Block:
     def publish(self) -> None:
         """Bring the outputs that the FMU has written from their C type to doubles.
 
-        Raises SessionError if one of them is none.
+        Raises SessionError if one of them is not a number that a port can carry.
         """
         if self.raw is not self.values:
             np.copyto(self.values, self.raw)

@@ -1,4 +1,4 @@
-"""What an FMU's modelDescription.xml says, as ports and start values. The FMU itself is not loaded for it."""
+"""An FMU's modelDescription.xml as ports and start values, without loading the FMU itself."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from engines.fmu.start import Start, declared_start, given_start, settable, size
 from engines.fmu.variables import Variable, number_type, port_name
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 from schemas.ports import Port
+from schemas.ros import Float64Message, Float64MultiArray
 
 if TYPE_CHECKING:
     from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
@@ -83,7 +84,7 @@ def _input_start(
         return declared_start(row, variable.size)
     except ValueError as error:
         raise ScenarioError(
-            f"'{path}': the FMU declares the start value '{row.start}' for '{row.name}', which is no number"
+            f"'{path}': the FMU declares the start value '{row.start}' for '{row.name}': not a number"
         ) from error
 
 
@@ -94,19 +95,18 @@ def _read(path: Path) -> ModelDescription:
     except ImportError as error:
         raise MissingExtraError("engine 'fmu'", "fmu", "fmpy") from error
     if not path.is_file():
-        raise ScenarioError(f"there is no FMU '{path}'")
+        raise ScenarioError(f"the FMU '{path}' does not exist")
     try:
         with path.open("rb") as file:  # given a path, FMPy leaves the file open if there is an error in it
             try:
                 return read_model_description(file)
-            except (
-                ValidationError
-            ) as error:  # tools write many FMUs that run well and break a rule of the schema
+            except ValidationError as error:
+                # tools write many FMUs that run well and break a rule of the schema
                 _log.warning(
                     "%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems)
                 )
                 return read_model_description(file, validate=False)
-    except Exception as error:  # FMPy lets everything through: BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
+    except Exception as error:  # FMPy raises BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
         raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {error}") from error
 
 
@@ -131,19 +131,16 @@ def _co_simulation(path: Path, model: ModelDescription, major: int) -> CoSimulat
     ]
     if clocks:
         raise ScenarioError(
-            f"'{path}' has time-based input clocks ({', '.join(clocks)}), which Trocar does not tick. Export"
-            " it without clocks."
+            f"'{path}' has time-based input clocks ({', '.join(clocks)}), which Trocar does not support."
+            " Export it without clocks."
         )
     folder = fmpy.platform if major == 2 else fmpy.platform_tuple
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
     if f"binaries/{folder}/{model.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}" not in names:
-        there = sorted(
-            {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
-        )
-        raise ScenarioError(
-            f"'{path}' has no binary for this platform, {folder}; it has: {', '.join(there) or 'none'}"
-        )
+        found = {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
+        binaries = ", ".join(sorted(found)) or "none"
+        raise ScenarioError(f"'{path}' has no binary for this platform, {folder}; it has: {binaries}")
     return model.coSimulation
 
 
@@ -167,7 +164,7 @@ def _variable(path: Path, row: ModelVariable, major: int, size: int) -> Variable
         reason = (
             "it is empty"
             if number
-            else f"it is a {row.type}; only numbers and truth values flow between participants"
+            else f"it is a {row.type}; only numbers and booleans are exchanged between participants"
         )
         _log.info("%s: %s '%s' becomes no port: %s", path, row.causality, row.name, reason)
         return None
@@ -185,7 +182,7 @@ def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | Non
     return Port(
         name=variable.port,
         causality="input" if row.causality == "input" else "output",
-        type="std_msgs/msg/Float64MultiArray" if row.dimensions else "std_msgs/msg/Float64",
+        type=(Float64MultiArray if row.dimensions else Float64Message).ros_type,
         size=variable.size,
         unit=unit_of(row),
         start=start,

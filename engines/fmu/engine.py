@@ -3,8 +3,8 @@
 Inputs and outputs of the FMU are ports, named as `engines.fmu.variables.port_name` says, in the unit that the
 FMU declares: nothing is converted, so that a length in mm fits an input in mm alone. Scalars are
 `std_msgs/msg/Float64`, FMI 3 arrays `std_msgs/msg/Float64MultiArray`, row by row. Integers, enumerations and
-booleans (0, 1) flow as doubles, and an input that is no such number ends the session. Strings, binaries and
-clocks are no ports, which is logged.
+booleans (0, 1) are exchanged as doubles; an input that is no valid number of its type ends the session.
+Strings, binaries and clocks become no ports, which is logged.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class FmuParams(Params):
     start: dict[str, Any] = Field(
         default_factory=dict[str, Any],
         description=(
-            "start values by FMU variable name: numbers in the variable's unit, texts with a unit, lists for"
-            " arrays, true or false, or texts"
+            "start values by FMU variable name: a number in the variable's unit, a text with a unit, a list"
+            " for an array, true or false, or a text"
         ),
         examples=[{"mass": "50 g", "stages": 3}],
     )
@@ -63,19 +63,18 @@ class FmuEngine(Stepped):
 
     Between communication points an FMU holds its inputs. Where a connection extrapolates linearly, an FMI 2
     FMU that can interpolate gets value and slope; any other FMU gets the mean of the input over each
-    communication step, which `step` makes as short as wanted.
+    communication step, which `step` makes as short as needed.
 
     `state_hash` covers the serialised state of the FMU where equal states have equal bytes. Many FMUs
     serialise addresses of their memory as well (those of modelica/Reference-FMUs do, `getFMUState` in
-    src/cosimulation.c), so that is tried out on a twin; where it is not so, and where the FMU cannot
-    serialise, the hash covers inputs, outputs and the time.
+    src/cosimulation.c), so a second instance is compared at the start; where equal states differ in their
+    bytes, and where the FMU cannot serialise, the hash covers inputs, outputs and the time.
     """
 
     params_model: ClassVar[type[Params]] = FmuParams
     params: FmuParams
 
     def __init__(self, name: str, params: FmuParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._instance: Instance | None = None
         self._hashes_state = False
@@ -128,7 +127,7 @@ class FmuEngine(Stepped):
         return self._read(t + h)
 
     def state_hash(self) -> int:
-        """Return the hash of the FMU's state, or of all that is seen of it."""
+        """Return the hash of the FMU's state, or else of its inputs, outputs and time."""
         instance = self._running()
         if self._hashes_state:
             return state_hash(instance.memory, instance.serialise())
@@ -147,7 +146,7 @@ class FmuEngine(Stepped):
         size = instance.memory.nbytes
         if len(state) < size:
             raise StateError(
-                f"participant '{self.name}': {len(state)} bytes are no state of '{self.params.path.name}'"
+                f"participant '{self.name}': {len(state)} bytes are not a state of '{self.params.path.name}'"
             )
         instance.deserialise(state[size:])
         instance.memory[:] = np.frombuffer(state, np.float64, instance.memory.size)

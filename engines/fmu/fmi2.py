@@ -11,7 +11,7 @@ import numpy as np
 from engines.fmu.blocks import WARNING
 from engines.fmu.description import Description
 from engines.fmu.instance import DISCARD, Instance
-from engines.fmu.log import fmi2_callbacks, wants_all
+from engines.fmu.log import fmi2_callbacks, log_everything
 from engines.fmu.start import Start
 from hub.participant import Inputs
 from schemas.errors import SessionError
@@ -36,7 +36,7 @@ class Fmi2Instance(Instance):
         from fmpy.fmi2 import FMU2Slave
 
         super().__init__(
-            FMU2Slave, description, name, {"callbacks": fmi2_callbacks(), "loggingOn": wants_all()}
+            FMU2Slave, description, name, {"callbacks": fmi2_callbacks(), "loggingOn": log_everything()}
         )
         self._do_step: Callable[..., int] = self._function("DoStep")
         interpolates = description.co_simulation.canInterpolateInputs
@@ -70,7 +70,7 @@ class Fmi2Instance(Instance):
         self.call("ExitInitializationMode")
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
-        """Give the FMU its inputs: value and slope if it interpolates, else the mean over the `dt` seconds."""
+        """Set the inputs: value and slope if the FMU interpolates, else the mean over the `dt` seconds."""
         interpolates = bool(self._slope_ports)
         for block in self.inputs:
             block.take(inputs, tau if interpolates else tau + dt / 2)

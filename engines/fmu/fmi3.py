@@ -12,7 +12,7 @@ import numpy as np
 from engines.fmu.blocks import WARNING, Block
 from engines.fmu.description import Description
 from engines.fmu.instance import Instance
-from engines.fmu.log import log_message, wants_all
+from engines.fmu.log import log_everything, log_message
 from engines.fmu.start import Start
 from hub.participant import Inputs
 from schemas.errors import SessionError
@@ -20,7 +20,7 @@ from schemas.errors import SessionError
 __all__ = ["Fmi3Instance"]
 
 _SAME_INSTANT_S = 0.5e-9
-"""Simulated time has whole nanoseconds: what is nearer than half of one is the same instant."""
+"""Simulated time has whole nanoseconds: times nearer than half of one are the same instant."""
 _MOST_EVENTS = 10_000
 """In one step. An FMU that asks for more stands still (a Zeno point), and a session must not hang on it."""
 
@@ -52,7 +52,7 @@ class Fmi3Instance(Instance):
             "eventModeUsed": self._has_events,
             "earlyReturnAllowed": True,
             "logMessage": log,
-            "loggingOn": wants_all(),
+            "loggingOn": log_everything(),
         }
         super().__init__(FMU3Slave, description, name, options)
         self._event_blocks = [block for block in self.inputs if block.discrete and self._has_events]
@@ -93,8 +93,9 @@ class Fmi3Instance(Instance):
             self.call("EnterStepMode")
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
-        """Give the FMU its inputs: continuous ones as their mean over the `dt` seconds, discrete ones, if
-        they have changed, in event mode.
+        """Set the inputs: continuous ones to their mean over the `dt` seconds, discrete ones in event mode.
+
+        Discrete inputs are set only if they have changed.
         """
         for block in self._step_blocks:
             block.take(inputs, tau + dt / 2)
@@ -124,7 +125,7 @@ class Fmi3Instance(Instance):
             if end - now < _SAME_INSTANT_S:
                 return
         raise SessionError(
-            f"the FMU got no further than {now:.9g} s in {_MOST_EVENTS} events of the step to {end:.9g} s"
+            f"the FMU reached only {now:.9g} s in {_MOST_EVENTS} events of the step to {end:.9g} s"
         )
 
     def _step_to(self, now: float, target: float) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engines.fmu.blocks import WARNING, Block, grouped, prepared
 from engines.fmu.description import Description
-from engines.fmu.log import last_complaint
+from engines.fmu.log import last_warning
 from engines.fmu.start import Start
 from hub.participant import Inputs
 from schemas.errors import ScenarioError, SessionError
@@ -51,7 +51,10 @@ def _load(slave: type[Any], description: Description, directory: Path, name: str
 
 
 class Instance(ABC):
-    """A loaded FMU. Raises SessionError, with the FMU's own complaint, whenever one of its functions fails."""
+    """A loaded FMU.
+
+    Raises SessionError, with the FMU's own message, whenever one of its functions fails.
+    """
 
     prefix: ClassVar[str]
     """`fmi2` or `fmi3`."""
@@ -81,9 +84,7 @@ class Instance(ABC):
             try:
                 self._fmu.instantiate(**options)
             except Exception as error:  # FMPy raises a bare Exception
-                raise SessionError(
-                    f"'{description.path}' cannot be instantiated{self._complaint()}"
-                ) from error
+                raise SessionError(f"'{description.path}' cannot be instantiated{self._reason()}") from error
             self._loaded = stack.pop_all()
         self.can_save = (
             description.co_simulation.canGetAndSetFMUstate and description.co_simulation.canSerializeFMUstate
@@ -110,7 +111,7 @@ class Instance(ABC):
 
     @abstractmethod
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
-        """Give the FMU its inputs for the `dt` seconds that begin `tau` seconds after the start of the step."""
+        """Set the inputs for the `dt` seconds that begin `tau` seconds after the start of the step."""
 
     @abstractmethod
     def advance(self, t: int, h: int) -> None:
@@ -158,7 +159,7 @@ class Instance(ABC):
                 and self._worst < _ERROR
                 and self._function("Terminate")(self._component) > WARNING
             ):
-                _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._complaint())
+                _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._reason())
             self._function("FreeInstance")(self._component)
 
     def call(self, function: str, *arguments: Any) -> None:
@@ -170,15 +171,15 @@ class Instance(ABC):
     def failure(self, function: str, status: int, about: str = "") -> SessionError:
         """Return the error for a function that failed, and remember how bad it was.
 
-        `about` says what it was called for.
+        `about`: what it was called for, as part of the message.
         """
         self._worst = max(self._worst, status)
         label = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
-        return SessionError(f"{self.prefix}{function} returned '{label}'{about}{self._complaint()}")
+        return SessionError(f"{self.prefix}{function} returned '{label}'{about}{self._reason()}")
 
-    def _complaint(self) -> str:
-        said = last_complaint(self._name)
-        return f"; the FMU says: {said}" if said else ""
+    def _reason(self) -> str:
+        message = last_warning(self._name)
+        return f"; the FMU reports: {message}" if message else ""
 
     def _function(self, name: str) -> Callable[..., int]:
         return getattr(self._fmu.dll, self.prefix + name)

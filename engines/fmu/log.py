@@ -7,32 +7,33 @@ from ctypes import byref
 from functools import cache
 from typing import Any
 
-__all__ = ["fmi2_callbacks", "last_complaint", "log_message", "wants_all"]
+__all__ = ["fmi2_callbacks", "last_warning", "log_everything", "log_message"]
 
 _log = logging.getLogger(__name__)
 _LEVELS = (logging.DEBUG, logging.WARNING, logging.WARNING, logging.ERROR, logging.CRITICAL, logging.DEBUG)
 """By FMI status: ok, warning, discard, error, fatal, pending (FMI 2 alone)."""
-_complaints: dict[str, str] = {}
+_last_warnings: dict[str, str] = {}
 
 
 def log_message(instance: str, status: int, category: bytes | None, message: bytes | None) -> None:
-    """Take a message of an FMU instance."""
+    """Log a message of an FMU instance."""
     text = (message or b"").decode(errors="replace").strip()
     level = _LEVELS[status] if 0 <= status < len(_LEVELS) else logging.ERROR
     if level >= logging.WARNING:
-        _complaints[instance] = text
+        _last_warnings[instance] = text
     _log.log(level, "%s: %s: %s", instance, (category or b"").decode(errors="replace"), text)
 
 
-def last_complaint(instance: str) -> str:
-    """Return the last warning or error of an instance, to be put into the error that follows from it, and
-    forget it.
+def last_warning(instance: str) -> str:
+    """Return the last warning or error of an instance, and forget it.
+
+    It becomes part of the error that follows from it.
     """
-    return _complaints.pop(instance, "")
+    return _last_warnings.pop(instance, "")
 
 
-def wants_all() -> bool:
-    """Say whether anybody listens to what FMUs log when all is well."""
+def log_everything() -> bool:
+    """Return whether FMUs shall log more than warnings and errors."""
     return _log.isEnabledFor(logging.DEBUG)
 
 

@@ -1,5 +1,6 @@
-"""Start values: those that an FMU declares for its inputs, and those that a scenario gives for parameters,
-inputs and states.
+"""Start values: those that an FMU declares for its inputs, and those that a scenario gives.
+
+A scenario may give them for parameters, inputs and states.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ class Start:
 
 
 def settable(row: ModelVariable) -> bool:
-    """Say whether a start value can be given (FMI 2.0.5 section 4.2.4, FMI 3.0.2 section 2.3.2: state
-    Instantiated).
+    """Return whether a start value can be given.
+
+    FMI 2.0.5 section 4.2.4, FMI 3.0.2 section 2.3.2: state Instantiated.
     """
     return row.variability != "constant" and (
         row.causality in {"input", "parameter", "structuralParameter"} or row.initial in {"exact", "approx"}
@@ -50,8 +52,9 @@ def unit_of(row: ModelVariable) -> str:
 
 
 def size_of(row: ModelVariable, start: Mapping[str, Any]) -> int:
-    """Return the number of elements of a variable; structural parameters among the start values change that
-    of FMI 3 arrays.
+    """Return the number of elements of a variable.
+
+    Structural parameters among the start values change that of FMI 3 arrays.
     """
     return math.prod(
         int(start.get(d.variable.name, d.variable.start) if d.variable else d.start) for d in row.dimensions
@@ -67,10 +70,10 @@ def declared_start(row: ModelVariable, size: int) -> tuple[float, ...] | None:
 
 
 def given_start(row: ModelVariable, given: Any, major: int, size: int) -> Start:
-    """Return the start value `given`: a number, a text with a unit, a list of them, a truth value, or a text
-    for a String.
+    """Return the start value `given`: a number, a text with a unit, a list of them, or true or false.
 
-    Numbers are in the variable's unit. Raises ValueError if it does not fit the variable.
+    For a String it is a text. Numbers are in the variable's unit. Raises ValueError if it does not fit the
+    variable.
     """
     structural = row.causality == "structuralParameter"
     if row.type == "String":

@@ -32,10 +32,10 @@ class NumberType:
     """The C type of those functions."""
 
     def from_float64(self, values: Vector, variable: str) -> NDArray[Any]:
-        """Return `values` in the C type. Raises ValueError, naming the variable, if one of them has no exact
-        place there.
+        """Return `values` in the C type.
 
-        A boolean is 0 or 1, an integer a whole number in its range and of at most 2^53.
+        A boolean is 0 or 1, an integer a whole number in its range and of at most 2^53. Raises ValueError,
+        naming the variable, if a value cannot be represented exactly.
         """
         low, high = self._bounds()
         fits = (values >= low) & (values <= high)
@@ -96,8 +96,9 @@ _FMI3 = {
 
 
 def number_type(major: int, fmi_type: str) -> NumberType | None:
-    """Return an FMI type by name, as FMI 2.0 (fmi2TypesPlatform.h) or 3.0 (fmi3PlatformTypes.h) has it; None
-    if it holds no numbers.
+    """Return an FMI type by name; None if it holds no numbers.
+
+    Names are those of FMI 2.0 (fmi2TypesPlatform.h) or 3.0 (fmi3PlatformTypes.h).
     """
     return (_FMI2 if major == 2 else _FMI3).get(fmi_type)
 

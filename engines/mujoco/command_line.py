@@ -1,6 +1,4 @@
-"""The commands `trocar model`: where an arm's tip stands, what its dynamics are, and the model as files for
-other programs.
-"""
+"""The commands `trocar model`: kinematics and dynamics of an arm, and the model as files."""
 
 from __future__ import annotations
 
@@ -35,7 +33,7 @@ _CART: tuple[CartArm, ...] = get_args(CartArm)
 
 
 class _NumbersInARow(TyperCommand):
-    """Takes `--q 0.1 -0.2 0.3` like `--q 0.1,-0.2,0.3`: all numbers that follow belong to the option."""
+    """Accepts `--q 0.1 -0.2 0.3` like `--q 0.1,-0.2,0.3`: all numbers that follow belong to the option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         for option in ("--q", "--dq"):
@@ -59,7 +57,7 @@ def _numbers(text: str) -> list[float] | None:
 def _checked(text: str | None) -> str | None:
     if text is not None and not _numbers(text):
         raise typer.BadParameter(
-            f"'{text}' holds no numbers; write one per joint in SI units, separated by spaces or commas"
+            f"'{text}' contains no numbers; write one per joint in SI units, separated by spaces or commas"
         )
     return text
 
@@ -114,7 +112,7 @@ def dynamics(
     tool = instrument or ("straight" if name == "ECM" else DEFAULT_INSTRUMENT)
     velocities = [0.0] * len(positions) if dq is None else _numbers(dq) or []
     with _refusing():
-        kinematics.fk(arm, tool, positions)  # refuses what is out of range
+        kinematics.fk(arm, tool, positions)  # raises MotionError where one is out of range
         if len(velocities) != len(positions):
             raise MotionError(f"{arm}: {len(velocities)} joint velocities, expected {len(positions)}")
         if not np.isfinite(velocities).all():
@@ -180,7 +178,7 @@ def export(
     ] = "cart",
     form: Annotated[
         Literal["mjcf", "urdf"] | None,
-        typer.Option("--format", help="By default what the file's suffix says, else mjcf."),
+        typer.Option("--format", help="By default that of the file's suffix, else mjcf."),
     ] = None,
 ) -> None:
     """Write the robot's model as MJCF or URDF with its meshes."""
@@ -208,14 +206,14 @@ def _scene(arms: list[CartArm], instruments: list[str], mounting: str) -> SceneP
         arm, _, tool = text.partition("=")
         if arm not in tools or not tool:
             problem = (
-                f"'{text}' is no ARM=N with an arm of this model: {', '.join(tools)}; write for instance"
+                f"'{text}' is not ARM=N with an arm of this model: {', '.join(tools)}; write for instance"
                 f" {arms[0]}=400006"
             )
             raise typer.BadParameter(problem, param_hint="--instrument")
         tools[_cart_arm(arm)] = {"endoscope" if arm == "ECM" else "instrument": tool}
     if mounting == "free" and len(tools) > 1:
         raise typer.BadParameter(
-            f"{len(tools)} arms would stand in one place; name one with --arms, or mount them on the cart",
+            f"{len(tools)} arms would be at the same place; name one with --arms, or mount them on the cart",
             param_hint="--mounting",
         )
     with _refusing():
@@ -230,7 +228,7 @@ def _cart_arm(arm: str) -> CartArm:
 
 @contextmanager
 def _refusing() -> Generator[None]:
-    """Turn what an arm cannot do into bad usage."""
+    """Report what an arm cannot do as bad usage."""
     try:
         yield
     except MotionError as error:

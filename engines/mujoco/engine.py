@@ -1,5 +1,4 @@
-"""The MuJoCo engine: dVRK arms with joint servos, things to hold, power bonds at probes and contact spheres,
-and exact checkpoints.
+"""The MuJoCo engine: dVRK arms, objects, power bonds at instruments, and exact checkpoints.
 
 A sub-step is `mj_step2` (actuation to integration) followed by `mj_step1` (kinematics, velocities, sensors):
 the same work as `mj_step`, in the order that leaves every output at the end of the step instead of one
@@ -30,7 +29,7 @@ __all__ = ["MujocoEngine"]
 
 
 class _Keeper(Protocol):
-    """What remembers something between steps that MuJoCo's own state does not hold."""
+    """A part with a state of its own, which MuJoCo's does not contain."""
 
     @property
     def state(self) -> Vector: ...
@@ -46,7 +45,6 @@ class MujocoEngine(Stepped):
     params: MujocoParams
 
     def __init__(self, name: str, params: MujocoParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._touching: list[Probe | Spheres] = []
         self._keepers: list[_Keeper] = []
@@ -55,15 +53,17 @@ class MujocoEngine(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Per arm commands in and measured state out; the whole model's positions; per object its pose,
-        holder, slip and lift.
+        """Commands and measured state of every arm, `qpos` of the whole model, and the state of every object.
+
+        The state of an object is its pose, who holds it, its slip, turn and lift.
         """
         return scene_ports(self.params)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Per palpation probe `<arm>/probe`: its sphere; per instrument with contact spheres `<arm>/contact`:
-        their centres; in the world.
+        """The sphere of every palpation probe, `<arm>/probe`, and the contact spheres of instruments.
+
+        The latter are called `<arm>/contact`; positions are those of the spheres' centres, in the world.
         """
         return tuple(
             side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)})
@@ -71,7 +71,7 @@ class MujocoEngine(Stepped):
         )
 
     def configure(self, setup: Setup) -> Outputs:
-        """Build and compile the model, and put the arms where they start."""
+        """Build and compile the model, and put the arms at their start positions."""
         timestep, period = self.params.timestep, setup.period_ns
         if period % timestep:
             problem = (
@@ -91,7 +91,7 @@ class MujocoEngine(Stepped):
         from engines.mujoco.interaction import holding
         from engines.mujoco.interaction.rigid_contact import RigidContact
 
-        # else MuJoCo writes MUJOCO_LOG.TXT where the user stands
+        # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
         mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
         spec = model.spec(self.params)
         brakes.prepare(spec, self.params)
@@ -147,8 +147,9 @@ class MujocoEngine(Stepped):
         ]
 
     def _what_is_state(self) -> int:
-        """Return which parts of MuJoCo's data are state: without a bond nothing ever applies a force, and
-        half of its numbers stay 0.
+        """Return which parts of MuJoCo's data are state.
+
+        Applied forces are left out where there is no bond: they stay 0, and are half of the numbers.
         """
         state = self._mujoco.mjtState
         applied = int(state.mjSTATE_QFRC_APPLIED | state.mjSTATE_XFRC_APPLIED)
@@ -191,8 +192,8 @@ class MujocoEngine(Stepped):
             if not np.isfinite(inputs[port]).all():
                 return f"{where}: input '{port}' is {inputs[port]}; every number must be finite"
         return (
-            f"{where}, arms {', '.join(self.params.arms)}: the simulation is unstable. Likeliest cause: a"
-            " bond whose wrench is too stiff for its step (shorten the step, or use impulse-linearised),"
+            f"{where}, arms {', '.join(self.params.arms)}: the simulation is unstable. The likeliest cause is"
+            " a bond whose wrench is too stiff for its step (shorten the step, or use impulse-linearised),"
             f" else the sub-step (timestep, now {self.params.timestep} ns)"
         )
 
@@ -205,25 +206,24 @@ class MujocoEngine(Stepped):
             at += state.size
 
     def state_hash(self) -> int:
-        """Return the hash of MuJoCo's integration state, setpoints and modes, who holds what, and the bonds'
-        books.
-        """
+        """Return the hash of MuJoCo's integration state, setpoints and modes, holders, and energy books."""
         self._read_state()
         return state_hash(self._state)
 
     def save(self) -> bytes:
-        """Return MuJoCo's integration state (`mjSTATE_INTEGRATION`, applied forces only where there are
-        probes) and what the other parts remember.
+        """Return MuJoCo's integration state and the state of the other parts.
+
+        MuJoCo's is `mjSTATE_INTEGRATION`, with applied forces only where there are bonds.
         """
         self._read_state()
         return self._state.tobytes()
 
     def restore(self, state: bytes) -> None:
-        """Return to a saved state, bit for bit. Raises StateError if it is none of this model's."""
+        """Return to a saved state, bit for bit. Raises StateError if it does not fit this model."""
         if len(state) != self._state.nbytes:
             raise StateError(
                 f"participant '{self.name}': a saved state of {len(state)} bytes, this model's has"
-                f" {self._state.nbytes}; was it saved elsewhere?"
+                f" {self._state.nbytes}; was it saved by another model?"
             )
         values = np.frombuffer(state)
         at = self._size
@@ -240,7 +240,7 @@ class MujocoEngine(Stepped):
             touching.refresh()
 
     def close(self) -> None:
-        """Let go of model and data."""
+        """Release model and data."""
         self._touching.clear()
         self._keepers.clear()
         self._outputs.clear()

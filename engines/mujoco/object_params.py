@@ -1,4 +1,4 @@
-"""What a scenario may say about the things that lie in a scene. Lengths in m, poses in the world."""
+"""Parameters of the table and the objects in a scene. Lengths in m, poses in the world."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ class RingParams(_Wire):
 
 
 class NeedleParams(_Wire):
-    """A round wire bent to an arc; its frame is in the arc's centre, z normal to its plane, x to the middle
-    of the wire.
+    """A round wire bent to an arc.
 
-    The defaults are the needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre
-    line 11.44 mm, wire 0.8 mm.
+    Its frame is in the arc's centre, z normal to its plane, x to the middle of the wire. The defaults are the
+    needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm, wire
+    0.8 mm.
     """
 
     kind: Literal["needle"]
@@ -76,8 +76,9 @@ class NeedleParams(_Wire):
 
 
 class BlockParams(_Object):
-    """A box; its frame is in the middle. The default size is that of the small objects in
-    unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt.
+    """A box; its frame is in the middle.
+
+    The default size is that of the small objects in unina-icaros/dvrk-vrep, dVRK-training_pick&place.ttt.
     """
 
     kind: Literal["block"]

@@ -1,4 +1,4 @@
-"""What a scenario may say about the MuJoCo engine: the scene, and how it is stepped.
+"""Parameters of the MuJoCo engine: the scene, and how it is stepped.
 
 Lengths in m, angles in rad, quaternions (x, y, z, w), poses in the world unless a field says otherwise.
 """
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, model_validator, with_config
-from typing_extensions import TypedDict  # pydantic's wish before Python 3.12
+from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
@@ -60,7 +60,7 @@ class _SetupJoints(TypedDict, total=False):
 
 
 def _validated_as(form: Any) -> GetPydanticSchema:
-    """Validate by `form`, whose keys each have a type of their own, what is typed as a mapping here."""
+    """Validate a mapping by `form`, in which each key has a type of its own."""
     return GetPydanticSchema(lambda _source, handler: handler(form))
 
 
@@ -68,8 +68,8 @@ def _object_names(objects: Mapping[str, ObjectParams]) -> Mapping[str, ObjectPar
     for name in objects:
         if not valid_name(name) or name in _Arms.__annotations__:
             raise ValueError(
-                f"'{name}' is no name of an object: a letter, then letters, digits and underscores, and no"
-                " arm's name"
+                f"'{name}' is not a valid name of an object: a letter, then letters, digits and underscores,"
+                " and not the name of an arm"
             )
     return objects
 
@@ -82,14 +82,14 @@ class SceneParams(Params):
     mounting: Literal["free", "cart"] = Field(
         default="free",
         description=(
-            "each arm where its position and orientation say, or on the setup joints of the cart, whose frame"
-            " is the world then"
+            "each arm at its own position and orientation, or on the setup joints of the cart, whose frame is"
+            " then the world"
         ),
     )
     setup_joints: Annotated[dict[CartArm, SetupPositions], _validated_as(_SetupJoints)] = Field(
         default_factory=dict[CartArm, SetupPositions],
         description=(
-            "where the braked setup joints are set; an arm that is not named has the simulated positions"
+            "positions of the braked setup joints; an arm that is not named has the simulated positions"
         ),
     )
     table: TableParams | None = None
@@ -99,24 +99,24 @@ class SceneParams(Params):
     grasp: Literal["friction", "weld"] = Field(
         default="friction",
         description=(
-            "what holds an object between two jaws: friction alone, or a weld as long as both touch it"
+            "what holds an object between two jaws: friction alone, or a weld while both jaws touch it"
         ),
     )
     looks: bool = Field(
-        default=True, description="give the robot its meshes; without, only what collides is there"
+        default=True, description="give the robot its meshes; without, it has collision shapes only"
     )
 
     @model_validator(mode="after")
     def _stands_in_one_place(self) -> Self:
         if self.mounting == "free" and self.setup_joints:
-            raise ValueError("setup_joints are those of the cart; say 'mounting: cart' or leave them out")
+            raise ValueError("setup_joints belong to the cart: set 'mounting: cart', or leave them out")
         placed = [
             name for name, arm in self.arms.items() if arm.model_fields_set & {"position", "orientation"}
         ]
         if self.mounting == "cart" and placed:
             raise ValueError(
-                f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart"
-                " setup_joints say where an arm stands"
+                f"{', '.join(placed)}: position and orientation are for 'mounting: free'; on the cart,"
+                " setup_joints place the arms"
             )
         return self
 
@@ -129,8 +129,8 @@ class SceneParams(Params):
         ]
         if rolling and self.objects and self.grasp == "weld":
             raise ValueError(
-                f"grasp: weld would hold what the instrument of {', '.join(rolling)} is to roll; take grasp:"
-                " friction"
+                f"grasp: weld would lock the object that the instrument of {', '.join(rolling)} rolls; use"
+                " grasp: friction"
             )
         return self
 
@@ -145,27 +145,27 @@ class MujocoParams(SceneParams):
         default=5_000_000,
         gt=0,
         description=(
-            "at which measured_cp, setpoint_js, qpos and the objects' poses are published; a multiple of the"
+            "how often measured_cp, setpoint_js, qpos and the objects' poses are published; a multiple of the"
             " period"
         ),
     )
 
 
 def has_jaw(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds an instrument that opens and closes."""
+    """Return whether the arm holds an instrument that opens and closes."""
     return isinstance(params, PsmParams) and params.tool.jaw is not None
 
 
 def has_hand(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds a hand."""
+    """Return whether the arm holds a hand."""
     return isinstance(params, PsmParams) and params.tool.hand is not None
 
 
 def has_spheres(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds an instrument with contact spheres."""
+    """Return whether the arm holds an instrument with contact spheres."""
     return isinstance(params, PsmParams) and bool(params.tool.spheres)
 
 
 def has_probe(params: PsmParams | EcmParams) -> bool:
-    """Say whether the arm holds a palpation probe."""
+    """Return whether the arm holds a palpation probe."""
     return isinstance(params, PsmParams) and params.tool.name == "palpation-probe"

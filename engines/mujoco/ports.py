@@ -53,8 +53,9 @@ def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
 
 
 def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
-    """Return per palpation probe the bond `<arm>/probe`, and per instrument with contact spheres
-    `<arm>/contact`, all in the world.
+    """Return the bonds `<arm>/probe` of palpation probes and `<arm>/contact` of contact spheres.
+
+    All are in the world.
     """
     return tuple(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm))
 
@@ -186,10 +187,7 @@ def _hand_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
 
 def _object_ports(thing: str, slow: int) -> Iterator[Port]:
     yield Port(name=f"{thing}/pose", causality="output", type=_POSE, frame="world", period_ns=slow)
-    holder = (
-        "number of the PSM between whose jaws it is held (the first, where two hold it), 0 while nobody"
-        " holds it"
-    )
+    holder = "number of the PSM whose jaws hold it (the first, where two hold it), 0 while none does"
     yield Port(
         name=f"{thing}/held_by",
         causality="output",
@@ -226,8 +224,9 @@ def _object_ports(thing: str, slow: int) -> Iterator[Port]:
 
 
 def position_count(scene: SceneParams) -> int:
-    """Return the size of `qpos`: joints, linkage and fingers with pads or phalanges of every arm, then the
-    pose of every object.
+    """Return the size of `qpos`, without building the model.
+
+    It has the joints, linkage and fingers with pads or phalanges of every arm, then the pose of every object.
     """
     count = _FREE_BODY * len(scene.objects)
     for name, arm in scene.arms.items():

@@ -35,7 +35,7 @@ def test_what_is_no_instrument_is_refused(name, message):
         ("PSM1", ["0.9 m", 0, 0, 0, 0, 0], "joint lift at 0.9 m, allowed are -0.3798 .. 0.8425"),
         ("PSM3", ["-0.3 m", 0, 0, 0, 0, 0], "joint lift at -0.3 m, allowed are -0.2858 .. 0.9365"),
         ("ECM", [0, 0, 0, 0, "10 deg", 0], "joint tilt at 0.174533 rad, allowed are 0 .. 0"),
-        ("PSM2", [0, 0, 0, 0, 0, "nan"], "no quantity in rad"),
+        ("PSM2", [0, 0, 0, 0, 0, "nan"], "not a quantity in rad"),
         ("PSM2", [0, 0, 0], "Field required"),
     ],
 )
@@ -49,7 +49,7 @@ def test_a_setup_joint_is_set_inside_its_range(kind, arm, positions, message):
 @pytest.mark.parametrize(
     ("scene", "message"),
     [
-        ({"arms": {"PSM1": {}}, "setup_joints": {"PSM1": [0, 0, 0, 0, 0, 0]}}, "say 'mounting: cart'"),
+        ({"arms": {"PSM1": {}}, "setup_joints": {"PSM1": [0, 0, 0, 0, 0, 0]}}, "set 'mounting: cart'"),
         (
             {"arms": {"PSM1": {}, "ECM": {"position": [0, 0, 0]}}, "mounting": "cart"},
             "ECM: position and orientation are for 'mounting: free'",

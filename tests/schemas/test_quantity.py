@@ -167,5 +167,5 @@ def test_a_wrong_dimension_says_what_was_wanted() -> None:
     class Pull(BaseModel):
         force: Force
 
-    with pytest.raises(ValidationError, match="'2 kg' is no quantity in N"):
+    with pytest.raises(ValidationError, match="'2 kg' is not a quantity in N"):
         Pull.model_validate({"force": "2 kg"})

@@ -119,7 +119,7 @@ def test_unnamed_joints_come_in_the_order_of_the_port() -> None:
 
 
 @pytest.mark.parametrize(
-    ("port", "message", "said"),
+    ("port", "message", "expected"),
     [
         (POSE, PoseStamped(header=Header(frame_id="camera")), "frame 'camera', expected 'world'"),
         (POSE, PoseStamped.model_validate({"pose": {"orientation": {"w": 0.5}}}), "norm 0.5, expected 1"),
@@ -133,8 +133,8 @@ def test_unnamed_joints_come_in_the_order_of_the_port() -> None:
         ),
     ],
 )
-def test_a_message_that_does_not_fit_the_port(port: Port, message: Message, said: str) -> None:
-    with pytest.raises(MessageError, match=said):
+def test_a_message_that_does_not_fit_the_port(port: Port, message: Message, expected: str) -> None:
+    with pytest.raises(MessageError, match=expected):
         VectorCodec(port).from_message(message)
 
 
@@ -166,7 +166,7 @@ def test_fields_by_name() -> None:
 
 def test_types_without_a_vector() -> None:
     assert not has_vector("sensor_msgs/msg/Joy")
-    with pytest.raises(MessageError, match="are no vectors"):
+    with pytest.raises(MessageError, match="are not vectors"):
         VectorCodec(Port(name="joy", causality="output", type="sensor_msgs/msg/Joy"))
 
 

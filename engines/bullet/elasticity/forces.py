@@ -21,7 +21,6 @@ class Elasticity:
     """
 
     def __init__(self, mesh: TetMesh, material: Material) -> None:
-        """Take the mesh at rest."""
         corners = mesh.nodes[mesh.tetrahedra]
         inverse = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))  # (m, 3, 3)
         # (m, 4, 3), of the shape functions

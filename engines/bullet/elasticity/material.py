@@ -36,10 +36,9 @@ class Material:
         return 4.0 / 3.0 * mu, lambda_ + 5.0 / 6.0 * mu
 
     def contact_stiffness(self, radius: float) -> float:
-        """Return the stiffness (N/m) against a flat round punch of `radius` (m) on a half-space, 2 E radius /
-        (1 - nu^2).
+        """Return the stiffness (N/m) against a flat round punch of `radius` (m) on a half-space.
 
-        Johnson, Contact Mechanics (1985), section 3.4; for a sphere it is the tangent stiffness where the
-        contact has that radius.
+        It is 2 E radius / (1 - nu^2): Johnson, Contact Mechanics (1985), section 3.4. For a sphere it is the
+        tangent stiffness where the contact has that radius.
         """
         return 2.0 * self.young_modulus * radius / (1.0 - self.poisson_ratio**2)

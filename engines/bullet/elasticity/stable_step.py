@@ -21,7 +21,7 @@ _SAG_ITERATIONS, _SAG_TOLERANCE = 300, 0.1
 _LARGEST_PHASE = 4.0
 """Largest timestep x highest frequency.
 
-A block pressed at a node is stable at 4.0 and chatters at 4.7 (tests/engines/bullet/elasticity/test_limits.py).
+A block pressed at a node is stable at 4.0 and chatters at 4.7 (elasticity/test_limits.py in the tests).
 """
 
 
@@ -43,11 +43,15 @@ def highest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
 
 
 def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
-    """Return the lowest natural frequency (rad/s) that weight along z excites; arguments as above, with at
-    least one anchored node.
+    """Return the lowest natural frequency (rad/s) that weight along z excites.
 
-    By Rayleigh's quotient of the sag under weight, which is found by conjugate gradients; where they have not
-    converged it is too high.
+    By Rayleigh's quotient of the sag under weight, which conjugate gradients find; where they have not
+    converged, the result is too high.
+
+    Args:
+        mesh: the body; as in Bullet, all its nodes have the same mass.
+        free: 1 for nodes that can move, 0 for anchored ones, of which there is at least one, shape (n,).
+        material: linearised.
     """
     stiffness = _stiffness_per_mass(mesh, free, material)
     load = free[:, None] * np.array([0.0, 0.0, 1.0])
@@ -66,8 +70,9 @@ def lowest_frequency(mesh: TetMesh, free: Vector, material: Material) -> float:
 
 
 def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Callable[[Vector], Vector]:
-    """Return the map from displacements, shape (n, 3), to elastic forces over the mass of a node, 1/s^2 times
-    as large; arguments as above.
+    """Return the map from displacements, shape (n, 3), to elastic forces divided by the mass of a node.
+
+    It multiplies by 1/s^2; arguments as in `highest_frequency`.
     """
     edges = mesh.nodes[mesh.tetrahedra[:, 1:]] - mesh.nodes[mesh.tetrahedra[:, :1]]  # (m, 3, 3)
     inverse = np.linalg.inv(edges)  # (m, 3, 3): the columns are the gradients of the shape functions 1 to 3
@@ -97,11 +102,11 @@ def _stiffness_per_mass(mesh: TetMesh, free: Vector, material: Material) -> Call
 
 
 def longest_step(frequency: float, damping: float) -> float:
-    """Return the longest stable time step (s) for Bullet's scheme: explicit elasticity, implicit damping,
-    then position.
+    """Return the longest stable time step (s) of Bullet's integration scheme.
 
-    For a mode of angular frequency w the scheme reads v' = (v - h w^2 x) / (1 + h d w^2), x' = x + h v'. Its
-    roots leave the unit circle where h^2 w^2 > 4 + 2 h d w^2, so d >= h / 2 keeps any frequency stable.
-    Contacts are solved before the damping, and chatter where h w is too large.
+    The scheme is explicit in elasticity and implicit in damping, then it moves the positions. For a mode of
+    angular frequency w it reads v' = (v - h w^2 x) / (1 + h d w^2), x' = x + h v'. Its roots leave the unit
+    circle where h^2 w^2 > 4 + 2 h d w^2, so d >= h / 2 keeps any frequency stable. Contacts are solved before
+    the damping, and chatter where h w is too large.
     """
     return min(damping + sqrt(damping**2 + 4.0 / frequency**2), _LARGEST_PHASE / frequency)

@@ -28,12 +28,11 @@ _MIRRORED_CELL = (_CELL ^ 4)[:, [0, 2, 1, 3]]
 
 
 def block(size: Vector, nodes: int) -> TetMesh:
-    """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes; its top face is centred
-    on the origin.
+    """Return a box of edge lengths `size` (m), shape (3,), with about `nodes` nodes.
 
-    A regular grid whose cells are cut into five tetrahedra each, the fewest there are, mirrored from cell to
-    cell. With an even number of cells along x and y the mesh is its own mirror image in both, so it has no
-    preferred diagonal.
+    The origin is in the middle of its top face. The cells of a regular grid are cut into five tetrahedra
+    each, the fewest possible, mirrored from cell to cell. With an even number of cells along x and y the mesh
+    is its own mirror image in both, so it has no preferred diagonal.
     """
     cells = block_cells(size, nodes)
     points = (_grid(cells[0] + 1, cells[1] + 1, cells[2] + 1) / cells - [0.5, 0.5, 1.0]) * size
@@ -41,13 +40,14 @@ def block(size: Vector, nodes: int) -> TetMesh:
 
 
 def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) -> Indices:
-    """Return the tetrahedra of a grid of `cells`, shape (5 cells, 4); its nodes are numbered with the last
-    index the fastest.
+    """Return the tetrahedra of a grid of `cells`, shape (5 cells, 4).
+
+    The nodes of the grid are numbered with the last index the fastest.
 
     Args:
         cells: along the three directions, which must be right-handed.
         closed: the second direction runs around: its last cells, of which there must be an even number, end
-        on the first nodes.
+            on the first nodes.
     """
     rows = cells[1] + (0 if closed else 1)
     origins = _grid(*cells)  # (c, 3)
@@ -59,9 +59,7 @@ def tetrahedra_of_cells(cells: tuple[int, int, int], *, closed: bool = False) ->
 
 
 def block_cells(size: Vector, nodes: int) -> tuple[int, int, int]:
-    """Return the cells along x, y (even) and z of the grid that suits a box of `size` (m) and about `nodes`
-    nodes.
-    """
+    """Return the cells along x, y (even) and z of the grid for a box of `size` (m) and `nodes` nodes."""
 
     def unfitness(cells: tuple[int, int, int]) -> tuple[float, ...]:
         edges = size / cells

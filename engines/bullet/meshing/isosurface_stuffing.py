@@ -1,6 +1,6 @@
 """Tetrahedra that fill a smooth body, by isosurface stuffing.
 
-A body-centred cubic lattice is laid over the body; vertices near its surface are moved onto it, and the
+A body-centred cubic lattice covers the body; vertices near its surface are moved onto it, and the
 tetrahedra that the surface still cuts are cut there (Labelle, Shewchuk, Isosurface Stuffing, ACM Trans.
 Graph. 26, 2007).
 """
@@ -48,8 +48,9 @@ def fill(field: Field, low: Vector, high: Vector, spacing: float) -> TetMesh:
 
 
 def _lattice(low: Vector, high: Vector, spacing: float) -> tuple[Vector, Indices]:
-    """Return vertices and tetrahedra of a lattice whose cubes' corners and centres cover a box, symmetric
-    about its middle.
+    """Return vertices and tetrahedra of a body-centred lattice that covers a box.
+
+    Corners and centres of its cubes lie symmetrically about the middle of the box.
     """
     cubes = np.ceil((high - low) / spacing).astype(np.int64) + 2
     shape = 2 * cubes + 1  # places at half the spacing; corners of cubes are at even, centres at odd ones
@@ -78,8 +79,10 @@ def _grid(start: Indices, stop: Indices, step: int) -> Indices:
 def _snapped(
     field: Field, points: Vector, signs: Indices, tetrahedra: Indices, spacing: float
 ) -> tuple[Vector, Indices, Indices, Vector]:
-    """Move vertices onto a near surface; return points, signs (0 on the surface), and the edges (e, 2) still
-    cut, with the cuts (e, 3).
+    """Move vertices onto the surface where it is near.
+
+    Returns the points, their signs (0 on the surface), the edges that the surface still cuts, shape (e, 2),
+    and the points where it cuts them, shape (e, 3).
     """
     pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
     edges = np.unique(np.sort(tetrahedra[:, pairs].reshape(-1, 2), axis=1), axis=0)

@@ -1,4 +1,4 @@
-"""What makes a user's mesh unusable, said so that it can be mended."""
+"""Checks of a user's mesh: everything that makes it unusable, with the remedy."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _some(indices: Indices) -> str:
 
 
 def _numbers(nodes: Vector, tetrahedra: Indices) -> list[str]:
-    """Return what keeps the mesh from being looked at any further."""
+    """Return the problems that prevent any further check."""
     if not 4 <= len(nodes) <= MOST_NODES or not len(tetrahedra):
         return [
             f"it has {len(nodes)} nodes and {len(tetrahedra)} tetrahedra; 4 to {MOST_NODES} nodes are"
@@ -89,7 +89,7 @@ def _shapes(nodes: Vector, tetrahedra: Indices) -> list[str]:
     problems: list[str] = []
     if len(inverted) == len(tetrahedra):
         problems.append(
-            "all tetrahedra are inverted: swap two nodes of each (VTK wants node 3 on the side to which the"
+            "all tetrahedra are inverted: swap two nodes of each (in VTK node 3 is on the side to which the"
             " normal of 0, 1, 2 points)"
         )
     elif len(inverted):
@@ -106,7 +106,7 @@ def _shapes(nodes: Vector, tetrahedra: Indices) -> list[str]:
 
 
 def _surface(nodes: Vector, mesh: TetMesh) -> list[str]:
-    """Return where the surface is not closed and simple, and whether there is more than one piece."""
+    """Return the problems of the surface: not closed, not simple, or in more than one piece."""
     problems: list[str] = []
     crowded = mesh.crowded
     if len(crowded):

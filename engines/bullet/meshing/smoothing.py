@@ -21,8 +21,9 @@ _DIFFERENCE_M = 1e-6
 
 
 def smoothed(mesh: TetMesh, field: Field, spacing: float) -> TetMesh:
-    """Return a mesh with better shaped tetrahedra: its nodes move down the slope of their distortion, those
-    of the surface along that of `field`.
+    """Return a mesh with better shaped tetrahedra.
+
+    Nodes move down the gradient of their distortion, those of the surface along the surface of `field`.
     """
     nodes, surface = mesh.nodes.copy(), np.unique(mesh.triangles)
     step = 0.02 * spacing
@@ -48,10 +49,11 @@ _REGULAR = np.linalg.inv(np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 
 
 
 def _distortion(nodes: Vector, tetrahedra: Indices) -> tuple[float, Vector]:
-    """Return the sum over all tetrahedra of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron, and
-    its slope by the nodes; inf where one is inverted.
+    """Return the distortion of all tetrahedra, and its gradient by the nodes, shape (n, 3).
 
-    The inverse of the mean ratio: Knupp, Algebraic Mesh Quality Metrics, SIAM J. Sci. Comput. 23 (2001).
+    The distortion is the sum of (|F|^2 / (3 det F^(2/3)))^4, F from a regular tetrahedron; inf where one is
+    inverted. It is the inverse of the mean ratio: Knupp, Algebraic Mesh Quality Metrics, SIAM J. Sci. Comput.
+    23 (2001).
     """
     edges = (nodes[tetrahedra[:, 1:]] - nodes[tetrahedra[:, :1]]).transpose(0, 2, 1)  # (m, 3, 3), columns
     deformation = edges @ _REGULAR

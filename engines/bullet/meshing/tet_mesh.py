@@ -31,8 +31,9 @@ class TetMesh:
 
     @cached_property
     def triangles(self) -> Indices:
-        """The surface, shape (f, 3), counter-clockwise seen from outside: the faces that belong to one
-        tetrahedron only.
+        """The surface, shape (f, 3), counter-clockwise seen from outside.
+
+        It has the faces that belong to one tetrahedron only.
         """
         return self._faces[self._shared == 1]
 
@@ -43,7 +44,7 @@ class TetMesh:
 
     @cached_property
     def face_numbers(self) -> Indices:
-        """Of the four faces of every tetrahedron, shape (m, 4); the same number means the same three nodes."""
+        """Numbers of the four faces of every tetrahedron, shape (m, 4): equal for the same three nodes."""
         _, numbers = np.unique(np.sort(self._faces, axis=1), axis=0, return_inverse=True)
         return numbers.reshape(-1, 4)
 
@@ -63,8 +64,9 @@ class TetMesh:
         return np.bincount(numbers)[numbers]
 
     def write_vtk(self, path: Path) -> None:
-        """Write a legacy ASCII .vtk file, the only tetrahedral format that Bullet reads, without losing a bit
-        of the nodes.
+        """Write a legacy ASCII .vtk file, the only tetrahedral format that Bullet reads.
+
+        The nodes read back bit for bit.
         """
         lines = [
             "# vtk DataFile Version 2.0",
@@ -94,10 +96,10 @@ def compact(nodes: Vector, tetrahedra: Indices) -> TetMesh:
 
 
 def shape_quality(nodes: Vector, tetrahedra: Indices) -> Vector:
-    """Return how near every tetrahedron is to a regular one (1), by its mean ratio 12 (3 volume)^(2/3) / sum
-    of squared edges, shape (m,).
+    """Return the mean ratio of every tetrahedron, shape (m,): 1 is regular, 0 flat, negative inverted.
 
-    Liu, Joe, Relationship between tetrahedron shape measures, BIT 34 (1994). Zero is flat, negative inverted.
+    It is 12 (3 volume)^(2/3) / sum of squared edges: Liu, Joe, Relationship between tetrahedron shape
+    measures, BIT 34 (1994).
     """
     corners = nodes[tetrahedra]  # (m, 4, 3)
     squares = sum(((corners[:, i] - corners[:, j]) ** 2).sum(axis=1) for i, j in combinations(range(4), 2))

@@ -31,10 +31,9 @@ _LARGEST_FILE = 64_000_000
 
 
 def read_vtk(path: Path) -> tuple[Vector, Indices]:
-    """Return nodes, shape (n, 3), in the file's unit, and tetrahedra, shape (m, 4), as they stand in the
-    file.
+    """Return the nodes, shape (n, 3), in the file's unit, and the tetrahedra, shape (m, 4), as in the file.
 
-    Raises ValueError, naming the file, where it holds no tetrahedral mesh.
+    Raises ValueError, naming the file, where it contains no tetrahedral mesh.
     """
     try:
         if path.stat().st_size > _LARGEST_FILE:
@@ -54,7 +53,7 @@ class _Reader:
         self._at = 0
         magic, _, encoding = self._line(), self._line(), self._line().upper()
         if not magic.startswith("# vtk DataFile Version"):
-            raise ValueError("is no legacy .vtk file: it does not begin with '# vtk DataFile Version'")
+            raise ValueError("is not a legacy .vtk file: it does not begin with '# vtk DataFile Version'")
         if encoding not in ("ASCII", "BINARY"):
             raise ValueError(f"its third line is '{encoding[:40]}', not ASCII or BINARY")
         self._binary = encoding == "BINARY"
@@ -116,8 +115,9 @@ class _Reader:
         return line.decode("ascii", "replace").strip()
 
     def _kind(self, keyword: str) -> str:
-        """Return the type of the numbers that follow the next line, which begins with `keyword`; blank lines
-        may stand before it.
+        """Return the type of the numbers after the next line that is not blank.
+
+        Raises ValueError unless that line begins with `keyword`.
         """
         while self._at < len(self._content):
             words = self._line().split()
@@ -129,7 +129,7 @@ class _Reader:
 
     def _count(self, words: list[str], place: int) -> int:
         if len(words) <= place or not words[place].isdigit():
-            raise ValueError(f"the line '{' '.join(words)[:60]}' does not say how many numbers follow")
+            raise ValueError(f"the line '{' '.join(words)[:60]}' does not state how many numbers follow")
         return int(words[place])
 
     def _integers(self, count: int, kind: str) -> Indices:

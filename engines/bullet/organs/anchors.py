@@ -1,6 +1,4 @@
-"""What holds an organ in its place: surfaces tied to the world, or to rigid parts of the tissue engine's
-scene.
-"""
+"""What holds an organ in its place: surfaces tied to the world, or to rigid parts of the scene."""
 
 from __future__ import annotations
 

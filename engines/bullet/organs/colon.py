@@ -41,7 +41,7 @@ def _mesh(nodes: int) -> TetMesh:
 
 
 def _unfitness(cells: tuple[int, int, int], nodes: int) -> float:
-    """Weigh the miss of the wanted number of nodes, in tenths, against the elongation of the cells."""
+    """Return the relative error of the number of nodes, times ten, plus the elongation of the cells."""
     around, along, layers = cells
     miss = abs(around * (along + 1) * (layers + 1) / nodes - 1.0)
     edges = 2.0 * np.pi * _RADIUS_M / around, _LENGTH_M / along, _WALL_M / layers

@@ -72,7 +72,7 @@ def presets() -> dict[str, Preset]:
 
 
 def preset(name: str) -> Preset:
-    """Return one preset. Raises ValueError where there is none of this name."""
+    """Return one preset. Raises ValueError for an unknown name."""
     if name not in presets():
         raise ValueError(
             f"no material '{name}'.{did_you_mean(name, presets())} Or give young_modulus, poisson_ratio and"

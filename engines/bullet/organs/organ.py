@@ -28,8 +28,9 @@ class Organ:
     def __init__(
         self, name: str, params: OrganParams, client: int, parts: Mapping[str, int] | None = None
     ) -> None:
-        """Load the organ into the world of `client`, where `parts` are the rigid bodies by name that it may
-        be anchored to.
+        """Load the organ into the world of `client`.
+
+        `parts` are the numbers of the rigid bodies, by name, that it may be anchored to.
         """
         import pybullet as bullet
 
@@ -97,7 +98,7 @@ class Organ:
         self.held[node] = False
 
     def let_touch(self, body: int, *, on: bool) -> None:
-        """Say whether a rigid body of Bullet meets the organ, or passes through it."""
+        """Let a rigid body of Bullet collide with the organ, or pass through it."""
         import pybullet as bullet
 
         bullet.setCollisionFilterPair(self._body, body, -1, -1, int(on), physicsClientId=self._client)

@@ -1,4 +1,4 @@
-"""What a scenario says about an organ."""
+"""Parameters of an organ."""
 
 from __future__ import annotations
 
@@ -102,8 +102,8 @@ class OrganParams(BaseModel):
             raise ValueError("nodes are those of the mesh file: leave them out")
         if self.mesh is not None and self.anchors is None:
             raise ValueError(
-                "say what holds the organ: for instance anchors: [{surface: bottom}], or [] if it lies freely"
-                " on rigid parts"
+                "anchors are missing: state what holds the organ, for instance [{surface: bottom}], or [] if"
+                " it lies freely on rigid parts"
             )
         if self.young_modulus is None and (self.poisson_ratio is not None or self.density is not None):
             raise ValueError("poisson_ratio and density go with young_modulus; a material has its own")
@@ -127,7 +127,7 @@ class OrganParams(BaseModel):
         name = self.material or self.body.material
         if name is None:
             raise ValueError(
-                "say what the organ is made of: young_modulus, or a material (`trocar organs` lists them)"
+                "the material is missing: state young_modulus, or a material (`trocar organs` lists them)"
             )
         known = preset(name)
         return Material(known.young_modulus, known.poisson_ratio, known.density, damping)
@@ -191,8 +191,9 @@ class OrganParams(BaseModel):
         return chosen
 
     def contact_stiffness(self, radius: float) -> float:
-        """Estimate the stiffness (N/m) against a sphere of `radius` (m): that of a punch as wide as the
-        sphere, or as a usual edge of the surface.
+        """Estimate the stiffness (N/m) against a sphere of `radius` (m).
+
+        It is that of a punch as wide as the sphere, or as a median edge of the surface if that is longer.
         """
         triangles = self.local.triangles
         edges = self.local.nodes[triangles] - self.local.nodes[np.roll(triangles, 1, axis=1)]

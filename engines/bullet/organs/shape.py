@@ -29,7 +29,7 @@ smoothing makes 1e-13 m; meshes must not differ.
 
 _COUNT_TOLERANCE = 0.02
 _SEARCHES = 8
-"""The spacing is sought that gives the wanted number of nodes to this share, in at most so many attempts;
+"""The spacing is varied until the number of nodes is this near to the requested one, at most so many times;
 then the nearest is taken.
 """
 
@@ -44,23 +44,23 @@ own frame.
 
 @dataclass(frozen=True)
 class Shape:
-    """A body that can be meshed with about as many nodes as wanted."""
+    """A body that can be meshed with about as many nodes as requested."""
 
     description: str
     """What it is, how it lies in its frame, and where its dimensions come from."""
     mesh: Callable[[int], TetMesh]
-    """Of the number of nodes wanted; the nearest that the method gives. In the organ's own frame."""
+    """From the requested number of nodes to the nearest mesh that the method gives, in the organ's frame."""
     surfaces: Mapping[str, Surface]
     """Parts of the surface by name, besides `SIDES`."""
     anchors: tuple[str, ...]
-    """Surfaces that are anchored where the scenario says nothing."""
+    """Surfaces that are anchored by default."""
     material: str | None
-    """Preset that is taken where the scenario says nothing."""
+    """The default preset."""
 
     def surface(self, name: str, nodes: Vector) -> NDArray[np.bool_]:
         """Return which nodes of the surface, shape (n, 3), belong to the part of it called `name`.
 
-        Raises ValueError if there is none.
+        Raises ValueError if it does not exist.
         """
         if name in self.surfaces:
             return self.surfaces[name](nodes)
@@ -75,8 +75,9 @@ class Shape:
 
 
 def on_side(nodes: Vector, side: str, share: float) -> NDArray[np.bool_]:
-    """Return which nodes, shape (n, 3), lie within a `share` of their extent from their end on one of
-    `SIDES`, shape (n,).
+    """Return which nodes, shape (n, 3), lie near the end of the body on one of `SIDES`, shape (n,).
+
+    `share`: of the body's extent, within which they count as near.
     """
     axis, sign = SIDES[side]
     along = sign * nodes[:, axis]
@@ -121,7 +122,5 @@ def mesher(
 
 
 def smooth_union(one: Vector, other: Vector, blend: float) -> Vector:
-    """Return the field of two bodies that run into each other where their fields differ by less than `blend`
-    (m).
-    """
+    """Return the field of two bodies that blend where their fields differ by less than `blend` (m)."""
     return np.maximum(one, other) + np.maximum(blend - np.abs(one - other), 0.0) ** 2 / (4.0 * blend)

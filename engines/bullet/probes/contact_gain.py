@@ -1,12 +1,12 @@
-"""What Bullet's contacts lose of a force, and the gain that makes up for it.
+"""The share of a force that Bullet's contacts lose, and the gain that compensates for it.
 
 Where a rigid body touches a face of a soft body at barycentric coordinates w, Bullet spreads the impulse over
 the three nodes with weights 2 w / (1 + s), s = w . w, and takes the sum of w times weight as the inverse mass
 of the face (btSoftBodyInternals.h, CollideSDF_RDF). Of an impulse J on the rigid body the soft body then
 receives only 4 s / (1 + s)^2 J: all of it at a node, 8/9 in the middle of an edge, 3/4 in the middle of a
 face. A force on the rigid body must be larger by the inverse for the tissue to feel it whole: by 1 to 4/3.
-How several faces share the force of a sphere is not to be seen from outside; so the gain is measured, from
-what the elastic forces say that the touched nodes receive. docs/decisions/0015-contact-force.md
+How several faces share the force of a sphere cannot be read from Bullet; so the gain is measured, from the
+elastic forces on the nodes that are touched. See docs/decisions/0015-contact-force.md.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from schemas.vectors import Vector
 __all__ = ["CONTACT_PERIOD_NS", "Contacts", "Tissue", "closest_points", "touched_faces"]
 
 CONTACT_PERIOD_NS = 8_000_000
-"""How often the nodes are read to see where probes touch and what they receive."""
+"""How often the nodes are read to find where probes touch and what force they receive."""
 
 _BAND_M = 6e-4
 """Faces nearer to the sphere than this may share its force; the first guess is that the nearest bears most.
@@ -59,11 +59,10 @@ class Tissue:
         self._before = organ.nodes
 
     def received(self, nodes: Indices) -> Vector:
-        """Return the force (N) with which contacts push these nodes, shape (n, 3), zero for all others: what
-        balances elasticity, damping and weight.
+        """Return the force (N) with which contacts push these nodes, shape (n, 3), zero for all others.
 
-        Damping being proportional to stiffness, elasticity is taken where the nodes will be a damping time
-        later.
+        It is what balances elasticity, damping and weight. As damping is proportional to stiffness,
+        elasticity is taken where the nodes will be a damping time later.
         """
         at = np.zeros(len(self.organ.nodes), dtype=np.bool_)
         at[nodes] = True
@@ -74,7 +73,7 @@ class Tissue:
         return force
 
     def advance(self) -> None:
-        """Take the nodes as they are now for those before the next ones."""
+        """Keep the present nodes as those before the next ones."""
         self._before = self.organ.nodes
 
 
@@ -100,14 +99,13 @@ class _Touch:
 
 
 class Contacts:
-    """Sees which spheres touch organs, and sets their gains."""
+    """Finds which spheres touch organs, and sets their gains."""
 
     def __init__(self, tissues: Sequence[Tissue]) -> None:
-        """Take the organs."""
         self._tissues = tissues
 
     def update(self, probes: Sequence[Probe]) -> None:
-        """Bring every gain nearer to what it should be; the organs' nodes have just been read."""
+        """Correct every gain by what the tissue receives; the organs' nodes have just been read."""
         touches: list[list[_Touch]] = [[] for _ in self._tissues]
         for probe in probes:
             for sphere in range(len(probe.radii)):
@@ -135,8 +133,10 @@ class Contacts:
 def touched_faces(
     centre: Vector, reach: float, nodes: Vector, faces: Indices
 ) -> tuple[Indices, Vector, Vector]:
-    """Return the faces nearer than `reach` (m) to `centre`, shape (f, 3), the barycentric coordinates of
-    their nearest points, and their distances (m).
+    """Return the faces nearer than `reach` (m) to `centre`, shape (f, 3).
+
+    Also returns the barycentric coordinates of their nearest points, shape (f, 3), and their distances (m),
+    shape (f,).
     """
     corners = nodes[faces]  # (f, 3, 3)
     near = ((corners.min(axis=1) < centre + reach) & (corners.max(axis=1) > centre - reach)).all(axis=1)
@@ -160,8 +160,9 @@ def _touch(tissue: Tissue, probe: Probe, sphere: int) -> _Touch | None:
 
 
 def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
-    """Correct the guesses by what the nodes receive; where spheres share a node, by the parts that should
-    fall to it.
+    """Correct the guesses by what the nodes receive.
+
+    Where spheres share a node, the force on it is divided as the guesses say.
     """
     tied = tissue.organ.anchored | tissue.organ.held
     received = tissue.received(np.unique(np.concatenate([touch.nodes for touch in touches])))
@@ -181,10 +182,10 @@ def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
 
 
 def closest_points(point: Vector, corners: Vector) -> tuple[Vector, Vector]:
-    """Return the barycentric coordinates, shape (f, 3), of the points of triangles nearest to `point` (m),
-    and their distances (m).
+    """Return the points of triangles that are nearest to `point` (m).
 
-    The nearest point is the foot of the perpendicular if that lies inside, else it lies on an edge.
+    They come as barycentric coordinates, shape (f, 3), with their distances (m), shape (f,). The nearest
+    point is the foot of the perpendicular if that lies inside the triangle, else it lies on an edge.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     normal, to_point = np.cross(b - a, c - a), point - a

@@ -1,8 +1,7 @@
-"""Grasp of tissue: fingers that close on an organ take hold of its nodes, opening lets go, too strong a pull
-tears loose.
+"""Grasp of tissue: fingers that close on an organ hold its nodes; opening or too strong a pull frees them.
 
-Friction of spheres on Bullet's tissue creeps, so what is held is tied: nodes are anchored to the proxies, and
-an anchor passes a force on whole. Rules and figures: docs/decisions/0016-tissue-grasp.md.
+Friction of spheres on Bullet's tissue creeps, so nodes that are held are anchored to the proxies, and an
+anchor passes on the whole force. Rules and figures: docs/decisions/0016-tissue-grasp.md.
 """
 
 from __future__ import annotations
@@ -18,15 +17,16 @@ from engines.bullet.probes.params import GraspParams
 from engines.bullet.probes.probe import Probe
 from hub.participant import Value
 from schemas.ports import Port
-from schemas.ros import Header, Time
+from schemas.ros import Float64Message, Header, Time
 from schemas.trocar_msgs import TissueGrasp
 from schemas.vectors import Vector
 
 __all__ = ["Grasp", "grasp_ports", "nothing_held"]
 
 _CLOSING_M = 0.5e-3
-"""By how much the fingers must have closed on tissue to take hold, and opened from there to let go: half of
-what two jaws come nearer.
+"""By how much the fingers must have closed on tissue to grasp it, and opened from there to release it.
+
+It is half of the distance by which two jaws approach each other.
 """
 
 _SHUT_M = 0.5e-3
@@ -42,7 +42,7 @@ def grasp_ports(probe: str) -> tuple[Port, ...]:
         Port(
             name=f"{probe}/held",
             causality="output",
-            type="std_msgs/msg/Float64",
+            type=Float64Message.ros_type,
             description="1 while tissue is held, else 0",
         ),
         Port(
@@ -56,7 +56,7 @@ def grasp_ports(probe: str) -> tuple[Port, ...]:
         Port(
             name=f"{probe}/lift",
             causality="output",
-            type="std_msgs/msg/Float64",
+            type=Float64Message.ros_type,
             unit="m",
             description="mean rise of the nodes held, since time 0",
         ),
@@ -71,7 +71,7 @@ def grasp_ports(probe: str) -> tuple[Port, ...]:
 
 
 def nothing_held(probe: str) -> dict[str, Value]:
-    """Return what the ports say of a probe that touches nothing."""
+    """Return the outputs of a probe that touches nothing."""
     return {
         f"{probe}/held": np.zeros(1),
         f"{probe}/pull": np.zeros(3),
@@ -95,7 +95,7 @@ class Grasp:
     """Watches the fingers of one probe, and ties tissue to them."""
 
     def __init__(self, params: GraspParams, probe: Probe, organs: list[Organ]) -> None:
-        """Watch `probe`, whose fingers may take hold of `organs`."""
+        """Watch `probe`, whose fingers may grasp `organs`."""
         self._params, self._probe, self._organs = params, probe, organs
         self._spheres = np.arange(len(probe.radii)).reshape(params.fingers, -1)  # (fingers, spheres of each)
         self._rest = [organ.nodes[:, 2].copy() for organ in organs]
@@ -108,8 +108,9 @@ class Grasp:
         self.outputs = nothing_held(probe.name)
 
     def update(self, t: int, *, looked: bool) -> None:
-        """Take hold or let go at the end `t` (ns) of a step; `looked`: the organs' nodes, and what touches
-        them, are those of now.
+        """Grasp or release at the end `t` (ns) of a step.
+
+        `looked`: the organs' nodes, and the contacts with them, have been read at the end of this step.
         """
         events: tuple[TissueGrasp, ...] = ()
         if self._holds:
@@ -124,7 +125,7 @@ class Grasp:
 
     @property
     def state(self) -> tuple[Vector, ...]:
-        """What it remembers: the spread it compares with, outputs, and the nodes held."""
+        """State between steps: the spread for comparison, outputs, and the nodes held."""
         return (
             np.array([self._widest]),
             self._pull,
@@ -133,12 +134,12 @@ class Grasp:
         )
 
     def _spread(self) -> float:
-        """Return how far the middles of the instrument's fingers are from the middle of all (m), on average."""
+        """Return the mean distance (m) of the middles of the instrument's fingers from the middle of all."""
         middles = self._probe.targets[self._spheres].mean(axis=1)  # (fingers, 3)
         return float(np.linalg.norm(middles - middles.mean(axis=0), axis=1).mean())
 
     def _watch_hold(self, t: int) -> tuple[TissueGrasp, ...]:
-        """Let go if the fingers have opened; else see how far the tissue is lifted."""
+        """Release the tissue if the fingers have opened; else measure how far it is lifted."""
         if self._spread() > self._widest + _CLOSING_M:
             return self._let_go("released", t)
         self._lift[0] = np.concatenate(
@@ -147,9 +148,7 @@ class Grasp:
         return ()
 
     def _watch(self, t: int) -> tuple[TissueGrasp, ...]:
-        """Take hold if at least two fingers touch tissue, have closed since they do, and cannot close any
-        further.
-        """
+        """Grasp if at least two fingers touch tissue, have closed since, and can close no further."""
         touching = self._probe.touching[self._spheres].max(axis=1)
         if touching.sum() < 2:
             self._widest = 0.0
@@ -185,9 +184,7 @@ class Grasp:
     def _take(
         self, fingers: NDArray[np.bool_], outward: Vector, spread: float, t: int
     ) -> tuple[TissueGrasp, ...]:
-        """Tie the nodes that are within reach of where these fingers face the others, each to the nearest
-        sphere.
-        """
+        """Anchor the nodes within reach of these fingers' inner sides, each to the nearest sphere."""
         probe, spheres = self._probe, self._spheres[fingers].ravel()
         radii = probe.radii[spheres]
         # (k, 3): where the spheres face the other fingers
@@ -226,8 +223,9 @@ class Grasp:
         return events
 
     def _set_held(self, spheres: NDArray[np.int64], *, held: bool) -> None:
-        """Let these spheres pass through what they hold, so that all force goes through the anchors, or touch
-        it again.
+        """Mark these spheres as holding tissue or not.
+
+        Spheres pass through the organs that they hold, so that all force goes through the anchors.
         """
         self._probe.held[spheres] = held
         self._probe.gains[spheres] = 1.0

@@ -1,4 +1,4 @@
-"""What a scenario may say about a probe: its spheres, their virtual coupling, and fingers that grasp."""
+"""Parameters of a probe: its spheres, their virtual coupling, and fingers that grasp."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Radius = Annotated[Length, Field(ge=0.5e-3)]
 
 @dataclass(frozen=True)
 class Coupling:
-    """The spring and damper between each proxy and its sphere on the instrument, and the mass of the proxy."""
+    """The spring and damper between each proxy and its sphere on the instrument, and the proxy's mass."""
 
     stiffness: float
     """k, N/m."""
@@ -59,7 +59,7 @@ class Coupling:
 
 
 class GraspParams(BaseModel):
-    """Fingers that may take hold of tissue. SI units after validation."""
+    """Fingers that may grasp tissue. SI units after validation."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -113,9 +113,7 @@ class ProbeParams(BaseModel):
     damping: Damping | None = Field(
         default=None, gt=0, description="b of the virtual coupling; default: critical, 2 sqrt(k m)"
     )
-    grasp: GraspParams | None = Field(
-        default=None, description="lets the spheres take hold of tissue, as fingers"
-    )
+    grasp: GraspParams | None = Field(default=None, description="lets the spheres grasp tissue, as fingers")
 
     @model_validator(mode="after")
     def _a_radius_for_each(self) -> ProbeParams:

@@ -1,6 +1,4 @@
-"""A probe: the spheres that stand in the tissue's world for those of an instrument that moves in another
-engine.
-"""
+"""A probe: proxies, in the tissue's world, of the spheres of an instrument that another engine moves."""
 
 from __future__ import annotations
 
@@ -28,9 +26,7 @@ Bullet's own groups end at 1 << 5.
 
 
 class Probe:
-    """Proxies in Bullet, each drawn by a virtual coupling after the predicted motion of its sphere on the
-    instrument.
-    """
+    """Proxies in Bullet; a virtual coupling pulls each after the predicted motion of its sphere."""
 
     def __init__(
         self,
@@ -41,7 +37,7 @@ class Probe:
         gravity: float,
         client: int,
     ) -> None:
-        """Create the spheres far above everything; the first step puts them where the other side is."""
+        """Create the spheres far above everything; the first step moves them to the instrument."""
         import pybullet as bullet
 
         self.name = bond.name
@@ -66,7 +62,7 @@ class Probe:
         Shape (n,).
         """
         self.touching = np.zeros(n, dtype=np.bool_)
-        """Which spheres were at an organ when last looked at, shape (n,)."""
+        """Which spheres touched an organ at the last reading of the contacts, shape (n,)."""
         self.contacts = np.zeros((n, 3))
         """Force (N) with which each proxy pressed on what it touched in the last sub-step, as Bullet has it,
         shape (n, 3).
@@ -98,8 +94,9 @@ class Probe:
 
     @property
     def forces(self) -> Vector:
-        """Force (N) of the coupling on every proxy in the last sub-step, or at the end of the last step,
-        shape (n, 3).
+        """Force (N) of the coupling on every proxy, shape (n, 3).
+
+        It is that of the last sub-step, or of the end of the last step.
         """
         return self._springs + self._dampers
 
@@ -154,12 +151,13 @@ class Probe:
 
     @property
     def state(self) -> tuple[Vector, ...]:
-        """Positions, velocities, gains and what the bond remembers."""
+        """Positions, velocities, gains and the state of the bond."""
         return self.positions, self.velocities, self.gains, self.corrections, self._reset, self._side.state
 
     def _stretch(self, tau: float, ahead: float) -> None:
-        """Set spring and damper `tau` seconds into the step, with the proxies where they will be `ahead`
-        seconds from now.
+        """Set spring and damper `tau` seconds into the step.
+
+        The proxies are taken where they will be `ahead` seconds from now.
         """
         self.targets, velocities = self._motion(tau)
         self._springs[:] = (
@@ -168,8 +166,9 @@ class Probe:
         self._dampers[:] = self._coupling.damping * (velocities - self.velocities)
 
     def _motion(self, tau: float) -> tuple[Vector, Vector]:
-        """Return where the spheres of the instrument are (m) and their velocities (m/s), shapes (n, 3), `tau`
-        seconds into the step.
+        """Return positions (m) and velocities (m/s) of the instrument's spheres, shapes (n, 3).
+
+        `tau`: how far into the step, s.
         """
         shape = self.positions.shape
         return self._side.position(tau).reshape(shape), self._side.velocity(tau)[

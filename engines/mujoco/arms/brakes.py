@@ -42,15 +42,16 @@ class Brakes:
         self._state = np.array([*model.eq_data[self._locks, 0], self._on], float)
 
     def set(self, on: bool) -> None:
-        """Close or open the brakes; closed ones stay where they closed."""
+        """Close or open the brakes; closed ones keep the positions at which they closed."""
         if on != self._on:
             self._data.eq_active[self._locks] = on
             self.state = np.array([*self._data.qpos[self._positions], on])
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not hold: where the brakes closed, and whether they are; the same
-        array at every call.
+        """What MuJoCo's own state does not contain: where the brakes closed, and whether they are closed.
+
+        It is the same array at every call.
         """
         return self._state
 

@@ -20,11 +20,11 @@ __all__ = ["Readings"]
 _JAW = np.array(
     [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.5, 0.5]]
 )
-"""Position, velocity and effort of a jaw of those of its two fingers: opened by both, with the torque of
+"""From those of its two fingers to position, velocity and effort of a jaw: opened by both, with the torque of
 either.
 """
 _ROLLING_JAW = np.zeros((6, 9))
-"""The same of a jaw and its roller by turns, of those of the two fingers and the roller."""
+"""From those of the two fingers and the roller to those of the jaw and the roller, by turns."""
 _ROLLING_JAW[::2, :6], _ROLLING_JAW[1::2, 6:] = _JAW, np.eye(3)
 
 
@@ -70,11 +70,11 @@ class Readings:
         self.update()
 
     def update(self) -> None:
-        """Bring up to date what is due in every step."""
+        """Update what is due in every step."""
         for matrix, fingers, jaw in self._jaws:
             matrix.dot(fingers, jaw)
 
     def refresh(self) -> None:
-        """Bring up to date what is published more seldom: the tips' poses and the model's positions."""
+        """Update what is published less often: the tips' poses and the model's positions."""
         self._sensors.take(self._where, None, self._poses, "clip")  # three times as fast as the default mode
         self._qpos[:] = self._positions

@@ -129,8 +129,9 @@ class Servos:
         self._groups.append(_Group(arm, slice(first, first + count), actuators, bodies, ports, weighed))
 
     def _matrices(self, shares: list[tuple[int, int, float]], n: int, period: float) -> tuple[Vector, Vector]:
-        """Return what makes `ctrl` of (setpoint, setpoint one step ago, effort), and what makes the drives'
-        positions of `qpos`.
+        """Return two matrices, from the servos' inputs to `ctrl` and from `qpos` to the drives' positions.
+
+        The servos' inputs are the setpoint, the setpoint one step ago, and the effort.
         """
         model = self._model
         layout, measure = np.zeros((model.nu, 3 * n)), np.zeros((n, model.nq))
@@ -145,8 +146,9 @@ class Servos:
         return layout, measure
 
     def _moved(self, actuator: int) -> list[tuple[int, float]]:
-        """Return the joints whose positions, each times its factor, add up to the actuator's: one, or those
-        of a tendon from the palm outwards.
+        """Return the joints whose positions, each times its factor, add up to the position of the actuator.
+
+        It is one joint, or those of a tendon from the palm outwards.
         """
         model, target = self._model, int(self._model.actuator_trnid[actuator, 0])
         if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
@@ -173,7 +175,7 @@ class Servos:
     def begin(self, inputs: Inputs) -> None:
         """Take commands and modes for the step that begins.
 
-        Raises SessionError for a mode that there is none of.
+        Raises SessionError for an unknown mode.
         """
         np.concatenate([inputs[port] for port in self._ports], out=self._taken)
         if self._wanted.tobytes() != self._modes.tobytes():
@@ -192,8 +194,9 @@ class Servos:
         self._layout.dot(self._inputs, self._data.ctrl)
 
     def _let_go(self, inputs: Inputs) -> None:
-        """Where no position is held, push as told, and let the setpoint go with the joint: it is held from
-        where it is then.
+        """Where no position is held, apply the commanded effort and let the setpoint follow the joint.
+
+        The joint is held there when its position servo is switched on again.
         """
         measured = np.clip(self._measure @ self._data.qpos, self._lower, self._upper)
         for group in self._groups:

@@ -29,7 +29,7 @@ START = "start"
 
 
 def write(scene: SceneParams, path: Path, form: Format) -> list[Path]:
-    """Write the model of `scene` to `path` and its meshes to the folder `assets` beside it; return all files."""
+    """Write the model of `scene` to `path`, its meshes to the folder `assets` beside it; return all files."""
     model = spec(scene)
     _add_start(model, scene)
     root = _WRITERS[form](model)

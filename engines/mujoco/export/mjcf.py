@@ -49,8 +49,9 @@ def mjcf(spec: mujoco.MjSpec) -> ElementTree.Element:
 
 
 def _restore(element: ElementTree.Element, source: Any, names: dict[str, str]) -> None:
-    """Give the numbers of `element` all the digits that they have in `source`, where some are called
-    otherwise.
+    """Give the numbers of `element` all the digits that they have in `source`.
+
+    `names`: of attributes that have another name there.
     """
     for attribute, text in element.attrib.items():
         value: Any = getattr(source, names.get(attribute, attribute), None)

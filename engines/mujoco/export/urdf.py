@@ -29,8 +29,9 @@ __all__ = ["urdf"]
 _KINDS = {mujoco.mjtJoint.mjJNT_HINGE: "revolute", mujoco.mjtJoint.mjJNT_SLIDE: "prismatic"}
 _WORLD = "world"
 _FRAME_MASS, _FRAME_INERTIA = 1e-6, 1e-9
-"""kg, kg m^2, of a link that stands for a frame: less than a fifth of the lightest link, the wrist yaw with
-6.6e-6 kg.
+"""kg, kg m^2, of a link that stands for a frame: less than a fifth of the lightest link.
+
+That is the wrist yaw with 6.6e-6 kg.
 """
 _AT_ORIGIN, _UPRIGHT = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -49,7 +50,7 @@ def urdf(spec: mujoco.MjSpec) -> Element:
         _add_joint(robot, spec, model, body)
         for site in body.sites:
             if "/contact/" in site.name:
-                continue  # where tissue is touched concerns no one who reads a URDF
+                continue  # contact spheres have no use outside Trocar
             _add_frame(robot, model, body, site)
     for finger, leader in ((FINGERS[0], "jaw"), (PADS[0], ROLLER)):
         for body in spec.bodies:
@@ -112,7 +113,7 @@ def _add_shape(shape: Element, geom: mujoco.MjsGeom) -> None:
         case mujoco.mjtGeom.mjGEOM_CAPSULE | mujoco.mjtGeom.mjGEOM_CYLINDER:
             SubElement(geometry, "cylinder", radius=repr(float(size[0])), length=repr(2.0 * float(size[1])))
         case _:
-            raise ScenarioError(f"a shape of kind {kind} has no form in URDF")
+            raise ScenarioError(f"a shape of kind {kind} does not exist in URDF")
 
 
 def _add_joint(robot: Element, spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody) -> None:

@@ -50,22 +50,22 @@ class Spheres:
         }
 
     def begin(self, inputs: Inputs) -> None:
-        """Take the reaction for the step that begins."""
+        """Apply the reaction of the step that begins."""
         self.motion.begin(inputs, self._position, self._velocity)
         self._push(0.0)
 
     def renew(self, tau: float) -> None:
-        """Book what was done, and push from `tau` seconds into the step on from where the spheres are."""
+        """Record the work done, and renew the forces `tau` seconds into the step."""
         self._book()
         self._push(tau)
 
     def end(self) -> None:
-        """Book what was done, and say what the tip feels."""
+        """Record the work done, and set the wrench at the tip."""
         self._book()
         self._feel()
 
     def refresh(self) -> None:
-        """Bring what is remembered of the model up to its present state."""
+        """Take the positions of the model's present state as those from which work counts."""
         self._last[:] = self._position
 
     @staticmethod
@@ -93,9 +93,7 @@ class Spheres:
 
 
 def _sites(arm: str, model: mujoco.MjModel) -> list[int]:
-    """Return the sites of the spheres in the order in which the instrument lists them, which is that of their
-    sensors.
-    """
+    """Return the sites of the spheres in the order of their sensors, in which the instrument lists them."""
     sensors = [model.sensor(i) for i in range(model.nsensor)]
     return [
         int(sensor.objid[0])

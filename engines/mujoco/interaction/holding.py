@@ -1,8 +1,8 @@
 """Which jaw holds which object.
 
 An object is held by an arm once both fingers have touched it for `_SETTLED`. With `grasp: weld` a weld
-between wrist and object comes and goes with that; with `grasp: friction` nothing but contact acts, and this
-module only looks.
+between wrist and object is active for as long; with `grasp: friction` only contact acts, and this module only
+observes.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Holding:
     """Watches objects and jaws; makes the outputs of the objects."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scene: SceneParams, period: float) -> None:
-        """Watch the objects of `scene`, which is looked at every `period` seconds."""
+        """Watch the objects of `scene`; `update` is called every `period` seconds."""
         things, arms = list(scene.objects), _jawed(scene)
         self._model, self._data = model, data
         self._settled = max(1, round(_SETTLED / period))
@@ -97,7 +97,7 @@ class Holding:
             self.outputs |= {f"{thing}/pose": self._poses[i], **values}
 
     def update(self) -> None:
-        """Look at the contacts, set welds, and bring the outputs up to date."""
+        """Read the contacts, set welds, and update the outputs."""
         if not self._bodies:
             return
         if self._look() or self._touched.any():  # an object is held no longer than it is touched
@@ -113,11 +113,10 @@ class Holding:
         self.refresh()
 
     def _look(self) -> bool:
-        """Count the contacts of every finger with every object, and sum their positions; say whether there
-        are any.
+        """Count the contacts of every finger with every object, and sum their positions.
 
-        Once per look and in Python: 36 contact sensors of a full cart with six objects cost MuJoCo a
-        twentieth of every sub-step.
+        Returns whether there are any. In Python and once per update: 36 contact sensors of a full cart with
+        six objects cost MuJoCo a twentieth of every sub-step.
         """
         self._contacts[:] = 0.0
         contact = self._data.contact
@@ -129,7 +128,7 @@ class Holding:
         return bool(found)
 
     def refresh(self) -> None:
-        """Bring the outputs up to the model's present state."""
+        """Update the outputs to the model's present state."""
         # three times as fast as the default mode
         self._positions.take(self._where, None, self._poses, "clip")
         np.subtract(self._poses[:, 2], self._height, out=self._values[:, 3])
@@ -172,9 +171,7 @@ class Holding:
         )
 
     def _turn(self, i: int, j: int) -> float:
-        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` since it was
-        taken.
-        """
+        """Return the angle (rad) by which object `i` has turned in the left finger of arm `j` while held."""
         w = abs(float(self._grip[i, j, 6:] @ self._orientation(i, j)))
         return 2.0 * acos(min(w, 1.0))
 
@@ -187,7 +184,7 @@ class Holding:
 
     @property
     def state(self) -> Vector:
-        """What MuJoCo's own state does not hold; the same array at every call."""
+        """What MuJoCo's own state does not contain; the same array at every call."""
         return self._state
 
     @state.setter
@@ -198,8 +195,9 @@ class Holding:
 
 
 def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> NDArray[np.intp]:
-    """Return for every geom of `model` i + 1 if it is of the object i, -(i + 1) if it is of the finger i or
-    of a pad on it, else 0.
+    """Return what every geom of `model` belongs to, shape (ngeom,).
+
+    i + 1 stands for object i, -(i + 1) for finger i or a pad on it, 0 for anything else.
     """
     ends = np.zeros(model.nbody, int)
     for sign, bodies in (1, things), (-1, fingers):

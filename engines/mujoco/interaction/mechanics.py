@@ -21,15 +21,14 @@ def moment(arms: Vector, forces: Vector) -> Vector:
 
 
 def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Return the least mass (kg) that a force meets in any direction where the velocity is J dq: 1 / max
-    eig(J M^-1 J^T).
+    """Return the least mass (kg) that a force meets in any direction: 1 / max eig(J M^-1 J^T).
 
-    The joints of the linkage go with those they follow: J and M are those of the independent joints.
+    The joints of the linkage move with those they follow: J and M are those of the independent joints.
 
     Args:
-        jacobian: J, shape (k, nv); of several points one below the other.
-        model: with `data` computed at its present positions.
-        data: where it is now.
+        jacobian: J of the velocity J dq, shape (k, nv); those of several points one below the other.
+        model: the model.
+        data: computed at its present positions.
     """
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
@@ -39,8 +38,9 @@ def effective_mass(jacobian: Vector, model: mujoco.MjModel, data: mujoco.MjData)
 
 
 def _followers(model: mujoco.MjModel) -> Vector:
-    """Return T, shape (nv, independent), with dq = T dq_independent: the joint equalities of the model as
-    ratios of velocities.
+    """Return T, shape (nv, independent), with dq = T dq_independent.
+
+    It contains the joint equalities of the model, as ratios of velocities.
     """
     ties, led = np.eye(model.nv), list[int]()
     for i in range(model.neq):

@@ -46,7 +46,7 @@ class Probe:
         self.refresh()
 
     def begin(self, inputs: Inputs) -> None:
-        """Take the reaction for the step that begins."""
+        """Apply the reaction of the step that begins."""
         self.motion.begin(inputs, self._pose, self._twist)
         self._wrench[:] = self.motion.force(0.0, self._pose, self._twist)
 
@@ -56,12 +56,12 @@ class Probe:
         self._wrench[:] = self.motion.force(tau, self._pose, self._twist)
 
     def end(self) -> None:
-        """Book what was done, and say what the tip, which is the probe's centre, feels."""
+        """Record the work done, and set the wrench at the tip, which is the probe's centre."""
         self._book()
         self._to_base.dot(self._wrench, self._tip_wrench)
 
     def _book(self) -> None:
-        """Book the work of the wrench since it was set, and bring the pose up to the model's present state."""
+        """Record the work of the wrench since it was set, and update the pose."""
         np.subtract(self._position, self._pose[:3], out=self._translation)  # the pose is still the one before
         if any(self._torque):  # a sphere in contact feels none
             # in the probe's own axes
@@ -71,7 +71,7 @@ class Probe:
         self.refresh()
 
     def refresh(self) -> None:
-        """Bring the pose up to the model's present state."""
+        """Update the pose to the model's present state."""
         self._sensors.take(ROS_ORDER, None, self._pose, "clip")  # three times as fast as the default mode
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""What rigid things do to an instrument: table, objects, cart and other arms."""
+"""The force of rigid contacts on an instrument: with table, objects, cart and other arms."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ __all__ = ["RigidContact"]
 
 
 class RigidContact:
-    """Sums the contact forces on the instruments of some arms over the sub-steps of a step, and gives their
-    means.
+    """The mean contact force on the instruments of some arms over the sub-steps of a step.
 
-    What an instrument holds counts through its contacts with it, or through the weld. Contacts of an
-    instrument with itself do not.
+    The load of what an instrument holds counts through its contacts with it, or through the weld. Contacts of
+    an instrument with itself do not count.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Iterable[str]) -> None:
@@ -41,8 +40,9 @@ class RigidContact:
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
 
     def add(self) -> None:
-        """Add the sub-step whose forces are solved and whose contacts are not yet found anew: between
-        `mj_step2` and `mj_step1`.
+        """Add the forces of one sub-step; call it between `mj_step2` and `mj_step1`.
+
+        There the forces are solved, and the contacts are still those they belong to.
         """
         self._substeps += 1
         if self._data.ncon:
@@ -52,7 +52,7 @@ class RigidContact:
                 self._add_weld(weld, owner)
 
     def end(self) -> None:
-        """Bring the outputs up to the mean over the sub-steps since the last call."""
+        """Set the outputs to the mean over the sub-steps since the last call."""
         for to_base, total, mean in zip(self._to_base, self._sums, self._means, strict=True):
             to_base.dot(total, mean)
         self._means /= self._substeps
@@ -81,8 +81,9 @@ class RigidContact:
         self._sums += total
 
     def _add_weld(self, weld: int, owner: int) -> None:
-        """Add the reaction of the object in a weld, whose free joint has the force at its origin in the world
-        and the torque in its own frame.
+        """Add the reaction of the object in a weld.
+
+        Its free joint has the force at its origin in the world, and the torque in its own frame.
         """
         model, data = self._model, self._data
         of_weld = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == weld)

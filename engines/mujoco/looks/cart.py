@@ -1,8 +1,7 @@
-"""Look of the patient's cart: column with rails for the four lifts, base on casters; frame: z up, y towards
-the patient, z = -0.1675 m at the floor.
+"""Look of the patient's cart: column with rails for the four lifts, base on casters.
 
-Outer dimensions: bounding box of the CAD mesh in jhu-dvrk/dvrk_model (SUJ_cart) and its height over the
-floor; rails: `robots.dvrk.setup_joints`.
+Frame: z up, y towards the patient, z = -0.1675 m at the floor. Outer dimensions: bounding box of the CAD mesh
+in jhu-dvrk/dvrk_model (SUJ_cart) and its height over the floor; rails: `robots.dvrk.setup_joints`.
 """
 
 from __future__ import annotations

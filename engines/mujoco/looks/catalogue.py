@@ -1,4 +1,4 @@
-"""Looks by the name of what is looked at."""
+"""Looks and collision shapes of all parts of the robot, by name."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""What collides: convex hulls of the covers of arms, setup joints and cart, capsules for shafts, boxes for
-fingers.
+"""Collision shapes: convex hulls of covers, capsules for shafts, boxes for fingers.
+
+The covers are those of arms, setup joints and cart.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Look of the endoscope camera manipulator with its endoscope, in its base frame: x sideways, y from the
-mount to the patient, z up.
+"""Look of the endoscope camera manipulator with its endoscope, in its base frame.
 
-Like the PSM, but the front link drives and holds the motors, and the camera's head hangs on the column. Outer
-dimensions: bounding boxes of the CAD meshes in jhu-dvrk/dvrk_model (Classic ECM) and of its endoscope;
-pivots: `robots.dvrk.linkage`; shapes between them are ours, after the general appearance of the arm.
+The frame: x sideways, y from the mount to the patient, z up. Like the PSM, but the front link drives and
+holds the motors, and the camera's head hangs on the column. Outer dimensions: bounding boxes of the CAD
+meshes in jhu-dvrk/dvrk_model (Classic ECM) and of its endoscope; pivots: `robots.dvrk.linkage`; shapes
+between them are ours, after the general appearance of the arm.
 """
 
 from __future__ import annotations
@@ -227,8 +227,9 @@ def _carriage() -> tuple[Part, ...]:
 
 
 def _endoscope() -> tuple[Part, ...]:
-    """Endoscope along the z axis, tip just below the remote centre: 12 mm shaft, sterile adapter, camera head
-    with two light cables.
+    """Endoscope along the z axis: 12 mm shaft, sterile adapter, camera head with two light cables.
+
+    Its tip is just below the remote centre.
     """
     shaft = rod((0.0, 0.0, -0.0002), (0.0, 0.0, 0.335), 0.006)
     lens = rod((0.0, 0.0, -0.0007), (0.0, 0.0, -0.0002), 0.0054)

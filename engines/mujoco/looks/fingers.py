@@ -69,9 +69,7 @@ def shape(tool: Instrument, jaw: Jaw) -> Shape:
 
 
 def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
-    """Return the meshes of the finger on the side +1 (left) or -1 (right), drawn in the frame `pose`, shape
-    (4, 4).
-    """
+    """Return the meshes of a finger, side +1 (left) or -1 (right), in the frame `pose`, shape (4, 4)."""
     length, back = form.length, form.thickness
     front, tip = form.recess, form.tip_thickness
     profile = [
@@ -111,8 +109,9 @@ def finger(name: str, form: Shape, side: int, pose: Vector) -> tuple[Part, ...]:
 
 
 def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
-    """Return the box of a finger for contact: its pad's face is exactly the pad's plane, or stands back from
-    it.
+    """Return the collision box of a finger.
+
+    Its face is exactly the plane of the pad, or stands back from it.
     """
     centre = np.array(
         [side * (form.tip_thickness + form.recess) / 2.0, _curve(form, 0.7), (_ROOT + form.length) / 2.0]
@@ -132,8 +131,13 @@ def grip(name: str, form: Shape, side: int, pose: Vector) -> Primitive:
 
 
 def _top_view(form: Shape, start: float, end: float = 1.0, share: float = 1.0) -> list[tuple[float, float]]:
-    """Return the outline (y, z) of the pad's face between two fractions of the length, counter-clockwise, and
-    over a share of its width.
+    """Return the outline (y, z) of the pad's face, counter-clockwise.
+
+    Args:
+        form: of the finger.
+        start: where it begins, as a fraction of the length.
+        end: where it ends, as a fraction of the length.
+        share: of the pad's width.
     """
     root = _ROOT / form.length
     right, left = list[tuple[float, float]](), list[tuple[float, float]]()

@@ -1,10 +1,9 @@
-"""Look of the PSM's instruments, in the PSM's base frame with every joint at 0: housing, shaft, wrist and
-fingers.
+"""Look of the PSM's instruments: housing, shaft, wrist and fingers.
 
-The housing belongs to the body `insertion`, the shaft to `roll`; each wrist link and finger to the body of
-its name. Sources: shaft, wrist and jaw lengths from `robots.dvrk.instruments`; diameters and boxes of wrist
-and housing from unina-icaros/dvrk-vrep and the CAD meshes in med-air/SurRoL; forms of the fingers by the kind
-of instrument, ours.
+They are drawn in the PSM's base frame with every joint at 0. The housing belongs to the body `insertion`, the
+shaft to `roll`; each wrist link and finger to the body of its name. Sources: shaft, wrist and jaw lengths
+from `robots.dvrk.instruments`; diameters and boxes of wrist and housing from unina-icaros/dvrk-vrep and the
+CAD meshes in med-air/SurRoL; forms of the fingers by the kind of instrument, ours.
 """
 
 from __future__ import annotations
@@ -56,8 +55,9 @@ def _with_shaft(hand: Looks, end: Vector) -> Looks:
 
 
 def finger_frame(tool: Instrument) -> Vector:
-    """Return the frame that fingers are drawn in, shape (4, 4): x the way the left one opens, y the wrist yaw
-    axis, z to the tip.
+    """Return the frame that fingers are drawn in, shape (4, 4).
+
+    x is the direction in which the left one opens, y the wrist yaw axis, z points to the tip.
     """
     frame = psm.chain(tool).frames(np.zeros(3 + len(tool.joints)))[-2]
     pose = np.eye(4)
@@ -96,13 +96,14 @@ def _shaft(pitch: Vector) -> tuple[Part, ...]:
 
 
 def _drawing(pitch: Vector) -> Vector:
-    """Return the axes that a wrist link is drawn in, shape (3, 3): x along its joint, z back along the shaft."""
+    """Return the axes of a wrist link's drawing, shape (3, 3): x along its joint, z back along the shaft."""
     return np.column_stack([pitch[:3, 2], np.cross((0.0, 0.0, 1.0), pitch[:3, 2]), (0.0, 0.0, 1.0)])
 
 
 def _wrist_link(name: str, frame: Vector, below: Vector) -> Part:
-    """Link from its joint, z of `frame`, to the next one, z of `below`: a hub in the clevis above, ears about
-    what comes below.
+    """Link from its joint, z of `frame`, to the next one, z of `below`.
+
+    It has a hub in the clevis above it, and ears about the link below.
     """
     length = float(np.linalg.norm(below[:3, 3] - frame[:3, 3]))
     if length < 1e-6:  # two crossed joints of a snake wrist
@@ -129,9 +130,7 @@ def _pin(name: str, frame: Vector) -> Part:
 
 
 def _electrode(pose: Vector) -> Part:
-    """What cuts by current in place of jaws: a stem with a hooked end, drawn in the frame `pose`, shape (4,
-    4).
-    """
+    """Electrode in place of jaws: a stem with a hooked end, in the frame `pose`, shape (4, 4)."""
     stem = rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.0130), 0.0008)
     hook = block((-0.0006, -0.0018, 0.0125), (0.0006, 0.0008, _ELECTRODE_LENGTH))
     return part("electrode", placed(union(stem, hook), pose[:3, :3], pose[:3, 3]), STEEL)

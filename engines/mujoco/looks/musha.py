@@ -1,8 +1,8 @@
-"""Look of a hand at the end of a PSM's shaft, in the PSM's base frame with every joint at 0: palm and
-phalanges, and the capsules that collide.
+"""Look of the MUSHA hand at the end of a PSM's shaft: palm and phalanges, and the capsules that collide.
 
-A phalanx is drawn in the frame of its link: x along it, y to the side that closes, z along the joint's axis.
-Forms are ours, within the radius of the phalanges and, for the palm, of the trocar.
+They are drawn in the PSM's base frame with every joint at 0, a phalanx in the frame of its link: x along it,
+y to the side that closes, z along the joint's axis. Forms are ours, within the radius of the phalanges and,
+for the palm, of the trocar.
 """
 
 from __future__ import annotations
@@ -66,8 +66,9 @@ def _ears(end: float, start: float) -> Manifold:
 
 
 def _phalanx(hand: Hand, link: HandLink, pose: Vector) -> tuple[Part, ...]:
-    """Return a hub in the joint, a barrel, a pad on its closing side, and ears about the next joint or a
-    round fingertip.
+    """Return a hub in the joint, a barrel, a pad on its closing side, and ears or a round fingertip.
+
+    The ears hold the next joint.
     """
     length, radius, is_last = link.phalanx.length, hand.radius, link.phalanx is hand.phalanges[-1]
     gap = 0.0020

@@ -74,8 +74,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Primitive:
-    """A convex shape for contact: a box with half extents `size`, or a capsule of radius size[0] and half
-    length size[1] along its z axis.
+    """A convex shape for contact.
+
+    A box with half extents `size`, or a capsule of radius size[0] and half length size[1] along its z axis.
     """
 
     name: str

@@ -1,5 +1,6 @@
-"""Look of a patient-side manipulator without its instrument, in its base frame: x sideways, y from the mount
-to the patient, z up.
+"""Look of a patient-side manipulator without its instrument, in its base frame.
+
+The frame: x sideways, y from the mount to the patient, z up.
 
 Seen from the side: a cradle on the mount carries the yaw link, a trough that swings in it; two pairs of bars
 lead from the motor block in the trough to the column, along which the carriage with the instrument slides.
@@ -59,8 +60,9 @@ def parts() -> Looks:
 
 
 def _base() -> tuple[Part, ...]:
-    """Cradle: a foot on the mount, 0.4864 m behind the remote centre and 0.1524 m below it, the yaw motor's
-    drum behind, a bearing in front.
+    """Cradle: a foot on the mount, the drum of the yaw motor behind, a bearing in front.
+
+    The foot is 0.4864 m behind the remote centre and 0.1524 m below it.
     """
     foot = plate(
         "x",
@@ -136,8 +138,9 @@ def _yaw() -> tuple[Part, ...]:
 
 
 def _pitch_back() -> tuple[Part, ...]:
-    """Motor block below, and the fork that carries the bars; drawn upright with (y, z) about the pivot, then
-    leant back.
+    """Motor block below, and the fork that carries the bars.
+
+    Drawn upright with (y, z) about the pivot, then leant back.
     """
     lean_y, lean_z = _PIVOT["pitch_bottom"][0] - _BACK[0], _PIVOT["pitch_bottom"][1] - _BACK[1]
     length, lean = hypot(lean_y, lean_z), atan2(-lean_y, lean_z)
@@ -185,7 +188,7 @@ def _pitch_front() -> tuple[Part, ...]:
 
 
 def _pitch_bottom() -> tuple[Part, ...]:
-    """Channel of the lower bars: a floor between two walls, high behind, that fork about the column in front."""
+    """Channel of the lower bars: a floor between two walls, high behind, that fork about the column."""
     (back, low), front = _PIVOT["pitch_bottom"], _LOWER[0]
     below = [
         (back - 0.008, low - 0.004),
@@ -218,9 +221,7 @@ def _pitch_top() -> tuple[Part, ...]:
 
 
 def _column() -> tuple[Part, ...]:
-    """Column behind the instrument: the rail of the carriage, and the cannula that holds the remote centre in
-    the patient's wall.
-    """
+    """Column behind the instrument: the rail of the carriage, and the cannula at the remote centre."""
     shape = [
         (-0.068, 0.07),
         (-0.050, 0.012),
@@ -260,9 +261,7 @@ def _column() -> tuple[Part, ...]:
 
 
 def _carriage() -> tuple[Part, ...]:
-    """Carriage at the upper end of its way: slider, plate, and the sterile adapter that the instrument sits
-    on.
-    """
+    """Carriage at the upper end of its travel: slider, plate, and the sterile adapter of the instrument."""
     slider = block((-0.0200, -0.0360, 0.420), (0.0200, -0.0280, 0.492))
     body = plate(
         "y",

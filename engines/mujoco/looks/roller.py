@@ -1,5 +1,6 @@
-"""The pads of a roller: what they look like, and their boxes for contact, drawn like fingers
-(`engines.mujoco.looks.fingers`) at the middle of their way.
+"""The pads of a roller: their meshes, and their boxes for contact.
+
+They are drawn like fingers (`engines.mujoco.looks.fingers`), at the middle of their travel.
 """
 
 from __future__ import annotations

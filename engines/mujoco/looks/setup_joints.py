@@ -1,7 +1,7 @@
-"""Look of the setup joints that carry an arm, each link drawn in its joint's DH frame (z up but for the tilt)
-and carried to the cart's.
+"""Look of the setup joints that carry an arm.
 
-Outer dimensions: bounding boxes of the CAD meshes in jhu-dvrk/dvrk_model (SUJ, Classic); axes:
+Each link is drawn in its joint's DH frame (z up except for the tilt) and carried to the cart's. Outer
+dimensions: bounding boxes of the CAD meshes in jhu-dvrk/dvrk_model (SUJ, Classic); axes:
 `robots.dvrk.setup_joints`.
 """
 
@@ -69,7 +69,8 @@ def _shoulder(length: float, top: float) -> tuple[tuple[Manifold, Material], ...
 
 
 def _elbow(length: float, *, upside_down: bool) -> tuple[tuple[Manifold, Material], ...]:
-    """Forearm from the elbow to the wrist, whose brake is in a cap on the far side of what hangs there;
+    """Forearm from the elbow to the wrist, with the wrist's brake in a cap on the side away from the arm.
+
     PSM3's forearm is turned over.
     """
     low, high = _FOREARM
@@ -114,8 +115,9 @@ def _ecm_wrist() -> tuple[tuple[Manifold, Material], ...]:
 
 
 def _tilt() -> tuple[tuple[Manifold, Material], ...]:
-    """Bracket from the tilt axis, -z, down (-y) and forward under the manipulator, to the mount's axis, in
-    which the frame has its origin.
+    """Bracket from the tilt axis, -z, down (-y) and forward under the manipulator, to the mount's axis.
+
+    The origin of the frame is on the mount's axis.
     """
     hub = rod((0.0, 0.0, -0.348), (0.0, 0.0, -0.296), 0.048)
     upright = plate(

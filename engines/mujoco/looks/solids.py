@@ -70,9 +70,7 @@ def outline(points: Sequence[Point2], radius: float = 0.0) -> CrossSection:
 
 
 def symmetric(half: Sequence[Point2], radius: float = 0.0) -> CrossSection:
-    """Return the outline whose right half is the open polygon `half`, counter-clockwise, and whose left half
-    mirrors it.
-    """
+    """Return the outline of which `half` is the right half, an open polygon, counter-clockwise."""
     return outline([*half, *((-u, v) for u, v in reversed(half))], radius)
 
 
@@ -145,8 +143,9 @@ def turned(
 
 
 def cannula(radius: float, bowl: float, low: float, high: float) -> Manifold:
-    """Return a tube about the z axis from `low` up to a bowl that ends at `high`, with a thick ring about the
-    remote centre, z = 0.
+    """Return a tube about the z axis from `low` up to a bowl that ends at `high`.
+
+    A thick ring marks the remote centre, z = 0.
     """
     profile = [
         (0.0, low),
@@ -180,9 +179,7 @@ def placed(
 
 
 def part(name: str, solid: Manifold, material: Material) -> Part:
-    """Return the mesh of `solid` without details that nobody sees, with a vertex for each side of a sharp
-    edge.
-    """
+    """Return the mesh of `solid` without invisible details, with a vertex for each side of a sharp edge."""
     low, high = np.split(np.array(solid.bounding_box()), 2)
     extent = (high - low).tolist()
     plain = solid.simplify(min(_DETAIL, _LENGTH_SHARE * max(extent), _THICKNESS_SHARE * min(extent)))

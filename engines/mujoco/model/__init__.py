@@ -1,6 +1,4 @@
-"""The MuJoCo model of any part of a da Vinci Research Kit's patient cart, built from the numbers in
-`robots.dvrk`.
-"""
+"""The MuJoCo model of the patient cart of a da Vinci Research Kit, from the numbers in `robots.dvrk`."""
 
 from engines.mujoco.model.names import CONTACT, FINGERS, finger, first_sensor, instrument_body, probe_body
 from engines.mujoco.model.scene import build, place, spec

@@ -42,8 +42,9 @@ _MOTOR = (
 
 
 def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose: Vector) -> Bodies:
-    """Add the arm called `name`, its base frame at `base_pose`, shape (4, 4), in the world; return its bodies
-    by link.
+    """Add the arm called `name`, and return its bodies by link.
+
+    `base_pose`: of its base frame in the world, shape (4, 4).
     """
     base = spec.worldbody.add_body(name=f"{name}/{BASE}", **placed(base_pose))
     base.add_site(name=f"{name}/base", group=_HIDDEN)
@@ -94,7 +95,7 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
 
 
 def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
-    """Give each independent joint its drive, and an instrument's discs the friction that wrist and jaw share."""
+    """Give each independent joint its drive, and an instrument's discs the friction of wrist and jaw."""
     is_psm = isinstance(params, PsmParams)
     driven = drives.psm(params.tool) if is_psm else drives.ECM
     hand, roller = (params.tool.hand, params.tool.roller) if is_psm else (None, None)
@@ -117,8 +118,9 @@ def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) ->
 
 
 def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
-    """Add friction, elasticity and rotor inertia of a joint, and a servo with the inputs position, velocity
-    and feed-forward effort.
+    """Add friction, elasticity and rotor inertia of a joint, and its servo.
+
+    The servo has the inputs position, velocity and feed-forward effort.
     """
     joint = spec.joint(name)
     joint.damping, joint.frictionloss, joint.armature = (
@@ -168,7 +170,7 @@ def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
 
 
 def _add_spheres(spec: mujoco.MjSpec, arm: str, spheres: tuple[ContactSphere, ...], bodies: Bodies) -> None:
-    """Mark the contact spheres by sites, and let MuJoCo lay out their positions and velocities in the world."""
+    """Mark the contact spheres by sites, with sensors of their positions and velocities in the world."""
     for sphere in spheres:
         bodies[sphere.link][0].add_site(
             name=sphere_site(arm, sphere.name),
@@ -186,7 +188,7 @@ def _add_spheres(spec: mujoco.MjSpec, arm: str, spheres: tuple[ContactSphere, ..
 
 
 def _add_sensors(spec: mujoco.MjSpec, arm: str, joints: list[str], has_jaw: bool) -> None:
-    """Let MuJoCo lay out what the ports say, in the order that `first_sensor` tells."""
+    """Add the sensors that the output ports need, in the order that `first_sensor` documents."""
     _add_joint_sensors(spec, arm, joints)
     site = mujoco.mjtObj.mjOBJ_SITE
     for kind, what in _POSE:
@@ -215,7 +217,7 @@ def _add_sensors_of(
     what: mujoco.mjtObj,
     names: list[str],
 ) -> None:
-    """Let MuJoCo lay out positions, then velocities, then efforts of joints or motors."""
+    """Add sensors of the positions, then the velocities, then the efforts of joints or motors."""
     for kind, label in kinds:
         for name in names:
             spec.add_sensor(name=f"{arm}/{label}/{name}", type=kind, objtype=what, objname=f"{arm}/{name}")

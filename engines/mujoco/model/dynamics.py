@@ -1,8 +1,8 @@
-"""The equations of motion of one arm, in its independent joints: M(q) a + gravity(q) + elastic(q) +
-friction(v) = effort.
+"""The equations of motion of one arm: M(q) a + gravity(q) + elastic(q) + friction(v) = effort.
 
-The linkage, and the fingers held closed, move with the joints that lead them: with v = G u, from the
-velocities u of the independent joints to those of all, the inertia is G' M G and a load G' f.
+They are in its independent joints. The linkage, and the fingers held closed, move with the joints that lead
+them: with v = G u, from the velocities u of the independent joints to those of all, the inertia is G' M G and
+a load G' f.
 """
 
 from __future__ import annotations
@@ -47,14 +47,13 @@ class JointDynamics:
 
 
 def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
-    """Return the dynamics of `arm`, alone with its base upright, at joint positions `q` (rad, m) and
-    velocities `dq` (rad/s, m/s).
+    """Return the dynamics of `arm`, alone with its base upright.
 
     Args:
         arm: PSM1, PSM2, PSM3 or ECM.
         tool: instrument of a PSM, by name or number; endoscope of the ECM.
-        q: one number per joint, in range.
-        dq: the same.
+        q: joint positions (rad, m), one per joint, in range.
+        dq: joint velocities (rad/s, m/s), one per joint.
     """
     what = {"endoscope" if arm == "ECM" else "instrument": tool}
     scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False})

@@ -1,5 +1,6 @@
-"""What moves the fingers of a hand: springs and friction in the joints, the spring that spreads each finger,
-and the tendon that closes it.
+"""What moves the fingers of a hand: springs and friction in the joints, spreads, and tendons.
+
+A spring spreads each finger, and a tendon closes it.
 """
 
 from __future__ import annotations
@@ -22,12 +23,11 @@ hold weighs two grams.
 
 
 def add_drives(spec: mujoco.MjSpec, arm: str, hand: Hand, drives: Mapping[str, Drive]) -> None:
-    """Give `hand` its springs, its tendons and its motors, which are called `<arm>/<finger>` and
-    `<arm>/<spread>`.
+    """Give `hand` its springs, tendons and motors; motors are called `<arm>/<finger>` and `<arm>/<spread>`.
 
     A tendon's length is the finger's closing (rad), so its force is the torque at the first pulley (N m). A
-    motor that lets go turns its own rotor, by as much as that takes at the closing's largest acceleration;
-    beyond that it pushes nothing: springs open the finger.
+    motor that lets go turns its own rotor, with the torque for the closing's largest acceleration; it pushes
+    no harder: springs open the finger.
     """
     n = len(hand.phalanges)
     for i, (finger, spread) in enumerate(zip(hand.fingers, hand.spreads, strict=True)):
@@ -53,8 +53,9 @@ def add_drives(spec: mujoco.MjSpec, arm: str, hand: Hand, drives: Mapping[str, D
 
 
 def _add_springs(spec: mujoco.MjSpec, arm: str, hand: Hand, links: tuple[HandLink, ...]) -> None:
-    """Set the springs and friction of all joints of a finger but the first, whose spring is the motor of the
-    spread.
+    """Set the springs and friction of all joints of a finger except the first.
+
+    The motor of the spread is the spring of the first joint.
     """
     for i, (link, damping) in enumerate(zip(links, hand.damping.tolist(), strict=True)):
         joint, phalanx = spec.joint(f"{arm}/{link.name}"), link.phalanx

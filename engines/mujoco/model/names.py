@@ -1,6 +1,4 @@
-"""What the parts of an arm are called in the model: bodies and joints `<arm>/<link>`, sites `<arm>/base` and
-`<arm>/tip`.
-"""
+"""Names in the model: bodies and joints `<arm>/<link>`, sites `<arm>/base` and `<arm>/tip`."""
 
 from __future__ import annotations
 

@@ -49,8 +49,9 @@ _ROUNDNESS = 0.1
 
 
 def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
-    """Add the table to the world, as a body: MuJoCo pairs geoms of the world itself with every link, wherever
-    that is.
+    """Add the table to the world, as a body of its own.
+
+    MuJoCo pairs geoms of the world body with every link, however far away.
     """
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
@@ -61,7 +62,7 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
 
 
 def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
-    """Add one movable object as the body `name` with the free joint `name`; the body's frame is the object's."""
+    """Add one movable object as the body `name`, in the object's frame, with the free joint `name`."""
     x, y, z, w = params.orientation
     body = spec.worldbody.add_body(name=name, pos=params.position, quat=[w, x, y, z])
     body.add_freejoint(name=name)
@@ -107,17 +108,17 @@ def _on_arc(params: RingParams | NeedleParams, count: int) -> Vector:
 
 
 def wire_inertia(radius: float, thickness: float, arc: float, density: float) -> tuple[float, float, Vector]:
-    """Return mass (kg), distance of the centre of mass from the arc's centre (m) and principal moments about
-    it (kg m^2).
+    """Return mass (kg), centre of mass (m) and principal moments (kg m^2) of a wire along an arc.
+
+    The centre of mass is given by its distance from the arc's centre; the moments are about the centre of
+    mass. For a thin wire along r (cos a, sin a, 0), |a| < arc/2, they are means of cos^2 and sin^2 over the
+    arc; each section adds m s^2/4 about its diameters and m s^2/2 about the tangent (s: `thickness`).
 
     Args:
-        radius: Of the centre line, m.
-        thickness: Radius of the cross-section, m.
-        arc: From end to end, rad; the wire lies in the plane z = 0, its middle on the x axis.
+        radius: of the centre line, m.
+        thickness: radius of the cross-section, m.
+        arc: from end to end, rad; the wire lies in the plane z = 0, its middle on the x axis.
         density: kg/m^3.
-
-    A thin wire along r (cos a, sin a, 0), |a| < arc/2: its moments are means of cos^2 and sin^2 over the arc;
-    each of its sections adds m s^2/4 about its diameters and m s^2/2 about the tangent (s: `thickness`).
     """
     mass = density * pi * thickness**2 * radius * arc
     centre = radius * sin(arc / 2.0) / (arc / 2.0)

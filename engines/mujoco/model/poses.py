@@ -10,7 +10,7 @@ from schemas.vectors import Vector
 __all__ = ["ROS_ORDER", "placed"]
 
 ROS_ORDER = np.array([0, 1, 2, 4, 5, 6, 3])
-"""Where each number of a ROS pose (x, y, z, qx, qy, qz, qw) stands in a pose of MuJoCo, which has the w first."""
+"""Where each number of a ROS pose (x, y, z, qx, qy, qz, qw) stands in a pose of MuJoCo."""
 
 
 def placed(pose: Vector) -> dict[str, list[float]]:

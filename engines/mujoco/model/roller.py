@@ -1,6 +1,4 @@
-"""What rolls a needle in a jaw: two pads that slide along the fingers, one forwards while the other goes
-back, by one motor.
-"""
+"""What rolls a needle in a jaw: two pads on the fingers that one motor moves in opposite directions."""
 
 from __future__ import annotations
 

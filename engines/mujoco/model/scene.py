@@ -20,7 +20,7 @@ from schemas.vectors import Vector
 __all__ = ["build", "place", "spec"]
 
 _TIMESTEP = 5e-4
-"""s, unless whoever steps the model sets another: what `MujocoParams` has."""
+"""s; the default of `MujocoParams`."""
 
 
 def build(scene: SceneParams, timestep: float = _TIMESTEP) -> mujoco.MjModel:
@@ -75,16 +75,16 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, Psm
 
 
 def _set_options(option: mujoco.MjOption, *, grasping: bool) -> None:
-    """Choose how the model is stepped; where there are things to hold or a hand, so that friction holds them
-    and light fingers rest at their stops.
+    """Choose integrator and friction cone.
 
-    See docs/decisions/0012 and 0018.
+    `grasping`: there are objects or a hand, so friction must hold objects, and light fingers must rest at
+    their stops. See docs/decisions/0012 and 0018.
     """
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     if grasping:
         option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 1000.0
-        # dearer than what they save here
+        # both cost more than they save here
         option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ISLAND | mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
 
 

@@ -16,12 +16,13 @@ from schemas.vectors import Vector
 __all__ = ["CART", "add"]
 
 CART = "cart"
-"""The body of the cart; its frame, which is the world's, is the one in which the setup joints are told."""
+"""The body of the cart, whose frame is the world's; the setup joints are given in it."""
 
 
 def add(spec: mujoco.MjSpec, scene: SceneParams) -> dict[CartArm, Vector]:
-    """Add the cart and the setup joint of every arm in `scene`; return the poses of the arms' base frames in
-    the world, shape (4, 4).
+    """Add the cart and the setup joint of every arm in `scene`.
+
+    Returns the poses of the arms' base frames in the world, shape (4, 4).
     """
     cart = spec.worldbody.add_body(name=CART)
     shapes.add(spec, CART, CART, {CART: (cart, np.eye(4))}, seen=scene.looks)

@@ -42,7 +42,7 @@ _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEE
 def add_arm(
     spec: mujoco.MjSpec, arm: CartArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool
 ) -> None:
-    """Give an arm and what it holds its collision shapes and, if it is to be `seen`, its looks."""
+    """Give an arm and its instrument collision shapes and, if they are to be `seen`, looks."""
     whats = ("ecm",) if isinstance(params, EcmParams) else ("psm", f"instrument/{params.tool.name}")
     for what in whats:
         add(spec, what, arm, bodies, seen=seen)
@@ -59,8 +59,9 @@ def add_arm(
 
 
 def add(spec: mujoco.MjSpec, what: str, owner: str, bodies: Bodies, *, seen: bool) -> None:
-    """Give the bodies of `owner` the collision shapes and, if they are to be `seen`, the looks of `what`, a
-    name that `looks.parts` knows.
+    """Give the bodies of `owner` collision shapes and, if they are to be `seen`, looks.
+
+    `what`: a name that `looks.parts` knows.
     """
     if seen:
         _add_looks(spec, what, bodies)

@@ -1,8 +1,7 @@
-"""The links of an arm as a tree, with the pose of each in the base frame `<arm>_base` while every joint is at
-0.
+"""The links of an arm as a tree, each with its pose in `<arm>_base` while every joint is at 0.
 
 The main chain has the frames of the arm's modified DH table, so that the tip is exact. The bars of the
-linkage and the fingers hang on it; their joint axis is z of their own frame, as everywhere.
+linkage and the fingers hang on it; the axis of every joint is z of its own frame.
 """
 
 from __future__ import annotations

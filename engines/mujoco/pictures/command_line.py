@@ -46,9 +46,9 @@ def render(
         typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco."),
     ] = None,
 ) -> None:
-    """Draw the scene of a recording as it was at one moment, soft bodies and all."""
+    """Draw the scene of a recording at one moment, with its soft bodies."""
     if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise typer.BadParameter(f"'{output}' is no picture: .png or .jpg", param_hint="--output")
+        raise typer.BadParameter(f"'{output}' is not a picture: .png or .jpg", param_hint="--output")
     for package in ("mujoco", "PIL"):
         if find_spec(package) is None:
             raise MissingExtraError("'trocar render'", "mujoco", "pillow" if package == "PIL" else package)
@@ -70,5 +70,7 @@ def _point(text: str, option: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(number) for number in text.replace(",", " ").split())
     except ValueError:
-        raise typer.BadParameter(f"'{text}' is no point; write x,y,z in metres", param_hint=option) from None
+        raise typer.BadParameter(
+            f"'{text}' is not a point; write x,y,z in metres", param_hint=option
+        ) from None
     return x, y, z

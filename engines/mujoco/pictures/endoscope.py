@@ -1,4 +1,4 @@
-"""The stereo endoscope: draws the scene at the joint positions it is given, at a period of its own.
+"""The stereo endoscope: draws the scene at the joint positions it receives, at a period of its own.
 
 A picture of the state at `t` comes out at the end of the step that begins there, stamped `t`, as a camera
 delivers a frame one period after it was exposed (docs/decisions/0013).
@@ -42,7 +42,6 @@ class Endoscope(Stepped):
     params: EndoscopeParams
 
     def __init__(self, name: str, params: EndoscopeParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._positions = np.zeros(position_count(params))
         self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.skins}
@@ -68,10 +67,10 @@ class Endoscope(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """`qpos` of the same scene and the nodes of soft bodies in; per eye, with ROS's names, pictures and
-        their calibration out.
+        """`qpos` of the same scene and the nodes of soft bodies in; per eye, pictures and calibration out.
 
-        Pictures are events: none comes before the first step, and none at all on a machine without OpenGL.
+        The outputs have ROS's names. Pictures are events: the first is published at the first step, and none
+        on a machine without OpenGL.
         """
         qpos = Port(
             name="qpos",
@@ -95,7 +94,7 @@ class Endoscope(Stepped):
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Build the scene, unless soft bodies are missing from it.
 
-        Where there is no OpenGL, say so once and publish no pictures.
+        Without OpenGL it logs one warning and publishes no pictures.
         """
         if not self._pictures:
             return {}
@@ -113,7 +112,7 @@ class Endoscope(Stepped):
             self._build()
         elif not found.name:
             _log.warning(
-                "participant '%s' publishes no pictures: no OpenGL works here (%s). To mend it: %s",
+                "participant '%s' publishes no pictures: no OpenGL works here (%s). To fix it: %s",
                 self.name,
                 found.detail,
                 opengl.REMEDY,
@@ -181,40 +180,39 @@ class Endoscope(Stepped):
         return np.frombuffer(file.getvalue(), np.uint8)
 
     def state_hash(self) -> int:
-        """Return the hash of what was last drawn, positions and nodes; of no pixel, since two machines need
-        not draw the same ones.
+        """Return the hash of the positions and nodes that were drawn last.
+
+        Pixels are left out, since two machines need not draw the same ones.
         """
         return state_hash(self.save())
 
     def save(self) -> bytes:
-        """Return the positions last drawn, and what is known of the soft bodies."""
+        """Return the positions last drawn, and the state of the soft bodies."""
         return self._positions.tobytes() + b"".join(body.save() for body in self._bodies.values())
 
     def restore(self, state: bytes) -> None:
-        """Return to a saved state. Raises StateError if it is none of this scene's."""
+        """Return to a saved state. Raises StateError if it does not fit this scene."""
         size, rest = self._positions.nbytes, state[self._positions.nbytes :]
         for body in self._bodies.values():
             rest = body.restore(rest)
         if len(state) < size or rest:
             raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes is none of this scene; was"
-                " it saved elsewhere?"
+                f"participant '{self.name}': a saved state of {len(state)} bytes does not fit; was it saved"
+                " by another scene?"
             )
         self._positions[:] = np.frombuffer(state, np.float64, self._positions.size)
         if self._bodies:
             self.close()  # their surfaces may be others
 
     def close(self) -> None:
-        """Give the OpenGL context back."""
+        """Free the OpenGL context."""
         if self._scene is not None:
             self._scene.close()
             self._scene = None
 
 
 def camera_info(camera: StereoCamera, eye: Eye, header: Header) -> CameraInfo:
-    """Return the calibration of one camera, as ROS has it for a rectified stereo pair: both in the left
-    camera's optical frame.
-    """
+    """Return the calibration of one camera of a rectified stereo pair, in the left camera's optical frame."""
     return CameraInfo(
         header=header,
         height=camera.height,

@@ -1,4 +1,4 @@
-"""What a scenario may say about the endoscope."""
+"""Parameters of the endoscope."""
 
 from __future__ import annotations
 
@@ -44,25 +44,25 @@ class EndoscopeParams(SceneParams):
     )
     field_of_view: Angle = Field(default=endoscope.FIELD_OF_VIEW, gt=0.0, lt=3.0, description="horizontal")
     baseline: Length = Field(default=endoscope.BASELINE, ge=0.0, description="distance of the two cameras")
-    near: Length = Field(default=endoscope.NEAR, gt=0.0, description="what is nearer is not seen")
+    near: Length = Field(default=endoscope.NEAR, gt=0.0, description="anything nearer is invisible")
     far: Length | None = Field(
         default=None,
         gt=0.0,
         description=(
-            "what is farther is not seen; 2 m from the endoscope's tip, all of the scene from elsewhere"
+            "anything farther is invisible; default: 2 m at the endoscope's tip, elsewhere the whole scene"
         ),
     )
     view: ViewParams | None = Field(
         default=None,
         description=(
-            "cameras that stand in the world; without it they are at the ECM's tip or, in a scene without"
-            " ECM, look at all of it"
+            "cameras fixed in the world; default: at the ECM's tip or, in a scene without ECM, looking at the"
+            " whole scene"
         ),
     )
     skins: dict[Name, SkinParams] = Field(
         default_factory=dict[Name, SkinParams],
         description=(
-            "soft bodies of other engines that are to be seen; the nodes of each come over `<name>/nodes`"
+            "soft bodies of other engines to draw; the input `<name>/nodes` receives the nodes of each"
         ),
     )
     images: Literal["raw", "compressed", "both", "none"] = Field(
@@ -70,10 +70,10 @@ class EndoscopeParams(SceneParams):
     )
     format: Literal["jpeg", "png"] = Field(default="jpeg", description="of the compressed picture")
     quality: int = Field(
-        default=95, ge=1, le=95, description="of a JPEG; beyond 95 files grow and pictures do not get better"
+        default=95, ge=1, le=95, description="of a JPEG; above 95 files grow but pictures do not improve"
     )
     shadows: bool = Field(
-        default=False, description="draw shadows and reflections: without a GPU several times as slow"
+        default=False, description="draw shadows and reflections: several times slower without a GPU"
     )
 
     @property

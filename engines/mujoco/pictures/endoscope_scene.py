@@ -1,4 +1,4 @@
-"""What the endoscope looks at: the model of its scene, the state it is given, and where its cameras are."""
+"""What the endoscope sees: the model of its scene, the state it receives, and the poses of its cameras."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ class EndoscopeScene:
     def __init__(
         self, params: EndoscopeParams, gl: str, bodies: Mapping[str, SoftBody] = MappingProxyType({})
     ) -> None:
-        """Build the scene with the soft `bodies`, and prepare to draw it with the OpenGL that MUJOCO_GL calls
-        `gl`.
+        """Build the scene with the soft `bodies`, and prepare to draw it.
+
+        `gl`: the OpenGL to use, by its name in MUJOCO_GL.
         """
         scene, ecm = spec(params), params.arms.get("ECM")
         if params.view is not None or ecm is None:
@@ -65,7 +66,7 @@ class EndoscopeScene:
         return self._renderer.render(data, self._pose())
 
     def close(self) -> None:
-        """Give the OpenGL context back."""
+        """Free the OpenGL context."""
         self._renderer.close()
 
     def _pose(self) -> Vector:
@@ -79,8 +80,9 @@ class EndoscopeScene:
 
 
 def look_at(view: ViewParams) -> Vector:
-    """Return the optical frame (x right, y down, z ahead) of cameras at `view`, shape (4, 4), upright unless
-    they look along the vertical.
+    """Return the optical frame (x right, y down, z ahead) of cameras at `view`, shape (4, 4).
+
+    They are upright unless they look along the vertical.
     """
     position, target = np.array(view.position), np.array(view.target)
     ahead = (target - position) / np.linalg.norm(target - position)
@@ -94,7 +96,7 @@ def look_at(view: ViewParams) -> Vector:
 
 
 def _overview(model: mujoco.MjModel) -> ViewParams:
-    """Return where MuJoCo's viewer would begin."""
+    """Return the camera with which MuJoCo's viewer starts."""
     camera = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, camera)
     azimuth, elevation = np.radians([camera.azimuth, camera.elevation])

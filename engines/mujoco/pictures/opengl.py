@@ -1,7 +1,7 @@
 """Which OpenGL draws without a screen on this machine.
 
-A process can try one only: PyOpenGL and MuJoCo settle on it at the first use. So each is tried in a process
-of its own, which also survives a driver that crashes. `MUJOCO_GL`, if it is set, is obeyed
+A process can try only one: PyOpenGL and MuJoCo choose it at the first use. So each is tried in a process of
+its own; then this process also survives a driver that crashes. `MUJOCO_GL`, if it is set, decides
 (https://mujoco.readthedocs.io/en/stable/programming).
 """
 
@@ -28,13 +28,15 @@ _OFF = ("disable", "disabled", "off", "false", "0")
 _SCREEN = ("glfw", "glx", "wgl", "enable", "enabled", "on", "true", "1")
 """Values of MUJOCO_GL that mean GLFW (same source)."""
 _PATIENCE_S = 60.0
-"""A driver that has not drawn by then will not."""
+"""A driver that has drawn nothing by then will not draw."""
 
 
 @dataclass(frozen=True)
 class OpenGL:
-    """What `find` found: the value of MUJOCO_GL that works, empty if none does, and the renderer's name or
-    what went wrong.
+    """What `find` found.
+
+    `name` is the value of MUJOCO_GL that works, empty if none does; `detail` the name of the renderer, or the
+    error.
     """
 
     name: str
@@ -44,11 +46,11 @@ class OpenGL:
 @cache
 def find() -> OpenGL:
     """Return the first OpenGL that works here."""
-    wish = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if wish in _OFF:
-        return OpenGL("", f"MUJOCO_GL={wish} forbids it")
+    asked = os.environ.get("MUJOCO_GL", "").strip().lower()
+    if asked in _OFF:
+        return OpenGL("", f"MUJOCO_GL={asked} forbids it")
     tried: list[str] = []
-    for name in (wish,) if wish else _CANDIDATES.get(sys.platform, ("glfw",)):
+    for name in (asked,) if asked else _CANDIDATES.get(sys.platform, ("glfw",)):
         works, detail = _try(name)
         if works:
             return OpenGL(name, detail)
@@ -77,27 +79,27 @@ def _try(name: str) -> tuple[bool, str]:
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo, also where MUJOCO_GL names an OpenGL that this machine does not have: physics needs
-    none.
+    """Import MuJoCo, also where MUJOCO_GL names an OpenGL that this machine does not have.
 
-    MuJoCo's package loads that OpenGL as it is imported, and fails with whatever the OpenGL library's loader
-    raises.
+    Physics needs no OpenGL, but MuJoCo's package loads the one that is named, and fails with whatever the
+    loader of the OpenGL library raises.
     """
     try:
         import_module("mujoco")
     except (AttributeError, ImportError, OSError, RuntimeError):
-        wish = os.environ.pop("MUJOCO_GL", None)
-        if wish is None:
+        asked = os.environ.pop("MUJOCO_GL", None)
+        if asked is None:
             raise
         try:
             import_module("mujoco")
         finally:
-            os.environ["MUJOCO_GL"] = wish
+            os.environ["MUJOCO_GL"] = asked
 
 
 def context(name: str, width: int, height: int) -> Any:
-    """Return a `GLContext` of MuJoCo, with `make_current` and `free`, of the OpenGL that MUJOCO_GL calls
-    `name`.
+    """Return a `GLContext` of MuJoCo, with `make_current` and `free`.
+
+    `name`: the OpenGL to use, by its name in MUJOCO_GL.
     """
     # it reports that an optional package is not there
     logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
@@ -106,9 +108,7 @@ def context(name: str, width: int, height: int) -> Any:
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether cameras work on this machine, what was found, and what mends it where they do not: for
-    `trocar doctor`.
-    """
+    """Return whether cameras work on this machine, what was found, and the remedy, for `trocar doctor`."""
     if find_spec("mujoco") is None:
         return False, "not tried: mujoco is not installed", "pip install 'trocar[mujoco]'"
     found = find()

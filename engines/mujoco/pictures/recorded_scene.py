@@ -1,6 +1,4 @@
-"""A moment of a recorded session as a picture: the scene of its robot, with the soft bodies of its other
-engines.
-"""
+"""A moment of a recorded session as a picture: the scene of its robot, with all soft bodies."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ _ASIDE = np.array([0.5, -0.72, 0.48])
 seen.
 """
 _DISTANCE, _LEAST = 1.4, 0.1
-"""Of the overview, in diagonals of what is looked at; the least diagonal, m."""
+"""Of the overview, in diagonals of the box around its subject; the least diagonal, m."""
 _LENS = ("field_of_view", "baseline", "near", "far")
 _OVERSAMPLING = 2
 """Pixels drawn for each one of the picture, along either side: smooths edges."""
@@ -76,19 +74,19 @@ class RecordedScene:
         """Return what is seen at `time_ns`, shape (height, width, 3), RGB.
 
         Args:
-            time_ns: simulated time; what is shown is the newest that was published by then.
+            time_ns: simulated time; the picture shows the newest state published by then.
             camera: `left` or `right` of the endoscope, or `overview`.
             size: width and height, pixels.
             position: where the overview looks from, m in the world; by default from above and aside.
-            target: where it looks at, m in the world; by default at where the soft bodies and objects began.
+            target: where it looks at, m in the world; by default where soft bodies and objects were at first.
 
-        Raises RecordingError if the recording does not say what is asked, TrocarError if nothing can be drawn
-        on this machine.
+        Raises RecordingError if the recording does not contain what is asked for, TrocarError if nothing can
+        be drawn on this machine.
         """
         gl = opengl.find()
         if not gl.name:
             raise TrocarError(
-                f"no OpenGL works here ({gl.detail}), so there are no pictures. To mend it: {opengl.REMEDY}"
+                f"no OpenGL works here ({gl.detail}), so there are no pictures. To fix it: {opengl.REMEDY}"
             )
         positions, bodies = self._positions(time_ns), self._bodies(time_ns)
         width, height = size
@@ -156,8 +154,8 @@ class RecordedScene:
         points += [np.array([thing.position]) for thing in self._params.objects.values()]
         if not points:
             raise RecordingError(
-                f"'{self._recording.file}': neither soft bodies nor objects to look at; say where the"
-                " overview looks, from where and at what"
+                f"'{self._recording.file}': neither soft bodies nor objects to look at; give the overview a"
+                " position and a target"
             )
         cloud = np.concatenate(points)
         low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -167,9 +165,7 @@ class RecordedScene:
 
 
 def _by_body(topics: list[str]) -> dict[str, str]:
-    """Return the topics of soft bodies by name: `<organ>`, or `<engine>_<organ>` where several engines have
-    one of that name.
-    """
+    """Return the topics of soft bodies by name: `<organ>`, or `<engine>_<organ>` if several share it."""
     ends = [topic.split("/") for topic in topics]  # /engine/<participant>/out/<organ>/nodes
     organs = [end[-2] for end in ends]
     return {
@@ -189,7 +185,7 @@ def _looks(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
 
 
 def _lens(participants: Mapping[str, ParticipantSpec]) -> dict[str, Any]:
-    """Return what the scenario says of the cameras of its endoscope, if it has one."""
+    """Return the scenario's parameters of the cameras of its endoscope, if it has one."""
     for spec in participants.values():
         if spec.kind == "endoscope" and "view" not in spec.params:
             return {name: value for name, value in spec.params.items() if name in _LENS}

@@ -1,10 +1,9 @@
-"""From the coarse triangles of a soft body to a surface that looks smooth: sharp edges kept, triangles
-curved.
+"""From the coarse triangles of a soft body to a surface that looks smooth.
 
-The nodes stay where they are; between them the surface follows the cubic edge of a curved point-normal
-triangle (Vlachos, Peters, Boyd, Mitchell: Curved PN Triangles, I3D 2001): the middle of the edge from a to b
-with unit normals n and m there, and d = b - a, is (a + b)/2 - ((d . n) n - (d . m) m)/8. It depends on the
-edge alone, so neighbours meet without a gap.
+Sharp edges are kept, triangles are curved. The nodes stay where they are; between them the surface follows
+the cubic edge of a curved point-normal triangle (Vlachos, Peters, Boyd, Mitchell: Curved PN Triangles, I3D
+2001): the middle of the edge from a to b with unit normals n and m there, and d = b - a, is (a + b)/2 - ((d .
+n) n - (d . m) m)/8. It depends on the edge alone, so neighbours meet without a gap.
 """
 
 from __future__ import annotations
@@ -40,8 +39,11 @@ class SkinMesh:
     """
 
     def __init__(self, rest: Vector, triangles: Indices) -> None:
-        """Take the nodes at rest, shape (n, 3), m, and the surface, node indices of shape (f, 3),
-        counter-clockwise from outside.
+        """Divide the surface until it looks smooth.
+
+        Args:
+            rest: the nodes at rest, shape (n, 3), m.
+            triangles: of the surface, node indices, shape (f, 3), counter-clockwise from outside.
         """
         faces, self._node = _split(rest, triangles)
         self._divisions: list[_Division] = []
@@ -53,9 +55,7 @@ class SkinMesh:
         """Vertex indices, shape (m, 3), counter-clockwise from outside."""
 
     def vertices(self, nodes: Vector) -> Vector:
-        """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: first those at nodes, then
-        those between them.
-        """
+        """Return the vertices, shape (v, 3), m, for `nodes`, shape (n, 3), m: those at nodes come first."""
         points = nodes[self._node]
         for division in self._divisions:
             points = division.refined(points)
@@ -66,7 +66,7 @@ class _Division:
     """Every triangle becomes four."""
 
     def __init__(self, corners: Indices) -> None:
-        """Take the triangles, vertex indices of shape (f, 3)."""
+        """Divide triangles `corners`, vertex indices, shape (f, 3)."""
         self._corners = corners
         by_vertex = np.argsort(corners.ravel(), kind="stable")
         count = int(corners.max()) + 1
@@ -95,10 +95,10 @@ class _Division:
 
 
 def _split(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
-    """Return the corners of the triangles as vertex indices, shape (f, 3), and the node of each vertex, shape
-    (v,).
+    """Return the triangles as vertex indices, shape (f, 3), and the node of each vertex, shape (v,).
 
-    Two corners at a node are one vertex if one can go from one to the other across edges that are not sharp.
+    Two corners at a node are one vertex if a path across edges that are not sharp leads from one to the
+    other.
     """
     a, b, c = (rest[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
@@ -117,8 +117,9 @@ def _split(rest: Vector, triangles: Indices) -> tuple[Indices, Indices]:
 
 
 def _smooth_pairs(triangles: Indices, normals: Vector) -> tuple[Indices, Indices]:
-    """Return pairs of corners (numbered 3 face + corner), shape (p,) each, that share a node and an edge
-    which is not sharp.
+    """Return pairs of corners, shape (p,) each, that share a node and an edge that is not sharp.
+
+    A corner has the number 3 face + corner.
     """
     corner = np.arange(triangles.size).reshape(-1, 3)
     # (3 f, 2): the corners of each side

@@ -1,4 +1,4 @@
-"""What a scenario may say about how a soft body looks."""
+"""Parameters of the look of a soft body."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _COLOURS: dict[str, Rgb] = {
     "kidney": (0.60, 0.24, 0.20),
     "liver": (0.52, 0.20, 0.15),
 }
-"""Chosen by eye for a white lamp at the camera, after what anatomy says of the living organs: liver and
+"""Chosen by eye for a white lamp at the camera, after descriptions of the living organs in anatomy: liver and
 kidney red-brown, the liver darker; the colon a greyish pink; the adrenal gland the yellow of its cortex;
-`tissue`, which is all else, the pink of muscle.
+`tissue`, for all others, the pink of muscle.
 """
 
 
@@ -37,8 +37,8 @@ class SkinParams(Params):
     colour: Literal["tissue", "adrenal", "colon", "fat", "kidney", "liver"] | Rgb | None = Field(
         default=None,
         description=(
-            "name of a tissue, or red, green and blue from 0 to 1; by default that of the tissue with whose"
-            " name the body's ends, if there is one"
+            "name of a tissue, or red, green and blue from 0 to 1; default: the tissue whose name ends the"
+            " body's name, else `tissue`"
         ),
     )
 

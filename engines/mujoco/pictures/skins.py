@@ -32,12 +32,12 @@ _SPECULAR, _SHININESS = 0.5, 0.7
 
 
 class SoftBody:
-    """A soft body as the messages on one port describe it: the surface and the shape at rest from the first,
-    the nodes from the newest.
+    """A soft body as the messages on one port describe it.
+
+    The surface and the shape at rest come with the first message, the nodes with the newest.
     """
 
     def __init__(self, port: str) -> None:
-        """Take the port that the messages come from."""
         self._port = port
         self.rest: NDArray[np.float32] = np.zeros((0, 3), np.float32)
         """Shape (n, 3), m, frame `world`."""
@@ -47,8 +47,9 @@ class SoftBody:
         """Node indices, shape (f, 3), counter-clockwise from outside."""
 
     def take(self, message: Message | None) -> None:
-        """Take the newest message. Raises SessionError if the surface is not known, or the message does not
-        fit it.
+        """Take the newest message.
+
+        Raises SessionError if the surface is unknown, or the message does not fit it.
         """
         if not isinstance(message, SoftBodyState) or message.nodes_m.size % 3:
             raise SessionError(
@@ -69,8 +70,8 @@ class SoftBody:
         if not triangles.size:
             raise SessionError(
                 f"input '{self._port}': the first message has no triangles, which come with the state at time"
-                " 0. Was it missed, because an `order` puts the tissue before this participant? Take this"
-                " one out of the order"
+                " 0. An `order` that puts the tissue before this participant makes it miss that state: remove"
+                " this participant from the order"
             )
         if triangles.size % 3 or triangles.max() >= len(nodes):
             raise SessionError(
@@ -80,7 +81,7 @@ class SoftBody:
         self.triangles = triangles.reshape(-1, 3)
 
     def save(self) -> bytes:
-        """Return all that the messages have told."""
+        """Return all that is known from the messages."""
         return (
             _SHAPE.pack(len(self.rest), len(self.triangles))
             + self.rest.tobytes()
@@ -89,9 +90,9 @@ class SoftBody:
         )
 
     def restore(self, state: bytes) -> bytes:
-        """Take back what `save` returned, from the beginning of `state`; return what follows it.
+        """Restore what `save` returned from the beginning of `state`; return what follows it.
 
-        Raises StateError if it is cut short.
+        Raises StateError if it is incomplete.
         """
         try:
             count, triangles = _SHAPE.unpack_from(state)
@@ -100,8 +101,8 @@ class SoftBody:
             self.triangles = np.frombuffer(state, np.uint32, 3 * triangles, at).reshape(triangles, 3)
         except (struct.error, ValueError) as error:
             raise StateError(
-                f"a saved state of {len(state)} bytes holds no soft body for '{self._port}': {error}; was it"
-                " saved elsewhere?"
+                f"a saved state of {len(state)} bytes contains no soft body for '{self._port}': {error}; was"
+                " it saved by another scene?"
             ) from error
         self.rest, self.nodes = rest, nodes
         return state[at + self.triangles.nbytes :]

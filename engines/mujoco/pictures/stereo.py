@@ -1,6 +1,4 @@
-"""Draws what two cameras side by side see of a MuJoCo model: one scene, one pass, one picture with both
-halves.
-"""
+"""Draws what two cameras side by side see of a MuJoCo model, in one pass."""
 
 from __future__ import annotations
 
@@ -41,12 +39,11 @@ class StereoRenderer:
         """Prepare to draw.
 
         Args:
-            model: What to draw; its offscreen size and quality are set here, so it belongs to this renderer
-            alone.
-            camera: The two cameras.
-            clip: Near and far distance between which they see, m.
-            gl: The OpenGL to use, by the name that MUJOCO_GL has for it.
-            shadows: Draw shadows and reflections.
+            model: what to draw; its offscreen size and quality are set here, so no other renderer may use it.
+            camera: the two cameras.
+            clip: near and far distance between which they see, m.
+            gl: the OpenGL to use, by its name in MUJOCO_GL.
+            shadows: draw shadows and reflections.
         """
         self._model, self._camera = model, camera
         width, height = 2 * camera.width, camera.height
@@ -69,12 +66,13 @@ class StereoRenderer:
         self._frustum = (half * camera.height / camera.width, *clip)
 
     def render(self, data: mujoco.MjData, pose: Vector) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Return what the left and the right camera see, each of shape (height, width, 3), RGB, the first row
-        on top.
+        """Return the pictures of the left and the right camera, each of shape (height, width, 3), RGB.
+
+        The first row is the top.
 
         Args:
-            data: State whose kinematics are up to date.
-            pose: The optical frame midway between the cameras, in the world, shape (4, 4).
+            data: state whose kinematics are up to date.
+            pose: the optical frame midway between the cameras, in the world, shape (4, 4).
         """
         self._gl.make_current()
         what = mujoco.mjtCatBit.mjCAT_STATIC | mujoco.mjtCatBit.mjCAT_DYNAMIC
@@ -97,7 +95,7 @@ class StereoRenderer:
             lamp.pos, lamp.dir = middle, ahead
 
     def close(self) -> None:
-        """Give the OpenGL context back. May be called twice."""
+        """Free the OpenGL context. May be called twice."""
         if self._gl is not None:
             self._gl.make_current()
             self._context.free()

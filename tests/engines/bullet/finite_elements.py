@@ -1,13 +1,12 @@
-"""The truth for Bullet's tissue: its neo-Hookean material on linear tetrahedra, written from the paper, at
-static equilibrium.
+"""The reference for Bullet's tissue: its neo-Hookean material on linear tetrahedra, at static equilibrium.
 
-Energy density of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation (2018), equation 14, with a = 1 + 3
-mu / (4 lambda): mu/2 (I_C - 3) + lambda/2 (J - a)^2 - mu/2 log(I_C + 1). Its derivative by F, times the
-gradients of the shape functions, is the force that the elements exert on the nodes. Rigid spheres press on
-the faces between the nodes, so the truth is what this mesh can represent; how far the mesh is from the
-continuum is another question, which a finer mesh answers. Friction is Coulomb's, as a potential of the way
-since the last step with the pressure of the iteration before: Li et al., Incremental Potential Contact (ACM
-Trans. Graph. 39, 2020), section 5.
+It is written from the paper. Energy density of Smith, de Goes, Kim, Stable Neo-Hookean Flesh Simulation
+(2018), equation 14, with a = 1 + 3 mu / (4 lambda): mu/2 (I_C - 3) + lambda/2 (J - a)^2 - mu/2 log(I_C + 1).
+Its derivative by F, times the gradients of the shape functions, is the force that the elements exert on the
+nodes. Rigid spheres press on the faces between the nodes, so the reference is what this mesh can represent;
+how far the mesh is from the continuum is another question, which a finer mesh answers. Friction is Coulomb's,
+as a potential of the displacement since the last step with the pressure of the iteration before: Li et al.,
+Incremental Potential Contact (ACM Trans. Graph. 39, 2020), section 5.
 """
 
 from dataclasses import dataclass
@@ -27,9 +26,7 @@ LEVI_CIVITA = np.array(
 
 
 class Elements:
-    """Linear tetrahedra of a stable neo-Hookean material, with the parameters `mu` and `lambda_` (Pa) of the
-    paper.
-    """
+    """Linear tetrahedra of a stable neo-Hookean material; `mu` and `lambda_` (Pa) are those of the paper."""
 
     def __init__(self, rest, tetrahedra, mu, lambda_):
         inverse = np.linalg.inv((rest[tetrahedra[:, 1:]] - rest[tetrahedra[:, :1]]).transpose(0, 2, 1))
@@ -83,9 +80,7 @@ class Elements:
 
 
 class Body:
-    """An organ at rest under its own weight, and what presses on it: a mesh whose nodes, as in Bullet, all
-    have the same mass.
-    """
+    """An organ at rest under its own weight: a mesh whose nodes, as in Bullet, all have the same mass."""
 
     def __init__(self, organ, gravity=9.80665, friction=None):
         """Take an OrganParams, and its coefficient of friction if it shall be another one."""
@@ -120,8 +115,9 @@ class Body:
         return contacts.on_spheres(len(centres)) + rub.on_spheres(self.nodes, len(centres))
 
     def reaction(self, nodes):
-        """Return the force (N) of the anchors on the tissue, beyond its weight, if its nodes were at `nodes`,
-        shape (3,).
+        """Return the force (N) of the anchors on the tissue, beyond its weight, with its nodes at `nodes`.
+
+        The result has shape (3,).
         """
         return -self.elements.forces(nodes)[self.fixed].sum(axis=0) + self.load[~self.fixed].sum(axis=0)
 
@@ -137,8 +133,9 @@ def energy(rest, tetrahedra, nodes, mu, lambda_):
 
 
 def closest(point, corners):
-    """Return barycentric coordinates (f, 3) of the points of triangles (f, 3, 3) nearest to `point`: the best
-    of face, edges and corners.
+    """Return barycentric coordinates (f, 3) of the points of triangles (f, 3, 3) nearest to `point`.
+
+    The nearest point is the best of face, edges and corners.
     """
     a, b, c = corners.transpose(1, 0, 2)
     edges = np.stack([b - a, c - a], axis=2)
@@ -159,8 +156,10 @@ def closest(point, corners):
 
 @dataclass
 class Contacts:
-    """Faces that spheres have entered: `nodes` and `weights` (c, 3) of the touched points, `normals` (c, 3)
-    out of the sphere, `depths` (c,), `sphere` (c,).
+    """Faces that spheres have entered.
+
+    `nodes` and `weights` (c, 3) of the touched points, `normals` (c, 3) out of the sphere, `depths` (c,),
+    `sphere` (c,).
     """
 
     nodes: np.ndarray
@@ -227,7 +226,7 @@ class Friction:
         )
 
     def slip(self, nodes):
-        """Return how far the touched points have slipped (c, 3), and the friction for each metre of it (c,)."""
+        """Return the slip of the touched points (c, 3), and the friction for each metre of it (c,)."""
         slip = np.einsum(
             "cij,cj->ci",
             self.tangents,
@@ -271,12 +270,11 @@ class Friction:
 def equilibrium(
     elements, nodes, fixed, load, faces=None, centres=(), radii=(), friction=None, iterations=100
 ):
-    """Return nodes (n, 3) and contacts at rest, starting from `nodes`, whose `fixed` ones (n,) stay where
-    they are.
+    """Return nodes (n, 3) and contacts at rest, starting from `nodes`; the `fixed` ones (n,) do not move.
 
     Newton's method with a line search on the total energy, halving while that gains. load: force (N) on the
     nodes, such as their weight, shape (n, 3). Where a sphere slides over the edges of faces the energy has
-    kinks, so what may be left on a node is 1 mN and half a percent of what the spheres press with.
+    kinks, so a residual of 1 mN and half a percent of the spheres' force may be left on a node.
     """
     free = np.flatnonzero(np.repeat(~fixed, 3))
     faces = np.zeros((0, 3), int) if faces is None else faces

@@ -1,5 +1,6 @@
-"""A tool on a servo presses a block in Bullet and leaves it, both engines coupled in one process; run as a
-program: the energy table.
+"""A tool on a servo presses a block in Bullet and leaves it, both engines coupled in one process.
+
+Run as a program it prints the table of energies.
 """
 
 import logging
@@ -44,7 +45,7 @@ class Tool(Stepped):
         self.x, self.v = self.start.copy(), np.zeros(3)
         return self.side.result(self.x.copy(), self.v.copy())
 
-    def wanted(self, t):
+    def target(self, t):
         down, held, up = STAGES
         share = t / down if t < down else 1.0 if t < held else max(0.0, (up - t) / (up - held))
         return self.start - [0.0, 0.0, share * (CLEARANCE + DEPTH)]
@@ -54,7 +55,7 @@ class Tool(Stepped):
         for i in range(round(h * 1e-9 / SUB_STEP)):
             force = self.side.force(i * SUB_STEP, self.x, self.v)
             servo = (
-                SERVO * (self.wanted(t * 1e-9 + i * SUB_STEP) - self.x) - 2 * sqrt(SERVO * self.mass) * self.v
+                SERVO * (self.target(t * 1e-9 + i * SUB_STEP) - self.x) - 2 * sqrt(SERVO * self.mass) * self.v
             )
             self.v = self.v + SUB_STEP / self.mass * (force + servo)
             self.side.add(force, SUB_STEP * self.v)
@@ -106,7 +107,7 @@ if __name__ == "__main__":
             for step_ms in (1, 2, 5):
                 try:
                     made, exchanged = cycle(mass, step_ms, algorithm)
-                    said = f"{made * 1e6:7.3f} uJ of {exchanged * 1e6:.0f} uJ: {made / exchanged:.2%}"
+                    outcome = f"{made * 1e6:7.3f} uJ of {exchanged * 1e6:.0f} uJ: {made / exchanged:.2%}"
                 except TrocarError as error:
-                    said = f"refused: {str(error).partition(' rule ')[2].partition('(')[0]}"
-                sys.stdout.write(f"{algorithm:20} {mass * 1e3:4.0f} g  {step_ms} ms  {said}\n")
+                    outcome = f"refused: {str(error).partition(' rule ')[2].partition('(')[0]}"
+                sys.stdout.write(f"{algorithm:20} {mass * 1e3:4.0f} g  {step_ms} ms  {outcome}\n")

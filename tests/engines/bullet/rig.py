@@ -21,8 +21,9 @@ def params(block=BLOCK, probe=None, **rest):
 
 
 class Rig:
-    """Moves the probe from `start` (m; of every sphere) on straight lines at constant speed, and keeps what
-    came out.
+    """Moves the probe from `start` (m; of every sphere) on straight lines at constant speed.
+
+    It keeps the outputs.
     """
 
     def __init__(self, model=None, start=(0.0, 0.0, RADIUS + 1e-3), period=MS, plan=IMPULSE):
@@ -56,9 +57,7 @@ class Rig:
         return self.follow(lambda t: (start + way * t / seconds, way / seconds), seconds)
 
     def follow(self, motion, seconds):
-        """Like `move`, on the way whose position (m) and velocity (m/s) `motion` returns for the seconds
-        since now.
-        """
+        """Like `move`, along `motion`, which returns position (m) and velocity (m/s) at a time (s)."""
         steps = round(seconds * 1e9 / self.period)
         for i in range(steps):
             self.at[...], self.speed[...] = motion(i * self.period * 1e-9)

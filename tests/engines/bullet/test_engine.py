@@ -126,7 +126,7 @@ def test_unphysical_organs_are_refused(wrong):
 
 
 @pytest.mark.parametrize(
-    ("model", "says"),
+    ("model", "expected"),
     [
         (params(timestep="0.3 ms"), "does not divide the period"),
         (params(node_period="2.5 ms"), "no multiple of the period"),
@@ -135,9 +135,9 @@ def test_unphysical_organs_are_refused(wrong):
         (params({**BLOCK, "young_modulus": "30 kPa", "damping": 0}), "raise the damping"),
     ],
 )
-def test_steps_that_are_too_long_are_refused(model, says):
+def test_steps_that_are_too_long_are_refused(model, expected):
     engine = BulletEngine("tissue", model)
-    with engine, pytest.raises(ScenarioError, match=says):
+    with engine, pytest.raises(ScenarioError, match=expected):
         engine.configure(Setup(MS, Path(), {}))
 
 

@@ -142,7 +142,7 @@ class TestBadFmus:
 
     def test_missing_file(self, tmp_path: Path) -> None:
         error = self.error(FmuEngine("plant", FmuParams(path=tmp_path / "none.fmu")))
-        assert "there is no FMU" in str(error)
+        assert "does not exist" in str(error)
         assert error.path == ("participants", "plant", "path")
 
     @pytest.mark.parametrize("content", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
@@ -152,7 +152,7 @@ class TestBadFmus:
         assert "is no FMI 2.0 or 3.0 FMU" in str(self.error(FmuEngine("plant", FmuParams(path=path))))
 
     @pytest.mark.parametrize(
-        ("model", "edits", "said"),
+        ("model", "edits", "expected"),
         [
             (
                 SPRING,
@@ -168,9 +168,9 @@ class TestBadFmus:
         ],
     )
     def test_what_cannot_be_co_simulated(
-        self, make: Make, model: str, edits: dict[str, str], said: str
+        self, make: Make, model: str, edits: dict[str, str], expected: str
     ) -> None:
-        assert said in str(self.error(make(model, period=0, edits=edits)))
+        assert expected in str(self.error(make(model, period=0, edits=edits)))
 
     def test_no_binary_for_this_platform(self, libraries: dict[str, Path], tmp_path: Path) -> None:
         path = build.pack(SPRING, libraries[SPRING], tmp_path / "win.fmu", folder="win64")
@@ -211,12 +211,12 @@ class TestBadFmus:
 
 class TestStart:
     @pytest.mark.parametrize(
-        ("model", "start", "said"),
+        ("model", "start", "expected"),
         [
             (SPRING, {"mm": 1}, "Did you mean 'm'"),
             (SPRING, {"v_max": 1}, "has no variable 'v_max'"),
             (SPRING, {"steps": 1}, "has no variable 'steps' that takes a start value"),
-            (SPRING, {"m": "1 m"}, "no quantity in kg"),
+            (SPRING, {"m": "1 m"}, "not a quantity in kg"),
             (SPRING, {"m": True}, "takes numbers"),
             (SPRING, {"m": float("nan")}, "takes numbers from"),
             (SPRING, {"m": [1, 2]}, "takes 1 numbers, not 2"),
@@ -228,15 +228,15 @@ class TestStart:
             (BALL, {"u": [1, 2]}, "takes 3 numbers, not 2"),
             (BALL, {"big": 2**53 + 1}, "no exact double"),
             (BALL, {"gain": 1e39}, "takes numbers from"),
-            (BALL, {"size": "many"}, "no quantity"),
+            (BALL, {"size": "many"}, "not a quantity"),
         ],
     )
     def test_a_value_that_does_not_fit_is_refused_before_anything_starts(
-        self, make: Make, model: str, start: dict[str, Any], said: str
+        self, make: Make, model: str, start: dict[str, Any], expected: str
     ) -> None:
         with pytest.raises(ScenarioError) as caught:
             _ = make(model, period=0, start=start).ports
-        assert said in str(caught.value)
+        assert expected in str(caught.value)
         assert caught.value.path == ("participants", "plant", "start", *start)
 
     def test_values_are_taken_in_the_unit_of_the_variable(self, make: Make, tmp_path: Path) -> None:
@@ -395,20 +395,20 @@ class TestEvents:
 
 class TestFaults:
     @pytest.mark.parametrize(
-        ("fault", "said"),
+        ("fault", "expected"),
         [
             (1, r"output 'v' is \[nan\], expected finite numbers, at 0\.001 s"),
             (
                 2,
                 (
                     r"fmi2DoStep returned 'discard' for the step from 0 s to 0\.001 s, of which it got to 0"
-                    r" s; the FMU says: told to discard \(0\)"
+                    r" s; the FMU reports: told to discard \(0\)"
                 ),
             ),
             (
                 3,
                 (
-                    r"fmi2DoStep returned 'error' for the step from 0 s to 0\.001 s; the FMU says: told to"
+                    r"fmi2DoStep returned 'error' for the step from 0 s to 0\.001 s; the FMU reports: told to"
                     r" fail \(0\)"
                 ),
             ),
@@ -416,9 +416,9 @@ class TestFaults:
             (5, r"fmi2DoStep returned 'fatal'.*told to die"),
         ],
     )
-    def test_the_error_says_what_and_when(self, make: Make, fault: int, said: str) -> None:
+    def test_the_error_says_what_and_when(self, make: Make, fault: int, expected: str) -> None:
         engine = make(SPRING, start={"fault": fault})
-        with pytest.raises(SessionError, match=said):
+        with pytest.raises(SessionError, match=expected):
             run(engine, 1)
 
     def test_messages_go_to_logging_and_not_to_the_terminal(
@@ -478,7 +478,7 @@ class TestState:
     @pytest.mark.parametrize("model", [SPRING, BALL])
     @pytest.mark.parametrize("state", [b"", b"abc", bytes(1000)])
     def test_bytes_that_are_no_state(self, make: Make, model: str, state: bytes) -> None:
-        with pytest.raises((StateError, SessionError), match="no state of"):
+        with pytest.raises((StateError, SessionError), match="not a state of"):
             make(model).restore(state)
 
     def test_addresses_in_a_state_stay_out_of_the_hash(self, tmp_path: Path) -> None:

@@ -34,8 +34,9 @@ def pack(
     edits: Mapping[str, str] | None = None,
     folder: str | None = None,
 ) -> Path:
-    """Write the FMU of `model` to `path`, with each key of `edits` replaced by its value in
-    modelDescription.xml.
+    """Write the FMU of `model` to `path`.
+
+    Each key of `edits` is replaced by its value in modelDescription.xml.
     """
     text = (HERE / model / "modelDescription.xml").read_text()
     for old, new in (edits or {}).items():

@@ -158,9 +158,7 @@ def test_urdf_has_the_masses_of_the_model(robot):
 
 
 def test_mujoco_reads_the_urdf(folder):
-    """It refuses moving links without mass, looks for meshes beside the file, and makes equalities of the
-    mimics.
-    """
+    """MuJoCo rejects moving links without mass, finds meshes beside the file, and makes mimics equalities."""
     model = mujoco.MjModel.from_xml_path(str(folder / "dvrk.urdf"))
     params = SCENE.arms["PSM1"]
     q = np.random.default_rng(3).uniform(params.chain.lower, params.chain.upper)
@@ -267,7 +265,7 @@ def test_dynamics_for_a_person():
     [
         (("fk", "PSM1", "--q", "0,0"), "expected 6"),
         (("fk", "PSM1", "--q", "9,0,0,0,0,0"), "-1.588 .. 1.588"),
-        (("fk", "PSM1", "--q", "a"), "holds no numbers"),
+        (("fk", "PSM1", "--q", "a"), "contains no numbers"),
         (("fk", "PSM9", "--q", "0"), "PSM1"),
         (("fk", "PSM1", "--q", "nan,0,0,0,0,0"), "nan"),
         (("dynamics", "MTML", "--q", "0"), "no arm 'MTML' in the model"),
@@ -277,7 +275,7 @@ def test_dynamics_for_a_person():
             ("dynamics", "PSM1", "--q", "0,0,0,0,0,0", "--dq", "0,0,0,0,0,inf"),
             "not all joint velocities are finite",
         ),
-        (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "one place"),
+        (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "same place"),
         (("export", "x", "--instrument", "PSM1"), "ARM=N"),
         (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
         (("export", "x", "--arms", ""), "at least one of PSM1, PSM2, PSM3, ECM"),

@@ -96,7 +96,7 @@ def test_a_blocked_phalanx_lets_the_others_go_on():
 
 
 def test_opening_pushes_no_harder_than_springs_and_rotor():
-    """A tendon pulls: what a finger that opens can push against is its springs, not the motor of its tendon."""
+    """A tendon only pulls: a finger that opens pushes with its springs, not with the motor of its tendon."""
     run = Run().go(HAND.command("folded", 0.0), 100)
     joint = run.model.joint("PSM1/finger1_proximal")
     run.model.jnt_range[joint.id] = 0.0, 1.0  # something stands behind it

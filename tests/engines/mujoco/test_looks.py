@@ -44,9 +44,7 @@ def triangles(what: str) -> int:
 
 @pytest.mark.parametrize("what", [*FIXED, *INSTRUMENTS])
 def test_every_mesh_is_closed_and_faces_outward(what: str) -> None:
-    """Every edge of a mesh, sharp ones merged, is run through once in each direction, and the volume is
-    positive.
-    """
+    """Every edge of a mesh, sharp ones merged, occurs once in each direction, and the volume is positive."""
     names = [part.name for shown in parts(what).values() for part in shown]
     assert names
     assert len(set(names)) == len(names)
@@ -92,8 +90,9 @@ def test_the_whole_cart_has_about_ten_thousand_triangles() -> None:
 def test_outer_dimensions_are_the_published_ones(
     what: str, body: str, low: tuple[float, ...], high: tuple[float, ...]
 ) -> None:
-    """Bounding boxes of the CAD meshes in med-air/SurRoL (PSM) and jhu-dvrk/dvrk_model (ECM, SUJ), carried to
-    the frame of the look.
+    """Bounding boxes of the CAD meshes in med-air/SurRoL (PSM) and jhu-dvrk/dvrk_model (ECM, SUJ).
+
+    They are carried to the frame of the look.
     """
     names = ("yaw",) if (what, body) == ("psm", "yaw") else ()
     np.testing.assert_allclose(bounds(what, body, names), [low, high], atol=TOLERANCE)
@@ -121,7 +120,7 @@ def test_setup_joints_have_a_look_for_each_joint(arm: CartArm) -> None:
 
 @pytest.mark.parametrize("what", GRASPING)
 def test_pads_meet_in_the_plane_of_the_axis_and_the_tip(what: str) -> None:
-    """Meshes and boxes of both fingers touch that plane from either side and do not cross it beside the pad."""
+    """Meshes and boxes of both fingers touch that plane from either side and do not cross it."""
     looks, boxes = parts(what), collision(what)
     for side, name in ((1.0, "jaw_left"), (-1.0, "jaw_right")):
         (box,) = boxes[name]

@@ -19,7 +19,7 @@ MIDDLE = {"position": [0, 0, 0]}
             r"wire_radius \(0.008 m\) must be less than radius \(0.008 m\)",
         ),
         ({"objects": {"a": {"kind": "needle", **MIDDLE, "radius": "0.4 mm"}}}, "must be less than radius"),
-        ({"objects": {"PSM1": {"kind": "ring", **MIDDLE}}}, "no arm's name"),
+        ({"objects": {"PSM1": {"kind": "ring", **MIDDLE}}}, "not the name of an arm"),
         ({"objects": {"a": {"kind": "cube", **MIDDLE}}}, "'ring', 'needle', 'block'"),
     ],
 )

@@ -66,7 +66,7 @@ def test_every_problem_is_one_line_with_its_place(problems):
             " participants, step, window."
         ),
         (
-            "9:13: participants.two.length: '5 kg' is no quantity in m (Cannot convert from 'kilogram'"
+            "9:13: participants.two.length: '5 kg' is not a quantity in m (Cannot convert from 'kilogram'"
             " ([mass]) to 'meter' ([length]))"
         ),
         (
@@ -205,7 +205,7 @@ def test_an_override_changes_what_it_names_and_no_other_that_merges_it(merged):
                 for name in ("one", "two", "three")
             ],
         ),
-        ("80 mm", "80 kg", ["7:15: participants.one.length: '80 kg' is no quantity in m"]),
+        ("80 mm", "80 kg", ["7:15: participants.one.length: '80 kg' is not a quantity in m"]),
         ("0.5", "-0.5", ["9:45: participants.two.length: Input should be greater than 0"]),
         ("length: 2", "length: -2", ["11:19: participants.three.length: Input should be greater than 0"]),
         (

@@ -125,7 +125,10 @@ name: tissues
 step: 1 ms
 duration: 32 ms
 participants:
-  here: {kind: bullet, probes: {}, organs: {liver: {mesh: data/liver.vtk, unit: mm, material: liver, anchors: [{surface: top}]}}}
+  here:
+    kind: bullet
+    probes: {}
+    organs: {liver: {mesh: data/liver.vtk, unit: mm, material: liver, anchors: [{surface: top}]}}
   there:
     kind: bullet
     host: tissue
@@ -133,7 +136,12 @@ participants:
     rigid: {bed: {box: [1, 1, 10 mm], position: [0, 0, -40 mm]}}
     organs:
       kidney: {shape: kidney-with-adrenal, nodes: 120}
-      block: {size: [30 mm, 30 mm, 20 mm], material: kidney, nodes: 45, position: [150 mm, 0, -14 mm], anchors: [{surface: bottom, to: bed}]}
+      block:
+        size: [30 mm, 30 mm, 20 mm]
+        material: kidney
+        nodes: 45
+        position: [150 mm, 0, -14 mm]
+        anchors: [{surface: bottom, to: bed}]
 """
 
 

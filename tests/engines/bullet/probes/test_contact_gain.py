@@ -1,6 +1,4 @@
-"""The force on a probe, against what the tissue receives and against the finite-element truth of the same
-mesh.
-"""
+"""The force on a probe, against what the tissue receives and against finite elements of the same mesh."""
 
 import numpy as np
 import pytest
@@ -20,8 +18,9 @@ FINE = {"timestep": "0.5 ms"}
 
 
 def presses(model, at, depths):
-    """Yield depth (m), force on the probe (N) and nodes (m) at rest at every depth, with spheres at `at` (m,
-    shape (2,) or (k, 2)).
+    """Yield depth (m), force on the probe (N) and nodes (m) at rest at every depth.
+
+    `at`: of the spheres, m, shape (2,) or (k, 2).
     """
     radii = model.probes["probe"].radii if np.ndim(at) > 1 else model.probes["probe"].radii[0]
 

@@ -74,7 +74,7 @@ class Jaw:
         return self.move(0.1, opening=SHUT)
 
     @property
-    def said(self):
+    def kinds(self):
         return [event.event for event in self.events]
 
     @property
@@ -106,7 +106,7 @@ def grasp_wall(**grasp):
 )
 def test_the_pull_is_that_of_finite_elements_whose_held_nodes_are_moved_alike(grasp, way):
     with grasp() as jaw:
-        assert jaw.said == ["grasped"]
+        assert jaw.kinds == ["grasped"]
         jaw.move(0.2, at=jaw.at + way).move(0.3)
         body = Body(jaw.params.organs["organ"])
         held = jaw.events[0].nodes
@@ -128,14 +128,14 @@ def test_opening_lets_go_and_the_tissue_goes_back():
         assert jaw.held
         assert jaw.outputs["jaw/lift"][0] == pytest.approx(5e-3, abs=2e-3)
         jaw.move(0.05, opening=OPEN)
-        assert jaw.said == ["grasped", "released"]
+        assert jaw.kinds == ["grasped", "released"]
         assert not jaw.held
         assert jaw.outputs["jaw/lift"][0] == 0.0
         jaw.move(0.2, at=(0.0, 0.0, 15e-3))
         np.testing.assert_allclose(jaw.nodes, before, atol=2e-4)
         assert np.abs(jaw.force).max() < 1e-3
         jaw.move(0.2, at=ON_SLAB).close()
-        assert jaw.said == ["grasped", "released", "grasped"]
+        assert jaw.kinds == ["grasped", "released", "grasped"]
 
 
 def test_too_strong_a_pull_tears_loose_and_only_opening_makes_ready_again():
@@ -150,7 +150,7 @@ def test_too_strong_a_pull_tears_loose_and_only_opening_makes_ready_again():
         jaw.move(0.1, at=ON_SLAB).move(0.05)
         assert len(jaw.events) == 2
         jaw.move(0.05, opening=OPEN).close()
-        assert jaw.said == ["grasped", "torn", "grasped"]
+        assert jaw.kinds == ["grasped", "torn", "grasped"]
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_a_grasp_comes_out_the_same_again():
     for _ in range(2):
         with grasp_wall(hold="0.05 N") as jaw:
             jaw.move(0.1, at=(0.0, 0.0, 4e-3)).move(0.02, opening=OPEN)
-            assert jaw.said == ["grasped", "torn"]
+            assert jaw.kinds == ["grasped", "torn"]
             hashes.append(jaw.hashes)
     assert hashes[0] == hashes[1]
 
@@ -204,7 +204,7 @@ def test_three_fingers_close_on_a_post_and_lift_it():
     post = {"size": ["12 mm", "12 mm", "24 mm"], "young_modulus": "5 kPa", "nodes": 75}
     with Hand(post, (0.0, 0.0, -2e-3), opening=10e-3) as hand:
         hand.move(0.15, opening=7e-3)
-        assert hand.said == ["grasped"]
+        assert hand.kinds == ["grasped"]
         assert hand.held
         hand.move(0.1, at=(0.0, 0.0, 2e-3)).move(0.1)
         assert hand.outputs["jaw/lift"][0] > 2e-3

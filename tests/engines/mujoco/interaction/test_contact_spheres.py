@@ -90,9 +90,7 @@ def test_velocity_is_the_slope_of_the_position():
 
 @pytest.mark.parametrize("plan", [IMPULSE, LINEARISED])
 def test_work_is_what_the_arm_gains(plan):
-    """Without drives and losses all energy of the arm comes through the bond: power in is the change of
-    energy.
-    """
+    """Without drives and losses, all energy of the arm comes through the bond."""
     run = Run(plan)
     model, data = run.model
     model.opt.timestep = 5e-4
@@ -188,9 +186,7 @@ def test_without_a_bond_the_tip_feels_nothing():
 
 
 def test_effective_mass_is_below_that_of_each_sphere_and_above_a_share_of_it():
-    """The largest eigenvalue of a matrix is at least that of any block on its diagonal, and at most the sum
-    of theirs.
-    """
+    """The largest eigenvalue is at least that of any block on the diagonal, and at most the sum of theirs."""
     run = Run()
     model, data = run.model
     single = []

@@ -1,4 +1,4 @@
-"""What rigid things do to an instrument, as its arm's `rigid_wrench` tells."""
+"""The force of rigid contacts on an instrument, in its arm's `rigid_wrench`."""
 
 from pathlib import Path
 

@@ -1,6 +1,4 @@
-"""The model's equations of motion: against the identified ones, their energy, gravity compensation, and where
-a servo comes to rest.
-"""
+"""The model's equations of motion: against identified ones, energy, gravity compensation, servos at rest."""
 
 import json
 from pathlib import Path

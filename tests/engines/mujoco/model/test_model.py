@@ -40,7 +40,7 @@ def positions(chain, fraction):
 
 
 def place(model, data, arm, params, q):
-    """Put an arm's joints at `q`, its linkage where that wants it, and its fingers closed."""
+    """Put an arm's joints at `q`, its linkage where it follows, and its fingers closed."""
     known = dict(zip([joint.name for joint in params.chain.joints], q, strict=True))
     for link in links(arm, params):
         value = (
@@ -70,13 +70,13 @@ def gaps(model, data, arm, params):
 @given(fractions)
 def test_kinematics_are_those_of_the_dh_table(fraction):
     data = mujoco.MjData(MODEL)
-    wanted = {}
+    expected = {}
     for arm, params in FREE.arms.items():
         q = positions(params.chain, fraction)
         place(MODEL, data, arm, params, q)
-        wanted[arm] = params, params.chain.forward(q)
+        expected[arm] = params, params.chain.forward(q)
     mujoco.mj_forward(MODEL, data)
-    for arm, (params, tip) in wanted.items():
+    for arm, (params, tip) in expected.items():
         base = rotation.matrix(np.array(params.orientation))
         found = data.site(f"{arm}/tip")
         assert np.allclose(found.xpos, params.position + base @ tip[:3, 3], atol=1e-12)

@@ -86,9 +86,7 @@ def pixels(image: Any) -> NDArray[np.uint8]:
 
 
 def bright_spots(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """The middle (u, v) of each yellow spot, shape (n, 2): red and no blue, which nothing else in these
-    scenes is.
-    """
+    """The middle (u, v) of each yellow spot, shape (n, 2): red and not blue, unlike all else here."""
     from scipy import ndimage
 
     red, blue = picture[:, :, 0].astype(float), picture[:, :, 2].astype(float)

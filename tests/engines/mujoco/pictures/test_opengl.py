@@ -48,10 +48,10 @@ def test_the_first_that_works_is_taken_and_all_failures_are_told(monkeypatch: py
     assert opengl.find() == opengl.OpenGL("", "egl: about egl; osmesa: about osmesa")
 
 
-@pytest.mark.parametrize("wish", ["none-such", "egl", None])
-def test_mujoco_is_imported_whatever_mujoco_gl_asks_for(wish: str | None) -> None:
+@pytest.mark.parametrize("asked", ["none-such", "egl", None])
+def test_mujoco_is_imported_whatever_mujoco_gl_asks_for(asked: str | None) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"} | (
-        {} if wish is None else {"MUJOCO_GL": wish}
+        {} if asked is None else {"MUJOCO_GL": asked}
     )
     what = (
         "import os\nfrom engines.mujoco.pictures.opengl import import_mujoco\nimport_mujoco()\nimport"
@@ -66,7 +66,7 @@ def test_mujoco_is_imported_whatever_mujoco_gl_asks_for(wish: str | None) -> Non
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith(f"MjData'> {wish}\n")
+    assert done.stdout.endswith(f"MjData'> {asked}\n")
 
 
 def test_a_session_runs_where_mujoco_gl_names_what_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,8 +32,14 @@ participants:
       PSM1: {instrument: palpation-probe, probe_radius: 5 mm, position: [0 mm, 0 mm, 118 mm]}
       ECM: {position: [45 mm, 0 mm, 200 mm], start: [0, 0, 100 mm, 0]}
     looks: false
-  tissue: {kind: bullet, organs: {liver: {size: [80 mm, 60 mm, 20 mm], young_modulus: 10 kPa, nodes: 60}}, probes: {probe: {radius: 5 mm}}}
-  other: {kind: bullet, organs: {liver: {size: [80 mm, 60 mm, 20 mm], young_modulus: 10 kPa, nodes: 60, position: [0 mm, 90 mm, 0 mm]}}, probes: {}}
+  tissue:
+    kind: bullet
+    organs: {liver: &liver {size: [80 mm, 60 mm, 20 mm], young_modulus: 10 kPa, nodes: 60}}
+    probes: {probe: {radius: 5 mm}}
+  other:
+    kind: bullet
+    organs: {liver: {<<: *liver, position: [0 mm, 90 mm, 0 mm]}}
+    probes: {}
   camera:
     <<: *scene
     kind: endoscope

@@ -217,5 +217,5 @@ def test_what_cannot_be_a_soft_body_is_refused(
 
 @pytest.mark.parametrize("state", [b"abc", bytes(1000)])
 def test_a_state_of_another_scene_is_refused(state: bytes) -> None:
-    with pytest.raises(StateError, match="saved elsewhere"):
+    with pytest.raises(StateError, match="saved by another scene"):
         make().restore(state)
