@@ -30,11 +30,18 @@ class Policy:
 
     class DurabilityService(BasePolicy):
         def __init__(
-            self, cleanup_delay: int, history: BasePolicy, max_samples: int, max_instances: int, max_samples_per_instance: int
+            self,
+            cleanup_delay: int,
+            history: BasePolicy,
+            max_samples: int,
+            max_instances: int,
+            max_samples_per_instance: int,
         ) -> None: ...
 
     class DataRepresentation(BasePolicy):
-        def __init__(self, use_cdrv0_representation: bool = False, use_xcdrv2_representation: bool = False) -> None: ...
+        def __init__(
+            self, use_cdrv0_representation: bool = False, use_xcdrv2_representation: bool = False
+        ) -> None: ...
 
     class Userdata(BasePolicy):
         def __init__(self, data: bytes) -> None: ...
@@ -57,4 +64,6 @@ class GuardCondition(Entity):
 class WaitSet(Entity):
     def __init__(self, domain_participant: DomainParticipant) -> None: ...
     def _waitset_attach(self, waitset: int, entity: int, x: int) -> int: ...
-    def _waitset_wait(self, waitset: int, xs: ctypes._Pointer[ctypes.c_void_p], nxs: int, reltimeout: int) -> int: ...
+    def _waitset_wait(
+        self, waitset: int, xs: ctypes._Pointer[ctypes.c_void_p], nxs: int, reltimeout: int
+    ) -> int: ...

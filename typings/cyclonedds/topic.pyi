@@ -7,4 +7,6 @@ from cyclonedds.idl import IdlStruct
 S = TypeVar("S", bound=IdlStruct)
 
 class Topic(Entity, Generic[S]):
-    def __init__(self, domain_participant: DomainParticipant, topic_name: str, data_type: type[S]) -> None: ...
+    def __init__(
+        self, domain_participant: DomainParticipant, topic_name: str, data_type: type[S]
+    ) -> None: ...

@@ -4,7 +4,9 @@ from ctypes import CDLL
 class FMU3Slave:
     dll: CDLL
     component: int | None
-    def __init__(self, *, guid: str, modelIdentifier: str, unzipDirectory: str, instanceName: str) -> None: ...
+    def __init__(
+        self, *, guid: str, modelIdentifier: str, unzipDirectory: str, instanceName: str
+    ) -> None: ...
     def instantiate(
         self,
         visible: bool = False,

@@ -79,10 +79,20 @@ class ExtensionProperties(Structure):
     extension_name: bytes
 
 class ApplicationInfo(Structure):
-    def __init__(self, *, application_name: str, application_version: int, engine_name: str, engine_version: int, api_version: Version) -> None: ...
+    def __init__(
+        self,
+        *,
+        application_name: str,
+        application_version: int,
+        engine_name: str,
+        engine_version: int,
+        api_version: Version,
+    ) -> None: ...
 
 class InstanceCreateInfo(Structure):
-    def __init__(self, *, application_info: ApplicationInfo, enabled_extension_names: Sequence[str]) -> None: ...
+    def __init__(
+        self, *, application_info: ApplicationInfo, enabled_extension_names: Sequence[str]
+    ) -> None: ...
 
 class SessionCreateInfo(Structure):
     def __init__(self, *, system_id: SystemId) -> None: ...

@@ -14,4 +14,10 @@ class FifoChannel(Generic[T]):
     def __init__(self, capacity: int) -> None: ...
 
 class Callback(Generic[T]):
-    def __init__(self, callback: Callable[[T], object], drop: Callable[[], object] | None = None, *, indirect: bool = True) -> None: ...
+    def __init__(
+        self,
+        callback: Callable[[T], object],
+        drop: Callable[[], object] | None = None,
+        *,
+        indirect: bool = True,
+    ) -> None: ...

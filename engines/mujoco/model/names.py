@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["CONTACT", "FINGERS", "finger", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
+__all__ = ["CONTACT", "FINGERS", "first_sensor", "instrument_body", "probe_body", "sphere_site"]
 
 FINGERS = ("jaw_left", "jaw_right")
 """Both turn about the wrist yaw axis by half the jaw's angle: the left one towards the tip's +y, the right
@@ -26,11 +26,6 @@ def instrument_body(arm: str) -> str:
 def sphere_site(arm: str, sphere: str) -> str:
     """Return the name of the site that is the centre of the contact sphere of this name."""
     return f"{arm}/{CONTACT}/{sphere}"
-
-
-def finger(arm: str, side: str) -> str:
-    """Return the name of the body, joint and actuator of one of `FINGERS`."""
-    return f"{arm}/{side}"
 
 
 def first_sensor(arm: str) -> str:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.mujoco.model import FINGERS, build, finger, first_sensor, probe_body
+from engines.mujoco.model import FINGERS, build, first_sensor, probe_body
 from engines.mujoco.model.tree import links
 from engines.mujoco.params import EcmParams, SceneParams
 from robots import rotation
@@ -163,11 +163,11 @@ def test_fingers_open_either_way_by_half_the_jaw_angle():
     data = mujoco.MjData(MODEL)
     angle = 0.6
     for side in FINGERS:
-        data.joint(finger("PSM1", side)).qpos[0] = angle / 2
+        data.joint(f"PSM1/{side}").qpos[0] = angle / 2
     mujoco.mj_forward(MODEL, data)
     tip = data.site("PSM1/tip").xmat.reshape(3, 3)
     left, right = (
-        tip.T @ data.body(finger("PSM1", side)).xmat.reshape(3, 3) @ [0.0, forth, 0.0]
+        tip.T @ data.body(f"PSM1/{side}").xmat.reshape(3, 3) @ [0.0, forth, 0.0]
         for side, forth in zip(FINGERS, (1, -1), strict=True)
     )
     assert np.allclose(left, [0.0, np.sin(angle / 2), np.cos(angle / 2)])
@@ -177,7 +177,7 @@ def test_fingers_open_either_way_by_half_the_jaw_angle():
 def test_fingers_have_half_the_range_of_the_jaw():
     jaw = FREE.arms["PSM2"].tool.jaw
     for side in FINGERS:
-        assert np.allclose(MODEL.joint(finger("PSM2", side)).range, [jaw.lower / 2, jaw.upper / 2])
+        assert np.allclose(MODEL.joint(f"PSM2/{side}").range, [jaw.lower / 2, jaw.upper / 2])
 
 
 def test_the_centre_of_mass_of_the_probe_is_the_tip():
