@@ -1,1 +1,4 @@
-"""The part of cyclonedds that is used here: its own annotations leave policies, samples and all calls into its library unknown."""
+"""The part of cyclonedds that is used here.
+
+Its own annotations leave policies, samples and all calls into its library unknown.
+"""

@@ -1,6 +1,7 @@
 """What Trocar uses of pyopenxr 1.1.
 
-The package is annotated without a marker that says so, and some annotations are not what its functions take or return.
+The package is annotated without the marker `py.typed`, and some annotations are not what its functions take or
+return.
 """
 
 from collections.abc import Sequence

@@ -2,13 +2,13 @@
 
 All joints and jaws of all arms stand in one vector, in the order of the arms: joints, then the jaw if there
 is one. The setpoints follow the commands at most as fast as joints and jaws may move, so no command, however
-it jumps, closes a jaw through what lies between its fingers. One product lays out what the servos take:
-position, its slope as velocity, and a feed-forward effort.
+it jumps, closes a jaw through an object between its fingers. One matrix product gives the inputs of the
+servos: position, its slope as velocity, and a feed-forward effort.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -17,8 +17,10 @@ import numpy as np
 from engines.mujoco.model import FINGERS
 from engines.mujoco.params import EcmParams, PsmParams
 from hub.participant import Inputs
+from robots.dvrk.instruments import Jaw
 from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from robots.dvrk.setup_joints import CartArm
+from robots.serial_chain import Joint
 from schemas.errors import SessionError
 from schemas.vectors import Vector
 
@@ -30,6 +32,11 @@ _BARE = 2.0
 """Added to the latter two: without the gravity compensation that the real controller can switch off, see
 docs/decisions/0010.
 """
+
+_Row = tuple[float, float, float, float]
+"""Of a drive: start, lower and upper limit, velocity."""
+_Share = tuple[int, int, float]
+"""Actuator, drive, and the actuator's share of the drive's position."""
 
 
 @dataclass
@@ -52,7 +59,7 @@ class _Group:
 
 
 class Servos:
-    """Takes commands and modes, and keeps the setpoints."""
+    """Turns commands and modes into setpoints and efforts."""
 
     def __init__(
         self,
@@ -64,38 +71,14 @@ class Servos:
         """Drive `arms`, which are stepped every `period` seconds, from where they start."""
         self._model, self._data = model, data
         self._groups: list[_Group] = []
-        rows: list[tuple[float, float, float, float]] = []  # per drive: start, lower, upper, velocity
-        shares: list[tuple[int, int, float]] = []  # actuator, drive, share of the drive's position
+        rows: list[_Row] = []
+        shares: list[_Share] = []
         for arm, params in arms.items():
-            names = [joint.name for joint in params.chain.joints]
-            self._add_group(arm, f"{arm}/", names, len(rows), len(names))
-            shares += [
-                (actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)
-            ]
-            rows += [
-                (q, joint.lower, joint.upper, joint.velocity)
-                for q, joint in zip(params.start, params.chain.joints, strict=True)
-            ]
-            if isinstance(params, PsmParams) and (jaw := params.tool.jaw) is not None:
-                self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
-                shares += [(actuator, len(rows), 0.5) for actuator in self._groups[-1].actuators]
-                rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
-                if (roller := params.tool.roller) is not None:
-                    self._groups[-1].part = slice(len(rows) - 1, len(rows) + 1)
-                    self._groups[-1].actuators.append(model.actuator(f"{arm}/{ROLLER}").id)
-                    shares.append((self._groups[-1].actuators[-1], len(rows), 1.0))
-                    rows.append((0.0, roller.joint.lower, roller.joint.upper, roller.joint.velocity))
+            self._add_joints(arm, f"{arm}/", params.chain.joints, params.start, rows, shares)
+            if isinstance(params, PsmParams) and params.tool.jaw is not None:
+                self._add_jaw(arm, params, params.tool.jaw, rows, shares)
             elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
-                self._add_group(
-                    arm, f"{arm}/hand/", [motor.name for motor in hand.joints], len(rows), len(hand.joints)
-                )
-                shares += [
-                    (actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)
-                ]
-                rows += [
-                    (q, motor.lower, motor.upper, motor.velocity)
-                    for q, motor in zip(params.hand, hand.joints, strict=True)
-                ]
+                self._add_joints(arm, f"{arm}/hand/", hand.joints, params.hand, rows, shares)
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
         n = start.size
         self._inputs = np.concatenate([start, start, np.zeros(n)])
@@ -110,12 +93,40 @@ class Servos:
         self._state = np.concatenate([start, np.full(2 * len(arms), _POSITION)])
         self._modes = self._state[n:]  # per arm those of its joints and its jaw
         self._taken = np.concatenate([self._modes, start])
-        self._wanted, self._command = np.split(self._taken, [2 * len(arms)])
+        self._asked, self._command = np.split(self._taken, [2 * len(arms)])
         self.off: frozenset[str] = frozenset()
         """The arms whose joints have no torque."""
         self._holding = True
         np.multiply(self._springs, start - self._rest, out=self._effort)
         self._layout.dot(self._inputs, data.ctrl)
+
+    def _add_joints(
+        self,
+        arm: str,
+        ports: str,
+        joints: Sequence[Joint],
+        start: Sequence[float],
+        rows: list[_Row],
+        shares: list[_Share],
+    ) -> None:
+        """Add joints that have a drive each."""
+        self._add_group(arm, ports, [joint.name for joint in joints], len(rows), len(joints))
+        shares += [(actuator, len(rows) + i, 1.0) for i, actuator in enumerate(self._groups[-1].actuators)]
+        rows += [
+            (q, joint.lower, joint.upper, joint.velocity) for q, joint in zip(start, joints, strict=True)
+        ]
+
+    def _add_jaw(self, arm: str, params: PsmParams, jaw: Jaw, rows: list[_Row], shares: list[_Share]) -> None:
+        """Add a jaw, whose two fingers share one drive, and the roller in it."""
+        self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
+        group = self._groups[-1]
+        shares += [(actuator, len(rows), 0.5) for actuator in group.actuators]
+        rows.append((params.jaw, jaw.lower, jaw.upper, jaw.velocity))
+        if (roller := params.tool.roller) is not None:
+            group.part = slice(len(rows) - 1, len(rows) + 1)
+            group.actuators.append(self._model.actuator(f"{arm}/{ROLLER}").id)
+            shares.append((group.actuators[-1], len(rows), 1.0))
+            rows.append((0.0, roller.joint.lower, roller.joint.upper, roller.joint.velocity))
 
     def _add_group(self, arm: str, ports: str, joints: list[str], first: int, count: int) -> None:
         model = self._model
@@ -178,8 +189,8 @@ class Servos:
         Raises SessionError for an unknown mode.
         """
         np.concatenate([inputs[port] for port in self._ports], out=self._taken)
-        if self._wanted.tobytes() != self._modes.tobytes():
-            self._set_modes(self._wanted)
+        if self._asked.tobytes() != self._modes.tobytes():
+            self._set_modes(self._asked)
         command, setpoint, reach = self._command, self.setpoint, self._reach
         np.maximum(command, self._lower, out=command)
         np.minimum(command, self._upper, out=command)
@@ -208,23 +219,22 @@ class Servos:
     def _set_modes(self, modes: Vector) -> None:
         """Switch the drives; `modes`, shape (2 arms,), are those of the joints and the jaw of every arm."""
         gain, bias = self._gains
-        for (arm, port), wanted in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
-            if not np.isin(wanted, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
-                modes_there_are = (
-                    "0 (off), 1 (position servo) or 2 (effort), 3 and 4 the last two without gravity"
-                    " compensation"
+        for (arm, port), asked in zip(self._mode_ports.items(), modes.reshape(-1, 2), strict=True):
+            if not np.isin(asked, (_OFF, _POSITION, _EFFORT, _POSITION + _BARE, _EFFORT + _BARE)).all():
+                raise SessionError(
+                    f"input '{port}' is {asked}; each of [arm, jaw] is 0 (off), 1 (position servo) or 2"
+                    " (effort), 3 and 4 the last two without gravity compensation"
                 )
-                raise SessionError(f"input '{port}' is {wanted}; each of [arm, jaw] is {modes_there_are}")
-            for group, asked in zip(
-                [group for group in self._groups if group.arm == arm], wanted.tolist(), strict=False
+            for group, number in zip(
+                [group for group in self._groups if group.arm == arm], asked.tolist(), strict=False
             ):
-                mode = asked - _BARE if asked > _EFFORT else asked
+                mode = number - _BARE if number > _EFFORT else number
                 self._model.actuator_gainprm[group.actuators] = gain[group.actuators] * (mode == _POSITION)
                 self._model.actuator_biasprm[group.actuators] = bias[group.actuators] * (mode == _POSITION)
                 self._model.body_gravcomp[group.bodies] = self._gravity_compensation[group.bodies] * (
                     mode != _OFF
                 )
-                self._model.body_gravcomp[group.weighed] *= asked == mode
+                self._model.body_gravcomp[group.weighed] *= number == mode
                 group.mode = mode
         self._modes[:] = modes
         self.off = frozenset(

@@ -128,7 +128,7 @@ def test_twice_the_same_and_on_from_a_saved_state():
 
 
 def test_a_weld_would_hold_what_is_to_roll():
-    with pytest.raises(ValidationError, match="take grasp: friction"):
+    with pytest.raises(ValidationError, match="use grasp: friction"):
         scene(grasp="weld")
 
 
