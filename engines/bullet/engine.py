@@ -95,25 +95,13 @@ class BulletEngine(Stepped):
         self._check_tissue()
         self._settle()
         for bond in self.bonds:
-            if bond.name in setup.bonds:
+            if plan := setup.bonds.get(bond.name):
                 probe = self.params.probes[bond.name]
                 self._probes.append(
-                    Probe(
-                        probe,
-                        self._coupling(probe),
-                        bond,
-                        setup.bonds[bond.name],
-                        self.params.gravity,
-                        client,
-                    )
+                    Probe(probe, self._coupling(probe), bond, plan, self.params.gravity, client)
                 )
         self._read_nodes(0)
-        self._contacts = Contacts(
-            [
-                Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
-                for organ in self._organs
-            ]
-        )
+        self._contacts = Contacts([self._tissue(organ) for organ in self._organs])
         outputs = self._nodes(0)
         self._unused = {
             port: value
@@ -184,6 +172,9 @@ class BulletEngine(Stepped):
             f"participant '{self.name}': Bullet saves neither positions nor velocities of soft bodies."
             " Re-simulate from the recorded grants instead"
         )
+
+    def _tissue(self, organ: Organ) -> Tissue:
+        return Tissue(organ, self.params.organs[organ.name].elastic, self.params.gravity)
 
     def _contact_stiffness(self, probe: ProbeParams) -> float:
         """Return the largest stiffness (N/m) that one of the spheres may meet."""

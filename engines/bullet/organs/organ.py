@@ -57,23 +57,7 @@ class Organ:
         self._mesh_data = bullet.getMeshData
         self._flags = bullet.MESH_DATA_SIMULATION_MESH
         self._reach = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
-        mu, lambda_ = params.elastic.bullet_lame
-        with TemporaryDirectory(prefix="trocar-") as directory, quiet():
-            path = Path(directory) / f"{name}.vtk"
-            mesh.write_vtk(path)
-            self._body = bullet.loadSoftBody(
-                str(path),
-                mass=params.elastic.density * mesh.volume,
-                collisionMargin=COLLISION_MARGIN_M,
-                useNeoHookean=True,
-                NeoHookeanMu=mu,
-                NeoHookeanLambda=lambda_,
-                NeoHookeanDamping=params.elastic.damping,
-                useSelfCollision=False,
-                useFaceContact=True,
-                frictionCoeff=params.friction,
-                physicsClientId=client,
-            )
+        self._body = self._load(params)
         bullet.changeDynamics(
             self._body, -1, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client
         )
@@ -82,6 +66,28 @@ class Organ:
             for node in np.flatnonzero(tied).tolist():
                 bullet.createSoftBodyAnchor(self._body, node, bodies[part], -1, physicsClientId=client)
         self.sample(0)
+
+    def _load(self, params: OrganParams) -> int:
+        """Load the mesh, and return Bullet's number of the body."""
+        import pybullet as bullet
+
+        mu, lambda_ = params.elastic.bullet_lame
+        with TemporaryDirectory(prefix="trocar-") as directory, quiet():
+            path = Path(directory) / f"{self.name}.vtk"
+            self.mesh.write_vtk(path)
+            return bullet.loadSoftBody(
+                str(path),
+                mass=params.elastic.density * self.mesh.volume,
+                collisionMargin=COLLISION_MARGIN_M,
+                useNeoHookean=True,
+                NeoHookeanMu=mu,
+                NeoHookeanLambda=lambda_,
+                NeoHookeanDamping=params.elastic.damping,
+                useSelfCollision=False,
+                useFaceContact=True,
+                frictionCoeff=params.friction,
+                physicsClientId=self._client,
+            )
 
     def anchor(self, node: int, body: int) -> int:
         """Tie a node to a rigid body of Bullet, where both are now; return the number of the anchor."""
@@ -114,10 +120,10 @@ class Organ:
         if not moved < self._reach:
             raise SessionError(
                 f"organ '{self.name}' became unstable by {time_ns * 1e-9:.6g} s: a node is {moved:.3g} m from"
-                f" its place. {self._likeliest(moved)}"
+                f" its place. {self._likely_cause(moved)}"
             )
 
-    def _likeliest(self, moved: float) -> str:
+    def _likely_cause(self, moved: float) -> str:
         if np.isfinite(moved) and not self.anchored.any():
             return "The likeliest cause is that it fell: nothing anchors it, and no rigid part lies under it"
         return (

@@ -56,13 +56,13 @@ class Spheres:
 
     def renew(self, tau: float) -> None:
         """Record the work done, and renew the forces `tau` seconds into the step."""
-        self._book()
+        self._record_work()
         self._push(tau)
 
     def end(self) -> None:
         """Record the work done, and set the wrench at the tip."""
-        self._book()
-        self._feel()
+        self._record_work()
+        self._update_tip_wrench()
 
     def refresh(self) -> None:
         """Take the positions of the model's present state as those from which work counts."""
@@ -83,11 +83,11 @@ class Spheres:
         self._moments[:] = moment(self._centres - self._masses.take(self._carriers, 0), self._forces)
         self._applied[self._bodies] = self._share @ self._loads
 
-    def _book(self) -> None:
+    def _record_work(self) -> None:
         self.motion.add(self._force, self._position - self._last)
         self._last[:] = self._position
 
-    def _feel(self) -> None:
+    def _update_tip_wrench(self) -> None:
         self._to_base.dot(self._forces.sum(axis=0), self._tip_wrench[:3])
         self._to_base.dot(moment(self._centres - self._tip, self._forces).sum(axis=0), self._tip_wrench[3:])
 

@@ -52,15 +52,15 @@ class Probe:
 
     def renew(self, tau: float) -> None:
         """Follow the bond's correction: a new wrench from `tau` seconds into the step on."""
-        self._book()
+        self._record_work()
         self._wrench[:] = self.motion.force(tau, self._pose, self._twist)
 
     def end(self) -> None:
         """Record the work done, and set the wrench at the tip, which is the probe's centre."""
-        self._book()
+        self._record_work()
         self._to_base.dot(self._wrench, self._tip_wrench)
 
-    def _book(self) -> None:
+    def _record_work(self) -> None:
         """Record the work of the wrench since it was set, and update the pose."""
         np.subtract(self._position, self._pose[:3], out=self._translation)  # the pose is still the one before
         if any(self._torque):  # a sphere in contact feels none

@@ -50,7 +50,7 @@ def test_how_often_the_nodes_are_output_does_not_change_the_physics():
 
 def test_same_inputs_give_the_same_hashes_in_another_process_and_beside_another_engine():
     program = subprocess.run(
-        [sys.executable, "-m", "tests.engines.bullet_rig"], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "tests.engines.bullet.rig"], capture_output=True, text=True, check=True
     )
     expected = [int(value, 16) for value in program.stdout.split()]  # also: nothing else on stdout
     with Rig(params(SMALL_BLOCK)) as other:

@@ -163,5 +163,5 @@ def test_a_session_with_two_tissue_engines_and_a_mesh_of_ones_own_is_re_simulate
 def test_a_bad_mesh_is_shown_where_the_scenario_names_it(tmp_path):
     mesh = block(np.array([40.0, 30.0, 20.0]), 45)
     inverted = TetMesh(mesh.nodes, np.concatenate([mesh.tetrahedra[:1, [1, 0, 2, 3]], mesh.tetrahedra[1:]]))
-    with pytest.raises(ScenarioError, match=r"session\.yaml:5:.*liver.*1 of \d+ tetrahedra are inverted: 0"):
+    with pytest.raises(ScenarioError, match=r"session\.yaml:8:.*liver.*1 of \d+ tetrahedra are inverted: 0"):
         launch(written(tmp_path, inverted))
