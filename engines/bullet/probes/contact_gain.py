@@ -109,18 +109,10 @@ class Contacts:
         touches: list[list[_Touch]] = [[] for _ in self._tissues]
         for probe in probes:
             for sphere in range(len(probe.radii)):
-                found = (
-                    []
-                    if probe.held[sphere]
-                    else [
-                        (touch.distance, i, touch)
-                        for i, t in enumerate(self._tissues)
-                        if (touch := _touch(t, probe, sphere))
-                    ]
-                )
-                probe.touching[sphere] = bool(found)
-                if found:
-                    _, i, touch = min(found, key=lambda item: item[:2])
+                nearest = None if probe.held[sphere] else self._nearest(probe, sphere)
+                probe.touching[sphere] = nearest is not None
+                if nearest is not None:
+                    i, touch = nearest
                     touches[i].append(touch)
                 else:
                     probe.gains[sphere] = probe.corrections[sphere] = 1.0
@@ -128,6 +120,11 @@ class Contacts:
             if here:
                 _correct(tissue, here)
             tissue.advance()
+
+    def _nearest(self, probe: Probe, sphere: int) -> tuple[int, _Touch] | None:
+        """Return the number of the nearest organ that a sphere touches, and the touch; None without one."""
+        found = [(i, touch) for i, t in enumerate(self._tissues) if (touch := _touch(t, probe, sphere))]
+        return min(found, key=lambda item: item[1].distance, default=None)
 
 
 def touched_faces(

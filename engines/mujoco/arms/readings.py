@@ -24,7 +24,7 @@ _JAW = np.array(
 either.
 """
 _ROLLING_JAW = np.zeros((6, 9))
-"""From those of the two fingers and the roller to those of the jaw and the roller, by turns."""
+"""From those of the two fingers and the roller to those of the jaw and the roller, alternating."""
 _ROLLING_JAW[::2, :6], _ROLLING_JAW[1::2, 6:] = _JAW, np.eye(3)
 
 

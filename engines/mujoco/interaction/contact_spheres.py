@@ -70,7 +70,7 @@ class Spheres:
 
     @staticmethod
     def least_mass(arm: str, model: mujoco.MjModel, data: mujoco.MjData) -> float:
-        """Return the least mass (kg) that forces on the spheres of `arm` meet, whatever their directions."""
+        """Return the least mass (kg) that forces on the spheres of `arm` meet, in any directions."""
         sites = _sites(arm, model)
         jacobian = np.zeros((len(sites), 3, model.nv))
         for rows, site in zip(jacobian, sites, strict=True):

@@ -32,7 +32,7 @@ driver.
 """
 
 _THINGS, _TABLE, _WIRES = 1, 32, 64
-"""Collision bits beside those of the arms (engines.mujoco.model.shapes): of whatever is no wire, as is
+"""Collision bits beside those of the arms (engines.mujoco.model.shapes): of all that is not a wire, as is
 MuJoCo's default; of tables; of wires among each other. A wire lies on a table with a few balls, so that one
 at rest costs a few contacts and not two for each of its capsules.
 """
@@ -82,7 +82,7 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
 
 def _add_wire(body: mujoco.MjsBody, params: RingParams | NeedleParams) -> None:
     radius, thickness = params.radius, params.wire_radius
-    # the angle whose chord strays that far from its arc
+    # the angle whose chord is that far from its arc
     most = 2.0 * acos(1.0 - min(1.0, _ROUNDNESS * thickness / radius))
     points = _on_arc(params, max(4, ceil(params.arc / most)))
     rgba = _RGBA[params.kind]

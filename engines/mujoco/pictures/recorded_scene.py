@@ -71,7 +71,7 @@ class RecordedScene:
         position: Point | None = None,
         target: Point | None = None,
     ) -> NDArray[np.uint8]:
-        """Return what is seen at `time_ns`, shape (height, width, 3), RGB.
+        """Return the picture at `time_ns`, shape (height, width, 3), RGB.
 
         Args:
             time_ns: simulated time; the picture shows the newest state published by then.

@@ -1,7 +1,7 @@
-"""Soft bodies of another engine in a MuJoCo scene: what their messages say, and the skins that show it.
+"""Soft bodies of another engine in a MuJoCo scene: the state from their messages, and their skins.
 
-MuJoCo draws a skin from `skin_vert` of its model, moved by bodies; hung on the world alone it is where the
-vertices say. They and the normals are taken anew for every picture, without an upload beforehand
+MuJoCo draws a skin from `skin_vert` of its model, moved by bodies; bound to the world alone it is where the
+vertices are. They and the normals are read again for every picture, without an upload beforehand
 (docs/decisions/0017).
 """
 
