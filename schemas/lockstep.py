@@ -1,8 +1,8 @@
-"""Grants without inlet samples, and acks without an error, straight to CDR and back: what every step needs.
+"""Grants without inlet samples, and acks without an error, straight to CDR and back: needed in every step.
 
-The layout is that of `GrantMessage` and `AckMessage` in `schemas.trocar_msgs` (the tests hold it against `schemas.codec`);
-whatever is not of this simple form goes through the codec. Packing and unpacking an ack takes 1 us each this
-way, 11 us through the models (`bench/lockstep.py`).
+The layout is that of `GrantMessage` and `AckMessage` in `schemas.trocar_msgs` (the tests compare it with
+`schemas.codec`); all other grants and acks go through the codec. Packing and unpacking an ack takes 1 us each
+this way, 11 us through the models (`bench/lockstep.py`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from schemas.codec import decode, encode
 from schemas.errors import MessageError
 from schemas.trocar_msgs import AckMessage, GrantMessage, InletSample
 
-__all__ = ["Grant", "Ack", "pack_grant", "pack_ack", "unpack_grant", "unpack_ack"]
+__all__ = ["Ack", "Grant", "pack_ack", "pack_grant", "unpack_ack", "unpack_grant"]
 
 _CDR = b"\x00\x01\x00\x00"
 _GRANT = struct.Struct("<4sQI4xqqqI")
@@ -35,8 +35,9 @@ class Grant(NamedTuple):
 
 
 class Ack(NamedTuple):
-    """An `AckMessage` as the step loop uses it: one hash and one compute time per step, the works of all bonds per
-    step.
+    """An `AckMessage` as the step loop uses it.
+
+    It has one hash and one compute time per step, and the works of all bonds per step.
     """
 
     run: int
@@ -67,8 +68,9 @@ def unpack_grant(payload: bytes) -> Grant:
 
 @cache
 def _ack(steps: int, works: int) -> struct.Struct:
-    """Return the layout of an ack without an error: the elements of a sequence are aligned to 8 bytes, an
-    empty one has none.
+    """Return the layout of an ack without an error.
+
+    The elements of a sequence are aligned to 8 bytes; an empty sequence has none.
     """
     align = "4x" if steps else ""
     return struct.Struct(f"<4sQI4xqI{align}{steps}QI{align}{steps}QI{'4x' if works else ''}{works}dIB")

@@ -1,6 +1,4 @@
-"""The link of a device as a scenario states it: what a network between the device and the hub would do to
-their messages.
-"""
+"""The network link of a device, as a scenario states it: an emulated network between device and hub."""
 
 from __future__ import annotations
 

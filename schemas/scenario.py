@@ -13,7 +13,7 @@ from schemas.keys import valid_name
 from schemas.network_link import NetworkLinkSpec
 from schemas.quantity import Duration
 
-__all__ = ["Bond", "Connection", "PortReference", "Measure", "ParticipantSpec", "Scenario"]
+__all__ = ["Bond", "Connection", "Measure", "ParticipantSpec", "PortReference", "Scenario"]
 
 Algorithm = Literal["impulse", "impulse-linearised", "gauss-seidel", "jacobi"]
 
@@ -52,9 +52,7 @@ class PortReference(_Part):
 
 
 class ParticipantSpec(_Part):
-    """A participant: its kind, where it runs, how often it steps, what lies between it and the hub, and the
-    parameters of its kind.
-    """
+    """A participant: its kind, its host, its period, its network link, and the parameters of its kind."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
@@ -148,8 +146,9 @@ class Bond(_Part):
 
 
 class Measure(_Part):
-    """A number for the summary, from the values of one output port: `participant.port` or
-    `participant.port.field`.
+    """A number for the summary, from the values of one output port.
+
+    The port is named as `participant.port` or `participant.port.field`.
     """
 
     kind: Literal["peak-norm", "peak", "least", "mean", "final", "drop", "swing", "time-above"] = Field(

@@ -43,9 +43,7 @@ __all__ = [
 
 
 class InletSample(Message):
-    """One device sample as it enters simulated time: the CDR bytes that arrived, or only a change of
-    staleness.
-    """
+    """One device sample as it enters simulated time: its CDR bytes, or only a change of staleness."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/InletSample"
     participant: String
@@ -58,9 +56,7 @@ class InletSample(Message):
 
 
 class GrantMessage(Message):
-    """The hub's permission to advance from step `step` at `start_ns` to `horizon_ns`, with all that enters
-    there.
-    """
+    """The hub's permission to advance from `step` at `start_ns` to `horizon_ns`, with all inlet samples."""
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/Grant"
     run: UInt64
@@ -89,8 +85,9 @@ class AckMessage(Message):
 
 
 class CouplingEnergy(Message):
-    """The energy book of one bond: what the motion side gave, what the force side got, and the difference,
-    all in J since the start.
+    """The energy book of one bond, in J since the start.
+
+    It contains what the motion side gave, what the force side received, and the difference.
     """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/CouplingEnergy"
@@ -125,8 +122,9 @@ class ContactPlane(Message):
 
 
 class ContactModel(Message):
-    """All that a haptic device needs to render contact until the next one comes; in `header.frame_id`, the
-    device's base frame.
+    """All that a haptic device needs to render contact until the next one arrives.
+
+    The frame in `header.frame_id` is the device's base frame.
     """
 
     ros_type: ClassVar[str] = "trocar_msgs/msg/ContactModel"
