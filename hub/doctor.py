@@ -43,8 +43,9 @@ _ROS = (
 
 
 def examine() -> list[Finding]:
-    """Look at Python, Zenoh, certificates, the extras, the kinds of participants, what packages bring checks
-    for, and ROS. Starts no device.
+    """Check Python, Zenoh, import names, certificates, extras, kinds, the checks of packages, and ROS.
+
+    Starts no device.
     """
     sections: tuple[Callable[[], Iterator[Finding]], ...] = (
         _python,
@@ -183,7 +184,7 @@ def _ros() -> Iterator[Finding]:
 
 
 def as_json(findings: list[Finding]) -> str:
-    """Return the findings as JSON: an object with `works` (all that is needed does) and the list `findings`."""
+    """Return JSON: `works`, true if everything needed works, and the list `findings`."""
     return json.dumps(
         {"works": all(f.works for f in findings if f.needed), "findings": [vars(f) for f in findings]},
         indent=2,

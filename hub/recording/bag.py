@@ -7,8 +7,9 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
@@ -16,10 +17,11 @@ from mcap.records import Chunk
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
+from numpy.typing import NDArray
 
 from schemas import ros
 from schemas.codec import decode, message_type
-from schemas.errors import RecordingError, did_you_mean
+from schemas.errors import MessageError, RecordingError, did_you_mean
 from schemas.ports import Port
 from schemas.vectors import has_vector
 
@@ -31,22 +33,29 @@ __all__ = [
     "bag_file",
     "chunk_records",
     "located_messages",
+    "locating",
     "output_port",
     "reading",
 ]
 
 MAX_RECORD_BYTES = 64 * 2**20
-"""A longer MCAP record is refused unread: chunks have 64 KiB, or one image."""
+"""A longer MCAP record is not read: chunks have 64 KiB, or one image."""
 
 _RECORD = struct.Struct("<BQ")
 """Opcode and length of a record."""
 
 _MESSAGE = struct.Struct("<BQHIQQ")
-"""Opcode, length, channel, sequence, log time, publish time; the payload follows
-(https://mcap.dev/spec#message-op0x05).
+"""Opcode, length, channel, sequence, log time, publish time; the payload follows.
+
+https://mcap.dev/spec#message-op0x05
 """
 
 MESSAGE_HEADER_BYTES = _MESSAGE.size
+
+_MESSAGE_INDEX = struct.Struct("<BQHI")
+"""Opcode, length, channel, bytes of the entries that follow (https://mcap.dev/spec#message-index-op0x07)."""
+
+_INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 class BagMessage(NamedTuple):
@@ -59,7 +68,7 @@ class BagMessage(NamedTuple):
 
 
 def bag_file(path: Path) -> Path:
-    """Return the MCAP file that `path`, itself one or a rosbag2 directory, stands for.
+    """Return the MCAP file at `path`, which is the file itself or a rosbag2 directory.
 
     Raises RecordingError if there is not exactly one.
     """
@@ -78,30 +87,38 @@ def bag_file(path: Path) -> Path:
 
 @contextmanager
 def reading(file: Path) -> Generator[None]:
-    """Turn whatever damaged bytes make the parsers raise into a RecordingError that names `file`."""
+    """Turn what the parsers raise at damaged bytes into a RecordingError that names `file`."""
     try:
         yield
     except (RecordingError, GeneratorExit):
         raise
     except OSError as error:
         raise RecordingError(f"cannot read '{file}': {error.strerror}") from error
-    except (
-        Exception
-    ) as error:  # mcap lets struct.error, KeyError, ValueError, zstd's and lz4's errors through
+    except Exception as error:  # struct.error, KeyError, ValueError, and those of zstd and lz4
         raise RecordingError(
             f"'{file}' is damaged ({type(error).__name__}: {error}); `trocar recover {file}` saves what is"
             " whole"
         ) from error
 
 
+@contextmanager
+def locating(bag: Bag, topic: str, time_ns: int) -> Generator[None]:
+    """Turn a MessageError into a RecordingError that says where the message is."""
+    try:
+        yield
+    except MessageError as error:
+        raise RecordingError(f"'{bag.file}': topic '{topic}' at {time_ns} ns: {error}") from error
+
+
 class Bag:
     """A finished recording: its topics, messages and attachments."""
 
-    def __init__(self, path: Path) -> None:
-        """Open a rosbag2 directory or an MCAP file. Raises RecordingError if it is none, cut short, or not in
-        CDR.
+    def __init__(self, path: str | Path) -> None:
+        """Open a rosbag2 directory or an MCAP file.
+
+        Raises RecordingError if it is none, is cut short, or holds messages that are not in CDR.
         """
-        self.file = bag_file(path)
+        self.file = bag_file(Path(path))
         with reading(self.file):
             self._summary = self._read_summary()
         self.topics: dict[str, str] = {}
@@ -146,26 +163,31 @@ class Bag:
                 raise RecordingError(
                     f"'{self.file}' has no topic '{topic}'.{did_you_mean(topic, self.topics)}"
                 )
-        with reading(self.file):
-            wanted = {
-                c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics
-            }
-        for chunk in self._chunks(set(wanted)):
-            with reading(self.file):
-                records = chunk_records(chunk)
-                found = [m for m in located_messages(records) if m.channel in wanted]
+        wanted = {c.id: c.topic for c in self._summary.channels.values() if not topics or c.topic in topics}
+        for records, found in self._located(set(wanted)):
             for m in found:
                 topic = wanted[m.channel]
                 yield BagMessage(
                     topic, self.topics[topic], m.time_ns, records[m.offset + MESSAGE_HEADER_BYTES : m.end]
                 )
 
+    def column(self, topic: str) -> tuple[NDArray[np.int64], list[bytes]]:
+        """Return the times (ns), shape (n,), and the payloads of one topic, in the order of `messages`."""
+        times: list[int] = []
+        payloads: list[bytes] = []
+        for records, found in self._located(
+            {c.id for c in self._summary.channels.values() if c.topic == topic}
+        ):
+            times += [m.time_ns for m in found]
+            payloads += [records[m.offset + MESSAGE_HEADER_BYTES : m.end] for m in found]
+        return np.array(times, np.int64), payloads
+
     def _read_summary(self) -> Summary:
         with self.file.open("rb") as stream:
             size = stream.seek(0, 2)
             stream.seek(0)
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                raise RecordingError(f"'{self.file}' is no MCAP file")
+                raise RecordingError(f"'{self.file}' is not an MCAP file")
             stream.seek(max(0, size - len(MCAP0_MAGIC)))
             if size < 2 * len(MCAP0_MAGIC) or stream.read() != MCAP0_MAGIC:
                 raise RecordingError(
@@ -179,17 +201,23 @@ class Bag:
             raise RecordingError(f"'{self.file}' has no chunk index; `trocar recover {self.file}` writes one")
         return summary
 
-    def _chunks(self, wanted: set[int]) -> Iterator[Chunk]:
-        """Yield the chunks that hold a message of the channels `wanted`, in file order."""
+    def _located(self, wanted: set[int]) -> Iterator[tuple[bytes, list[LocatedMessage]]]:
+        """Yield, in file order, the records of each chunk that holds `wanted`, and where its messages are."""
         indexes = sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
         with self.file.open("rb") as stream:
             for index in indexes:
-                if index.message_index_offsets and wanted.isdisjoint(index.message_index_offsets):
+                places = index.message_index_offsets
+                if places and wanted.isdisjoint(places):
                     continue
                 with reading(self.file):
                     stream.seek(index.chunk_start_offset + _RECORD.size)
-                    chunk = Chunk.read(ReadDataStream(stream))
-                yield chunk
+                    records = chunk_records(Chunk.read(ReadDataStream(stream)))
+                    if wanted.issuperset(places):
+                        found = [m for m in located_messages(records) if m.channel in wanted]
+                    else:
+                        offsets = [o for c in wanted & places.keys() for o in _offsets(stream, places[c], c)]
+                        found = [_message_at(records, offset, wanted) for offset in sorted({*offsets})]
+                yield records, found
 
 
 class LocatedMessage(NamedTuple):
@@ -200,6 +228,23 @@ class LocatedMessage(NamedTuple):
     offset: int
     """Start of the record."""
     end: int
+
+
+def _offsets(stream: BinaryIO, place: int, channel: int) -> list[int]:
+    """Return where the messages of `channel` start in their chunk, from the message index at `place`."""
+    stream.seek(place)
+    opcode, length, stated, size = _MESSAGE_INDEX.unpack(stream.read(_MESSAGE_INDEX.size))
+    if (opcode, stated, length) != (Opcode.MESSAGE_INDEX, channel, size + 6) or length > MAX_RECORD_BYTES:
+        raise ValueError(f"there is no index of channel {channel} at {place}")
+    return np.frombuffer(stream.read(size), _INDEX_ENTRY)["offset"].tolist()
+
+
+def _message_at(records: bytes, offset: int, channels: set[int]) -> LocatedMessage:
+    opcode, length, channel, _, time_ns, _ = _MESSAGE.unpack_from(records, offset)
+    end = offset + _RECORD.size + length
+    if opcode != Opcode.MESSAGE or channel not in channels or end > len(records):
+        raise ValueError(f"the index of a chunk is wrong: no message at {offset}")
+    return LocatedMessage(channel, time_ns, offset, end)
 
 
 def chunk_records(chunk: Chunk) -> bytes:

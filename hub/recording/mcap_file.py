@@ -2,7 +2,7 @@
 
 The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three
 times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so
-the many message headers and index entries of a chunk are laid out here by numpy. Format:
+the many message headers and index entries of a chunk are written here by numpy. Format:
 https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 """
 
@@ -57,8 +57,9 @@ _RECORD_HEADER_BYTES = 9
 
 @dataclass(frozen=True)
 class ChunkData:
-    """The records of one chunk, uncompressed, and where its messages stand in them; arrays of shape
-    (messages,).
+    """The records of one chunk, uncompressed, and the channel, time and offset of each message.
+
+    The arrays have the shape (messages,).
     """
 
     records: bytes
@@ -68,7 +69,7 @@ class ChunkData:
 
 
 def chunk_data(messages: Sequence[tuple[int, int, bytes]]) -> ChunkData:
-    """Lay out `messages`, each (channel, time in ns, payload), as the records of one chunk."""
+    """Return `messages`, each (channel, time in ns, payload), as the records of one chunk."""
     channels, times, payloads = zip(*messages, strict=True)
     sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
     headers = np.zeros(len(payloads), _MESSAGE)
@@ -114,9 +115,7 @@ class McapFile:
         self._attachments.append(index)
 
     def declare(self, schema: Schema, channel: Channel) -> None:
-        """Add a channel and, if it is new, its schema; both must stand before the first message that uses
-        them.
-        """
+        """Add a channel and, if it is new, its schema, before the first message that uses them."""
         new = schema not in self.schemas
         self._append(_bytes_of(schema, channel) if new else _bytes_of(channel))
         self.schemas += [schema] if new else []
@@ -194,7 +193,7 @@ class McapFile:
         self._file.close()
 
     def _append(self, data: bytes) -> int:
-        """Write `data` at the end and return where it stands."""
+        """Write `data` at the end and return its offset."""
         rest = memoryview(data)
         try:
             while rest:

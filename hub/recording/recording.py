@@ -6,26 +6,32 @@ Topics are the session's keys without `trocar/<session>`.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from hub.planning.plan import Plan
 from hub.planning.renamed import current_names
-from hub.recording.bag import Bag, output_port
+from hub.recording.bag import Bag, locating
+from hub.recording.series import Series
 from schemas.codec import decode
-from schemas.errors import MessageError, RecordingError
+from schemas.errors import RecordingError, did_you_mean
 from schemas.keys import Keys, topic
 from schemas.message import Message
+from schemas.ports import Port
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, SessionStatus
-from schemas.vectors import Vector, VectorCodec, has_vector
 
 __all__ = ["ENERGY_PREFIX", "GRANT_TOPIC", "STATUS_TOPIC", "Recording"]
+
+_OUTPUT = re.compile(r"/(?:engine|device)/([^/]+)/out/(.+)")
+"""A topic that is an output port: participant, port."""
 
 M = TypeVar("M", bound=Message)
 
@@ -36,7 +42,88 @@ ENERGY_PREFIX = topic(_KEYS.energy(""))
 
 
 class Recording(Bag):
-    """The recording of one session, read from a rosbag2 directory or an MCAP file."""
+    """The recording of one session, read from a rosbag2 directory or an MCAP file.
+
+    recording = Recording("recordings/palpation")
+    recording.ports                                          # what there is
+    recording["robot.PSM1/measured_js"]["position"]          # (n, 6), rad and m
+    recording["tissue.probe/wrench"].to_frame().plot()       # with pandas
+    """
+
+    @cached_property
+    def ports(self) -> dict[str, str]:
+        """The recorded outputs, `participant.port`, each with its ROS type."""
+        return {name: self.topics[topic] for name, topic in sorted(self._ports.items())}
+
+    @property
+    def participants(self) -> tuple[str, ...]:
+        """Names of all participants that are recorded, in alphabetical order."""
+        parts = [name.split("/") for name in self.topics]
+        return tuple(sorted({part[2] for part in parts if len(part) > 3 and part[1] in ("engine", "device")}))
+
+    def __getitem__(self, port: str) -> Series:
+        """Return what an output port published: `participant.port`, or a topic such as `/hub/energy/tip`.
+
+        Raises RecordingError if it is not recorded; the message names the nearest one.
+        """
+        topic_name = port if port.startswith("/") else self._ports.get(port)
+        if topic_name not in self.topics:
+            known = self.topics if port.startswith("/") else self._ports
+            raise RecordingError(f"'{self.file}' has no port '{port}'.{did_you_mean(port, known)}")
+        return Series(self, topic_name, port, self._declared.get(port))
+
+    def __contains__(self, port: str) -> bool:
+        return port in self.topics if port.startswith("/") else port in self._ports
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.ports)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Recording {self._title}: {self.duration_ns * 1e-9:g} s; participants"
+            f" {', '.join(self.participants) or 'none'}; {len(self._ports)} ports;"
+            f" {sum(self.counts.values()):,} messages; {self.file}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the table that a notebook shows."""
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(kind)}</td><td>{self.counts[self._ports[name]]:,}</td></tr>"
+            for name, kind in self.ports.items()
+        )
+        return (
+            f"<p><b>{escape(self._title)}</b>, {self.duration_ns * 1e-9:g} s, participants"
+            f" {escape(', '.join(self.participants) or 'none')}</p><table><thead><tr><th>port</th>"
+            f"<th>type</th><th>messages</th></tr></thead><tbody>{rows}</tbody></table>"
+        )
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Return what a notebook offers after `recording[`."""
+        return list(self.ports)
+
+    @cached_property
+    def _ports(self) -> dict[str, str]:
+        """The topic of each recorded port."""
+        found: dict[str, str] = {}
+        for name in self.topics:
+            match = _OUTPUT.fullmatch(name)
+            if match:
+                found[f"{match[1]}.{match[2]}"] = name
+        return found
+
+    @cached_property
+    def _declared(self) -> dict[str, Port]:
+        """The ports as the participants declared them; empty if that is not recorded."""
+        if "plan.json" not in self.attachments:
+            return {}
+        participants = self.plan().participants
+        return {f"{name}.{port.name}": port for name, one in participants.items() for port in one.ports}
+
+    @property
+    def _title(self) -> str:
+        with suppress(RecordingError):
+            return self.scenario().name
+        return self.file.stem
 
     def scenario(self) -> Scenario:
         """Return the resolved scenario. Raises RecordingError if the recording is not one of a session."""
@@ -50,15 +137,15 @@ class Recording(Bag):
             first = error.errors(include_url=False)[0]
             path = ".".join(str(part) for part in first["loc"])
             raise RecordingError(
-                f"'{self.file}': the scenario in it is none that this version reads: {path}: {first['msg']}"
+                f"'{self.file}': this version cannot read the scenario in it: {path}: {first['msg']}"
             ) from error
 
     def versions(self) -> dict[str, str]:
-        """Return the versions of the packages that recorded; empty if they are not stated."""
+        """Return the version of each installed package at that time; empty if not recorded."""
         return self._table("versions.json")
 
     def files(self) -> dict[str, str]:
-        """Return the SHA-256 of the files that the participants read, by path; empty if they are not stated."""
+        """Return the SHA-256 of each file that the participants read, by path; empty if not recorded."""
         return self._table("files.json")
 
     def _table(self, name: str) -> dict[str, str]:
@@ -66,10 +153,10 @@ class Recording(Bag):
             content = json.loads(self.attachments.get(name, b"{}"))
             return {str(key): str(value) for key, value in content.items()}
         except (AttributeError, ValueError) as error:
-            raise RecordingError(f"'{self.file}': attachment {name} is no table: {error}") from error
+            raise RecordingError(f"'{self.file}': attachment {name} is not a table: {error}") from error
 
     def plan(self) -> Plan:
-        """Return the wiring. Raises RecordingError if the recording is not one of a session."""
+        """Return the plan of the session. Raises RecordingError if the recording is not one of a session."""
         try:
             return Plan.model_validate_json(self.attachments["plan.json"])
         except KeyError:
@@ -78,12 +165,12 @@ class Recording(Bag):
             ) from None
         except ValidationError as error:
             raise RecordingError(
-                f"'{self.file}': the plan in it is none that this version reads:"
+                f"'{self.file}': this version cannot read the plan in it:"
                 f" {error.errors(include_url=False)[0]['msg']}"
             ) from error
 
     def directory(self) -> Path:
-        """Return where relative paths of the scenario started.
+        """Return the directory in which relative paths of the scenario started.
 
         Raises RecordingError if the recording is not one of a session.
         """
@@ -93,7 +180,7 @@ class Recording(Bag):
         return Path(origin["directory"])
 
     def started_ns(self) -> int:
-        """Return the wall time (ns since 1970) at which the session was started; 0 if it is not stated."""
+        """Return the wall time (ns since 1970) at which the session was started; 0 if not recorded."""
         return int(self._table("origin.json").get("started_ns", 0))
 
     def session(self) -> str:
@@ -106,7 +193,7 @@ class Recording(Bag):
         return (grant for _, grant in self._decoded(GRANT_TOPIC, GrantMessage))
 
     def acks(self, participant: str) -> Iterator[AckMessage]:
-        """Yield the acks of `participant` in the order in which they came."""
+        """Yield the acks of `participant` in the order of their steps."""
         return (ack for _, ack in self._decoded(topic(_KEYS.ack(participant)), AckMessage))
 
     def energy(self, bond: str) -> Iterator[tuple[int, CouplingEnergy]]:
@@ -114,47 +201,13 @@ class Recording(Bag):
         return self._decoded(ENERGY_PREFIX + bond, CouplingEnergy)
 
     def statuses(self) -> Iterator[tuple[int, SessionStatus]]:
-        """Yield what the session said of itself, with the simulated time (ns)."""
+        """Yield the status that the session published, with the simulated time (ns)."""
         return self._decoded(STATUS_TOPIC, SessionStatus)
-
-    def series(self, topic_name: str) -> tuple[Vector, NDArray[np.float64]]:
-        """Return times in s, shape (n,), and values, shape (n, size), of a topic whose type has a vector
-        layout.
-        """
-        if not has_vector(self.topics.get(topic_name, "")) and topic_name in self.topics:
-            raise RecordingError(
-                f"'{self.file}': topic '{topic_name}' is of type {self.topics[topic_name]}, which has no"
-                " vector form"
-            )
-        times: list[int] = []
-        values: list[Vector] = []
-        codec: VectorCodec | None = None
-        for message in self.messages(topic_name):
-            try:
-                codec = codec or VectorCodec(output_port(topic_name, message.type, message.payload))
-                values.append(_vector(codec, message.payload))
-            except MessageError as error:
-                raise RecordingError(
-                    f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}"
-                ) from error
-            times.append(message.time_ns)
-        size = 0 if codec is None else codec.size
-        return np.asarray(times, np.float64) * 1e-9, np.asarray(values, np.float64).reshape(len(times), size)
 
     def _decoded(self, topic_name: str, model: type[M]) -> Iterator[tuple[int, M]]:
         if topic_name not in self.topics:
             return
         for message in self.messages(topic_name):
-            try:
-                yield message.time_ns, decode(model, message.payload)
-            except MessageError as error:
-                raise RecordingError(
-                    f"'{self.file}': topic '{topic_name}' at {message.time_ns} ns: {error}"
-                ) from error
-
-
-def _vector(codec: VectorCodec, payload: bytes) -> Vector:
-    try:
-        return codec.decode(payload)
-    except MessageError:  # a device may write joints in another order, or leave the frame out
-        return codec.from_message(decode(codec.model, payload))
+            with locating(self, topic_name, message.time_ns):
+                content = decode(model, message.payload)
+            yield message.time_ns, content

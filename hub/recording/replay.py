@@ -33,8 +33,9 @@ class ReplaySummary:
 
 
 def is_replayed(topic: str) -> bool:
-    """Say whether `topic` is republished: outputs, energy books and the status, but no grants and acks, which
-    would drive participants.
+    """Say whether `topic` is published again: outputs, energy books and the status.
+
+    Grants and acks are not, as they would drive participants.
     """
     role, _, rest = topic[1:].partition("/")
     return (

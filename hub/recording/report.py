@@ -21,15 +21,13 @@ from hub.recording.report_figures import (
     press_figure,
     step_time_figures,
 )
+from hub.recording.series import Series
 from schemas.errors import RecordingError
-from schemas.keys import Keys, topic
 from schemas.scenario import Bond, Scenario
 from schemas.trocar_msgs import SessionStatus
 from schemas.vectors import Vector
 
 __all__ = ["report"]
-
-_KEYS = Keys("any")
 
 
 def report(recording: Recording, output: Path) -> None:
@@ -61,24 +59,19 @@ def report(recording: Recording, output: Path) -> None:
 
 
 def _trace(recording: Recording, bond: Bond) -> BondTrace | None:
-    """Return what is recorded of both sides of `bond`, at the times of the force; None if a side is not
-    recorded.
-    """
-    motion = _first(recording, f"{bond.motion.participant}", bond.motion.port, ("pose", "position"))
-    force = _first(recording, f"{bond.force.participant}", bond.force.port, ("wrench", "force"))
-    if motion is None or force is None:
+    """Return both sides of `bond` at the times of the force; None if a side is not recorded."""
+    motion = _first(recording, f"{bond.motion.participant}.{bond.motion.port}", ("pose", "position"))
+    force = _first(recording, f"{bond.force.participant}.{bond.force.port}", ("wrench", "force"))
+    if not motion or not force:
         return None
-    (motion_s, motion_values), (force_s, force_values) = recording.series(motion), recording.series(force)
-    if not (len(motion_s) and len(force_s)):
-        return None
-    dof = min(3, motion_values.shape[1], force_values.shape[1])
-    position = np.stack([np.interp(force_s, motion_s, motion_values[:, i]) for i in range(dof)], axis=1)
-    return BondTrace(bond.name, force_s, position, force_values[:, :dof])
+    dof = min(3, motion.values.shape[1], force.values.shape[1])
+    position = [np.interp(force.time, motion.time, motion.values[:, i]) for i in range(dof)]
+    return BondTrace(bond.name, force.time, np.stack(position, axis=1), force.values[:, :dof])
 
 
-def _first(recording: Recording, participant: str, bond: str, names: Iterable[str]) -> str | None:
-    topics = (topic(_KEYS.output("engine", participant, f"{bond}/{name}")) for name in names)
-    return next((name for name in topics if name in recording.topics), None)
+def _first(recording: Recording, bond: str, names: Iterable[str]) -> Series | None:
+    """Return the first of the ports `names` of one side of a bond that is recorded."""
+    return next((recording[f"{bond}/{name}"] for name in names if f"{bond}/{name}" in recording), None)
 
 
 def _book(recording: Recording, bond: Bond) -> tuple[Vector, Vector, Vector]:

@@ -1,4 +1,4 @@
-"""The plots of a report, as SVG that takes its colours from the page and its width from the reader's screen."""
+"""The plots of a report, as SVG that takes its colours and its width from the page."""
 
 from __future__ import annotations
 
@@ -78,8 +78,9 @@ class BondTrace:
 
     @property
     def depth(self) -> Vector:
-        """Displacement since first contact, m, shape (n,), against the mean force on the motion side; zeros
-        if there was no contact.
+        """Displacement since first contact against the mean force on the motion side, m, shape (n,).
+
+        Zeros if there was no contact.
         """
         contact = self.contact
         if not contact.any():
@@ -181,8 +182,9 @@ def energy_figures(bond: str, times_s: Vector, motion_j: Vector, force_j: Vector
 
 
 def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) -> list[Figure]:
-    """Compute times per step, of each participant (times in s, compute times in s): how they are spread, and
-    over time.
+    """Compute times per step, as a distribution and over time.
+
+    `compute`: of each participant, the times (s) of its steps and their compute times (s), shape (n,).
     """
     caption = "Time a participant computes per step of its own, by the wall clock. " + "; ".join(
         f"{name}: median {np.median(spent) * 1e6:.0f} µs, 99 % below {np.percentile(spent, 99) * 1e6:.0f} µs"

@@ -11,7 +11,7 @@ from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from schemas.codec import encode
 from schemas.errors import RecordingError
-from schemas.ros import Float64Message, Float64MultiArray, JointState, StringMessage
+from schemas.ros import Float64Message
 from tests.hub.sample_session import ATTACHMENTS, BOND, write_session
 
 
@@ -28,7 +28,7 @@ def test_grants_acks_and_books(session: Path) -> None:
     assert [g.step for g in grants] == list(range(500))
     assert [len(g.inlets) for g in grants] == [1, 0, 0, 0] * 125
     assert [a.state_hash.tolist() for a in recording.acks("robot")] == [[i] for i in range(500)]
-    assert list(recording.acks("nobody")) == []
+    assert list(recording.acks("stranger")) == []
     books = list(recording.energy(BOND))
     assert [t for t, _ in books] == [(i + 1) * 1_000_000 for i in range(500)]
     assert all(b.residual_j == b.force_work_j - b.motion_work_j for _, b in books)
@@ -49,57 +49,6 @@ def test_the_file_itself_may_be_named(session: Path) -> None:
     assert Recording(session / "run_0.mcap").topics == Recording(session).topics
 
 
-def test_series_are_what_was_written(session: Path) -> None:
-    recording = Recording(session)
-    times, wrench = recording.series("/engine/tissue/out/probe/wrench")
-    assert wrench.shape == (500, 6)
-    assert np.allclose(times, np.arange(1, 501) * 1e-3)
-    assert 1.0 < wrench[:, 2].max() < 3.0
-    with pytest.raises(
-        RecordingError,
-        match=(
-            r"has no topic '/engine/tissue/out/probe/wrenh'\. Did you mean '/engine/tissue/out/probe/wrench'"
-        ),
-    ):
-        recording.series("/engine/tissue/out/probe/wrenh")
-    with pytest.raises(RecordingError, match="has no vector form"):
-        recording.series("/hub/grant")
-
-
-def test_series_of_joints_and_arrays(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "run", attachments={}) as recorder:
-        joints = recorder.channel("/joints", JointState.ros_type)
-        recorder.write(
-            joints,
-            0,
-            encode(JointState(name=["a", "b"], position=np.array([1.0, 2.0]), effort=np.array([3.0, 4.0]))),
-        )
-        recorder.write(
-            joints,
-            1,
-            encode(JointState(name=["b", "a"], position=np.array([2.5, 1.5]), effort=np.array([4.5, 3.5]))),
-        )
-        array, number, text = (
-            recorder.channel(f"/{m.__name__}", m.ros_type)
-            for m in (Float64MultiArray, Float64Message, StringMessage)
-        )
-        recorder.write(array, 0, encode(Float64MultiArray(data=np.arange(3.0))))
-        recorder.write(number, 0, encode(Float64Message(data=7.0)))
-        recorder.write(text, 0, encode(StringMessage(data="x")))
-    recording = Recording(tmp_path / "run")
-    assert recording.series("/joints")[1].tolist() == [[1, 2, 3, 4], [1.5, 2.5, 3.5, 4.5]]
-    assert recording.series("/Float64MultiArray")[1].tolist() == [[0, 1, 2]]
-    assert recording.series("/Float64Message")[1].tolist() == [[7]]
-
-
-def test_a_series_without_messages_is_empty(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "run", attachments={}) as recorder:
-        recorder.channel("/number", Float64Message.ros_type)
-        recorder.write(recorder.channel("/other", Float64Message.ros_type), 0, encode(Float64Message()))
-    times, values = Recording(tmp_path / "run").series("/number")
-    assert (times.shape, values.shape) == ((0,), (0, 0))
-
-
 def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run", attachments={}) as recorder:
         recorder.write(recorder.channel("/hub/grant", "trocar_msgs/msg/Grant"), 3, b"no grant")
@@ -114,17 +63,17 @@ def test_payloads_are_not_trusted(tmp_path: Path) -> None:
     ):
         list(recording.grants())
     with pytest.raises(RecordingError, match=r"topic '/number' at 3 ns: .*finite"):
-        recording.series("/number")
+        _ = recording["/number"].values
 
 
 @pytest.mark.parametrize(
     ("attachments", "problem"),
     [
         ({}, "holds no scenario: it was not recorded by `trocar run`"),
-        ({"scenario.json": b"{"}, "the scenario in it is none that this version reads"),
+        ({"scenario.json": b"{"}, "this version cannot read the scenario in it"),
         (
             {"scenario.json": json.dumps({"name": "x", "step": "soon", "participants": {}}).encode()},
-            "none that this version reads: step",
+            "this version cannot read the scenario in it: step",
         ),
     ],
 )
@@ -136,9 +85,9 @@ def test_a_recording_without_a_readable_scenario(
         Recording(tmp_path / "run").scenario()
 
 
-def test_versions_that_are_no_table(tmp_path: Path) -> None:
+def test_versions_that_are_not_a_table(tmp_path: Path) -> None:
     Recorder(tmp_path / "run", attachments={"versions.json": b"[1]"}).close()
-    with pytest.raises(RecordingError, match=r"versions\.json is no table"):
+    with pytest.raises(RecordingError, match=r"versions\.json is not a table"):
         Recording(tmp_path / "run").versions()
 
 
@@ -149,7 +98,7 @@ def test_what_is_no_recording(tmp_path: Path) -> None:
         Recording(tmp_path)
     for content in (b"", b"PK\x03\x04 something else", b"\x89MCAP0\r\n"):
         (tmp_path / "x.mcap").write_bytes(content)
-        with pytest.raises(RecordingError, match=r"no MCAP file|was cut short"):
+        with pytest.raises(RecordingError, match=r"not an MCAP file|was cut short"):
             Recording(tmp_path / "x.mcap")
 
 
@@ -178,6 +127,7 @@ def test_a_damaged_file_is_refused_or_read_never_more(
         recording = Recording(file)
         read = list(recording.messages())
         list(recording.grants())
+        recording.column("/engine/robot/ack")
         _ = recording.attachments
     except RecordingError:
         return

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hub.recording.bag import output_port
 from hub.recording.recording import Recording
 from hub.verify import verify
-from schemas.vectors import has_vector
+from schemas.vectors import VectorCodec, has_vector
 
 FILES = sorted((Path(__file__).parent / "recordings_0_1_0").glob("*.mcap.xz"))
 KINDS = {
@@ -63,9 +64,12 @@ def test_an_old_recording_is_read(recorded: tuple[str, Recording]) -> None:
         assert sum(len(ack.state_hash) for ack in recording.acks(participant)) > 0
     for topic, kind in recording.topics.items():
         if has_vector(kind):
-            times, values = recording.series(topic)
-            assert len(times) == len(values) == recording.counts[topic]
-            assert np.isfinite(values).all()
+            series = recording[topic]
+            assert len(series.time) == len(series.values) == recording.counts[topic]
+            assert np.isfinite(series.values).all()
+            one_by_one = VectorCodec(output_port(topic, kind, next(recording.messages(topic)).payload))
+            rows = [one_by_one.decode(message.payload) for message in recording.messages(topic)]
+            assert np.array_equal(rows, series.values)
 
 
 def test_an_old_recording_is_verified(recorded: tuple[str, Recording]) -> None:

@@ -95,7 +95,7 @@ def test_files_of_other_writers_keep_their_channels(tmp_path: Path) -> None:
         stream.flush()
     saved = recover(tmp_path / "x.mcap")
     assert saved.messages > 50
-    assert Recording(saved.path).series("/x")[1][:, 0].tolist() == list(range(saved.messages))
+    assert Recording(saved.path)["/x"].values[:, 0].tolist() == list(range(saved.messages))
 
 
 def test_messages_outside_chunks_are_not_ours(tmp_path: Path) -> None:

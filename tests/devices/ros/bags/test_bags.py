@@ -235,7 +235,7 @@ def test_states_are_what_the_gateway_would_have_written(driven, bag):
         "/PSM1/body/measured_cf",
     ):
         port, (_, _, last) = ports[topic], messages(bag, topic)[-1]
-        _, recorded = driven.series(f"/engine/motion/out{topic}")
+        recorded = driven[f"motion.{topic.removeprefix('/')}"].values
         header = getattr(last, "header", None)
         assert header is None or header.frame_id == port.frame
         assert (

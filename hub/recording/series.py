@@ -1,0 +1,194 @@
+"""What one port of a recorded session published, as arrays, messages or a data frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hub.recording.bag import Bag, locating, output_port
+from schemas.codec import decode, message_type
+from schemas.errors import MessageError, MissingExtraError, RecordingError, did_you_mean
+from schemas.message import Message
+from schemas.ports import Port
+from schemas.vectors import Vector, VectorCodec, has_vector
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+__all__ = ["Series"]
+
+
+class Series:
+    """All values of one recorded port, read when they are first used.
+
+        joints = recording["robot.PSM1/measured_js"]
+        joints.time                 # (n,), s, simulated
+        joints.values               # (n, 12): position and velocity of six joints
+        joints["position"]          # (n, 6), rad and m, in the order of joints.names
+        joints["position.insertion"]    # (n,), m
+
+    Attributes:
+        name: The port, `participant.port`, or the topic where it is none.
+        topic: The topic that holds it.
+        type: The ROS type of its messages.
+    """
+
+    def __init__(self, bag: Bag, topic: str, name: str, declared: Port | None = None) -> None:
+        """Wrap a topic of `bag`; `declared` is the port as its participant declared it, if known."""
+        self.name, self.topic, self.type = name, topic, bag.topics[topic]
+        self._bag, self._declared = bag, declared
+
+    @property
+    def unit(self) -> str:
+        """Unit of a bare number or array; empty where the type implies SI units."""
+        return "" if self._declared is None else self._declared.unit
+
+    @property
+    def frame(self) -> str:
+        """The frame in which the values are expressed; empty where there is none."""
+        return self._port.frame
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of the columns; empty if these are no joints."""
+        return self._port.names
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the parts of a value: `position`, `velocity`; `position`, `orientation`; `data`; ..."""
+        return tuple(self._blocks)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name of each column of `values`, shape (size,): `position.x`, `velocity.insertion`, `data.0`."""
+        return tuple(self._columns)
+
+    @property
+    def time(self) -> Vector:
+        """Simulated time of each message, s, shape (n,)."""
+        return self._times_ns.astype(np.float64) * 1e-9
+
+    @cached_property
+    def values(self) -> NDArray[np.float64]:
+        """The numbers of each message, shape (n, size); quaternions are (x, y, z, w).
+
+        Raises RecordingError where the type has no vector form, or a message is not valid.
+        """
+        codec, (times_ns, payloads) = self._codec, self._content
+        if codec is None:
+            return np.zeros((0, 0))
+        try:
+            return codec.decode_all(payloads)
+        except MessageError:  # a device may write joints in another order, or leave the frame out
+            rows = [self._row(codec, *row) for row in zip(times_ns.tolist(), payloads, strict=True)]
+            return np.stack(rows)
+
+    def messages(self) -> Iterator[tuple[float, Message]]:
+        """Yield simulated time (s) and message, oldest first, of any type.
+
+        Raises RecordingError for a message that is not valid.
+        """
+        model = message_type(self.type)
+        for time_ns, payload in zip(self._times_ns.tolist(), self._content[1], strict=True):
+            with self._located(time_ns):
+                message = decode(model, payload)
+            yield time_ns * 1e-9, message
+
+    def to_frame(self) -> DataFrame:
+        """Return a pandas data frame with the index `time` (s) and one column for each of `columns`.
+
+        Raises MissingExtraError without pandas, and what `values` raises.
+        """
+        try:
+            from pandas import DataFrame, Index
+        except ImportError as error:
+            raise MissingExtraError("a data frame", "notebook", "pandas") from error
+        return DataFrame(self.values, index=Index(self.time, name="time"), columns=list(self.columns))
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return a part, shape (n, width) or of a matrix (n, *shape), or a column, shape (n,).
+
+        Raises RecordingError for a name that is in neither `fields` nor `columns`.
+        """
+        if name in self._blocks:
+            part = self.values[:, self._blocks[name]]
+            shape = () if self._declared is None else self._declared.shape
+            return part.reshape(len(part), *shape) if shape else part
+        if name in self._columns:
+            return self.values[:, self._columns[name]]
+        raise RecordingError(
+            f"port '{self.name}' has no field '{name}'.{did_you_mean(name, [*self._blocks, *self._columns])}"
+        )
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return self._bag.counts[self.topic]
+
+    def __repr__(self) -> str:
+        about = [self.type, f"{len(self):,} messages"]
+        about += [f"in {self.unit}"] if self.unit else []
+        if has_vector(self.type):
+            about += [f"frame {self.frame}"] if self.frame else []
+            about.append(f"fields {', '.join(self.fields)}")
+        return f"<Series {self.name}: {'; '.join(about)}>"
+
+    @cached_property
+    def _content(self) -> tuple[NDArray[np.int64], list[bytes]]:
+        return self._bag.column(self.topic)
+
+    @property
+    def _times_ns(self) -> NDArray[np.int64]:
+        return self._content[0]
+
+    @cached_property
+    def _codec(self) -> VectorCodec | None:
+        """The layout of the first message; None if there is no message."""
+        if not has_vector(self.type):
+            raise RecordingError(
+                f"'{self._bag.file}': '{self.name}' is of type {self.type}, which has no vector form: use its"
+                " messages()"
+            )
+        times_ns, payloads = self._content
+        if not payloads:
+            return None
+        with self._located(int(times_ns[0])):
+            return VectorCodec(output_port(self.name, self.type, payloads[0]))
+
+    @cached_property
+    def _port(self) -> Port:
+        """The port as its first message shows it, else as it was declared."""
+        codec = self._codec if has_vector(self.type) else None
+        if codec is not None:
+            return codec.port
+        return self._declared or Port(name=self.name, causality="output", type=self.type)
+
+    @cached_property
+    def _blocks(self) -> dict[str, slice]:
+        codec = self._codec
+        return {} if codec is None else {name: at for name, at in codec.fields.items() if "." not in name}
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        codec = self._codec
+        if codec is None:
+            return {}
+        found: dict[str, int] = {}
+        for block, at in self._blocks.items():
+            width = at.stop - at.start
+            known = [name for name in codec.fields if name.startswith(f"{block}.")]
+            joints = [f"{block}.{joint}" for joint in self.names]
+            numbered = [f"{block}.{i}" for i in range(width)] if width > 1 else [block]
+            found |= dict(zip(known or joints or numbered, range(at.start, at.stop), strict=True))
+        return found
+
+    def _row(self, codec: VectorCodec, time_ns: int, payload: bytes) -> Vector:
+        with self._located(time_ns):
+            return codec.from_message(decode(codec.model, payload))
+
+    def _located(self, time_ns: int) -> AbstractContextManager[None]:
+        return locating(self._bag, self.topic, time_ns)

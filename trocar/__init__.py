@@ -1,0 +1,127 @@
+"""The public names of Trocar: everything that a plug-in, a notebook or an example imports.
+
+    import trocar
+
+    summary = trocar.run("palpation", set={"duration": "2 s"}, record="recordings/palpation")
+    joints = trocar.Recording(summary.recording)["robot.PSM1/measured_js"]
+    joints.time, joints["position"]     # (n,) s of simulated time, (n, 6) rad and m
+
+What is in `__all__` here, in `trocar.messages` (ROS 2 messages) and in `trocar.quantities` (parameters with
+units) is public. All other modules of the distribution (`schemas`, `robots`, `hub`, `engines`, `controllers`,
+`devices`, `configs`) are private: they may change in any release. `python -m trocar` is the command line.
+
+Sessions          `run`, `verify`, `load_scenario`, `run_in_process`
+Results           `Recording`, `Series`, `Summary`, `VerifySummary`
+Participants      `Stepped`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`, `Sample`, `Value`,
+                  `state_hash`, `restore_arrays`
+Power bonds       `BondSide`, `BondPlan`, `ForceSide`, `MotionSide`
+Conformance       `check_engine`, `check_device`
+Kinematics        `chain`, `inverse`
+Errors            `TrocarError`, the root of all errors that are raised on purpose
+
+Names are imported when they are first used, so `import trocar` itself takes a few milliseconds.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hub.observation.summary import Summary
+    from hub.participant import (
+        BondPlan,
+        Device,
+        ForceSide,
+        Inputs,
+        MotionSide,
+        Outputs,
+        Params,
+        Sample,
+        Setup,
+        Stepped,
+        Value,
+        restore_arrays,
+        state_hash,
+    )
+    from hub.recording.recording import Recording
+    from hub.recording.series import Series
+    from hub.testing import check_device, check_engine, run_in_process
+    from hub.verify import VerifySummary
+    from robots.dvrk.arms import chain
+    from robots.dvrk.inverse import inverse
+    from schemas.errors import TrocarError
+    from schemas.ports import BondSide, Port
+    from trocar.sessions import load_scenario, run, verify
+
+__all__ = [
+    "BondPlan",
+    "BondSide",
+    "Device",
+    "ForceSide",
+    "Inputs",
+    "MotionSide",
+    "Outputs",
+    "Params",
+    "Port",
+    "Recording",
+    "Sample",
+    "Series",
+    "Setup",
+    "Stepped",
+    "Summary",
+    "TrocarError",
+    "Value",
+    "VerifySummary",
+    "chain",
+    "check_device",
+    "check_engine",
+    "inverse",
+    "load_scenario",
+    "restore_arrays",
+    "run",
+    "run_in_process",
+    "state_hash",
+    "verify",
+]
+
+_MODULES = {
+    "hub.observation.summary": ("Summary",),
+    "hub.participant": (
+        "BondPlan",
+        "Device",
+        "ForceSide",
+        "Inputs",
+        "MotionSide",
+        "Outputs",
+        "Params",
+        "Sample",
+        "Setup",
+        "Stepped",
+        "Value",
+        "restore_arrays",
+        "state_hash",
+    ),
+    "hub.recording.recording": ("Recording",),
+    "hub.recording.series": ("Series",),
+    "hub.testing": ("check_device", "check_engine", "run_in_process"),
+    "hub.verify": ("VerifySummary",),
+    "robots.dvrk.arms": ("chain",),
+    "robots.dvrk.inverse": ("inverse",),
+    "schemas.errors": ("TrocarError",),
+    "schemas.ports": ("BondSide", "Port"),
+    "trocar.sessions": ("load_scenario", "run", "verify"),
+}
+_ORIGINS = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used (PEP 562)."""
+    if name not in _ORIGINS:
+        raise AttributeError(f"module 'trocar' has no public name '{name}'; it has {', '.join(__all__)}")
+    value = globals()[name] = getattr(import_module(_ORIGINS[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
