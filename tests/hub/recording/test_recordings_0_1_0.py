@@ -1,6 +1,7 @@
 """What version 0.1.0 recorded is read and verified by this one, whatever names have changed since."""
 
 import lzma
+from collections import defaultdict
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import pytest
 from hub.recording.bag import output_port
 from hub.recording.recording import Recording
 from hub.verify import verify
-from schemas.vectors import VectorCodec, has_vector
+from schemas.codec import decode
+from schemas.vectors import Vector, VectorCodec, has_vector
 
 FILES = sorted((Path(__file__).parent / "recordings_0_1_0").glob("*.mcap.xz"))
 KINDS = {
@@ -62,14 +64,20 @@ def test_an_old_recording_is_read(recorded: tuple[str, Recording]) -> None:
     assert all(horizon == start for (_, horizon), (start, _) in pairwise(granted))
     for participant in plan.order:
         assert sum(len(ack.state_hash) for ack in recording.acks(participant)) > 0
-    for topic, kind in recording.topics.items():
-        if has_vector(kind):
-            series = recording[topic]
-            assert len(series.time) == len(series.values) == recording.counts[topic]
-            assert np.isfinite(series.values).all()
-            one_by_one = VectorCodec(output_port(topic, kind, next(recording.messages(topic)).payload))
-            rows = [one_by_one.decode(message.payload) for message in recording.messages(topic)]
-            assert np.array_equal(rows, series.values)
+    codecs: dict[str, VectorCodec] = {}
+    rows: defaultdict[str, list[Vector]] = defaultdict(list)
+    for message in recording.messages():
+        if has_vector(message.type):
+            topic = message.topic
+            if topic not in codecs:
+                codecs[topic] = VectorCodec(output_port(topic, message.type, message.payload))
+            codec = codecs[topic]
+            rows[topic].append(codec.from_message(decode(codec.model, message.payload)))
+    assert rows
+    for topic, values in rows.items():
+        series = recording[topic]
+        assert len(series.time) == len(series) == recording.counts[topic]
+        assert np.array_equal(series.values, values)
 
 
 def test_an_old_recording_is_verified(recorded: tuple[str, Recording]) -> None:
