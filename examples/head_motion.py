@@ -1,10 +1,11 @@
-"""Write the head of the surgeon in the scenario teleop: pose, velocity and the wish to turn or to move the
-camera, as a rosbag2 directory.
+"""Write the surgeon's head of the scenario teleop as a rosbag2 directory.
+
+Its topics are pose, velocity, and the mode of the camera (turn or move).
 
     python examples/head_motion.py configs/data/head
 
 The head looks left, right, up and back, leans to its right shoulder, comes nearer and goes back. Each
-movement is one of minimum jerk (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3), slower than the endoscope's
+movement is of minimum jerk (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3), slower than the endoscope's
 joints may move. Axes are those of REP 103 (x ahead, y left, z up) in the base frame and in the head's own,
 which start as one.
 """
@@ -13,17 +14,15 @@ from __future__ import annotations
 
 import shutil
 import sys
-from pathlib import Path
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from robots import rotation
-from schemas.codec import encode, typestore
-from schemas.message import Message
-from schemas.ros import (
+from trocar import write_bag
+from trocar.messages import (
     Header,
+    Message,
     Point,
     Pose,
     PoseStamped,
@@ -76,6 +75,13 @@ def motion() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.concatenate(values), np.concatenate(rates)
 
 
+def turned(vector: NDArray[np.float64]) -> Quaternion:
+    """Return the rotation vector `vector`, rad, as a quaternion."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = (vector * (sin(angle / 2) / angle if angle > 1e-6 else 0.5)).tolist()
+    return Quaternion(x=x, y=y, z=z, w=cos(angle / 2))
+
+
 def messages() -> list[tuple[str, int, Message]]:
     """Return (topic, time in ns, message), oldest first."""
     values, rates = motion()
@@ -84,8 +90,7 @@ def messages() -> list[tuple[str, int, Message]]:
     for k, (value, rate) in enumerate(zip(values, rates, strict=True)):
         time_ns = k * 10**9 // RATE_HZ
         header = Header(stamp=Time.from_ns(time_ns), frame_id=FRAME)
-        x, y, z, w = rotation.exp(value[:3]).tolist()
-        pose = Pose(position=Point(x=float(value[3])), orientation=Quaternion(x=x, y=y, z=z, w=w))
+        pose = Pose(position=Point(x=float(value[3])), orientation=turned(value[:3]))
         twist = Twist(
             linear=Vector3(x=float(rate[3])),
             angular=Vector3(x=float(rate[0]), y=float(rate[1]), z=float(rate[2])),
@@ -99,19 +104,6 @@ def messages() -> list[tuple[str, int, Message]]:
     return found
 
 
-def write(directory: Path) -> None:
-    """Write the motion into a new directory, replacing an old one."""
-    shutil.rmtree(directory, ignore_errors=True)
-    writer = Writer(directory, version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        connections = {
-            topic: writer.add_connection(topic, kind.ros_type, typestore=typestore())
-            for topic, kind in (("/pose", PoseStamped), ("/twist", TwistStamped), ("/mode", StringMessage))
-        }
-        for topic, time_ns, message in messages():
-            writer.write(connections[topic], time_ns, encode(message))
-
-
 if __name__ == "__main__":
-    write(Path(sys.argv[1]))
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
+    write_bag(sys.argv[1], messages())

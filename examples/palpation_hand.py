@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import shutil
 import sys
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from schemas.codec import encode, typestore
-from schemas.ros import Header, Point, Pose, PoseStamped, Time
+from trocar import write_bag
+from trocar.messages import Header, Point, Pose, PoseStamped, Time
 
 RATE_HZ = 250
 SCALE = 0.2
@@ -33,8 +32,9 @@ HOVER_MM = CONTACT_MM + 1.5
 
 
 def way_points() -> list[tuple[float, float, float]]:
-    """Return (seconds, x in mm, z in mm): approach, three presses of growing depth, a drag along the surface,
-    retreat.
+    """Return (seconds, x in mm, z in mm) of each way point.
+
+    Approach, three presses of growing depth, a drag along the surface, retreat.
     """
     points = [(0.5, 0.0, 0.0), (2.0, 0.0, HOVER_MM)]
     for depth_mm, seconds in ((2.0, 1.2), (4.0, 1.4), (6.0, 1.6)):
@@ -58,21 +58,14 @@ def hand_path() -> NDArray[np.float64]:
     return np.round(np.concatenate(pieces) / RESOLUTION_M) * RESOLUTION_M
 
 
-def write(directory: Path) -> None:
-    """Write the path into a new directory, replacing an old one."""
-    shutil.rmtree(directory, ignore_errors=True)
-    writer = Writer(directory, version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        connection = writer.add_connection("/pose", PoseStamped.ros_type, typestore=typestore())
-        for index, (x, y, z) in enumerate(hand_path()):
-            time_ns = index * 10**9 // RATE_HZ
-            pose = PoseStamped(
-                header=Header(stamp=Time.from_ns(time_ns), frame_id="stylus_base"),
-                pose=Pose(position=Point(x=x, y=y, z=z)),
-            )
-            writer.write(connection, time_ns, encode(pose))
+def messages() -> Iterator[tuple[str, int, PoseStamped]]:
+    """Yield (topic, time in ns, message), oldest first."""
+    for index, (x, y, z) in enumerate(hand_path()):
+        time_ns = index * 10**9 // RATE_HZ
+        header = Header(stamp=Time.from_ns(time_ns), frame_id="stylus_base")
+        yield "/pose", time_ns, PoseStamped(header=header, pose=Pose(position=Point(x=x, y=y, z=z)))
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]))
+    shutil.rmtree(sys.argv[1], ignore_errors=True)
+    write_bag(sys.argv[1], messages())

@@ -11,29 +11,21 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rosbags.highlevel import AnyReader
-
-from schemas.codec import decode
-from schemas.ros import CompressedImage
+from trocar import Recording
+from trocar.messages import CompressedImage
 
 
-def write(recording: Path, folder: Path) -> None:
+def write(recording: Recording, folder: Path) -> None:
     """Write `<participant>_<left or right>.<format>` to `folder` for every camera of `recording`."""
     folder.mkdir(parents=True, exist_ok=True)
-    with AnyReader([recording]) as reader:
-        cameras = [
-            connection for connection in reader.connections if connection.msgtype == CompressedImage.ros_type
-        ]
-        last = {connection.topic: data for connection, _, data in reader.messages(cameras)}
-        for topic, data in last.items():
-            picture = decode(CompressedImage, bytes(data))
-            participant, eye = (
-                topic.removeprefix("/engine/").removesuffix("/image_raw/compressed").split("/out/")
-            )
-            file = folder / f"{participant}_{eye}.{picture.format}"
+    for port, kind in recording.ports.items():
+        if kind == CompressedImage.ros_type and len(recording[port]):
+            *_, (_, picture) = recording[port].messages()
+            camera = port.removesuffix("/image_raw/compressed").replace(".", "_")
+            file = folder / f"{camera}.{picture.format}"
             file.write_bytes(picture.data.tobytes())
             print(file)
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]), Path(sys.argv[2]))
+    write(Recording(sys.argv[1]), Path(sys.argv[2]))

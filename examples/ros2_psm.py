@@ -1,5 +1,4 @@
-"""Home PSM1 and move it there and back, on a console machine with ROS 2 and crtk_msgs: as it is done on a
-dVRK.
+"""Home PSM1 and move it there and back, as on a dVRK, from a machine with ROS 2 and crtk_msgs.
 
 Where the simulation is, `trocar run ros`; where ROS is, `RMW_IMPLEMENTATION=rmw_zenoh_cpp python3
 ros2_psm.py` (docs/ros.md).
@@ -28,7 +27,7 @@ class Arm:
         self.until(lambda: self.states and self.position is not None, f"the states of /{name}")
         self.until(
             lambda: self.state_command.get_subscription_count() and self.move_jp.get_subscription_count(),
-            f"who heeds commands to /{name}",
+            f"a subscriber of the commands to /{name}",
         )
 
     def _measured(self, message):

@@ -1,10 +1,9 @@
-"""Write what stands for a real dVRK in the scenarios `ros-masters` and `ros-mirror`: its topics, as rosbag2
-directories.
+"""Write the topics of a real dVRK in the scenarios `ros-masters` and `ros-mirror` as rosbag2 directories.
 
     python examples/ros_recordings.py configs/data
 
-`masters`: a surgeon at the console, who homes the arms. Both masters are told at 100 Hz, as the dVRK
-publishes; the right one moves twice to the right, with the clutch pressed on its way back, and closes its
+`masters`: a surgeon at the console, who homes the arms. Both masters are published at 100 Hz, as by a dVRK;
+the right one moves twice to the right, with the clutch pressed on its way back, and closes its
 gripper; at last both drag the picture to the right with the camera pedal pressed. `real_arms`: PSM1 and ECM,
 moving. All movements are of minimum jerk (Flash and Hogan 1985, J. Neurosci. 5(7), eq. 3), so that velocities
 are those of the positions.
@@ -18,16 +17,24 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from robots.dvrk import ecm, psm
-from schemas.codec import encode, typestore
-from schemas.crtk import OperatingState
-from schemas.message import Message
-from schemas.ros import BoolMessage, EmptyMessage, Header, JointState, Joy, Point, Pose, PoseStamped, Time
+from trocar import chain, write_bag
+from trocar.messages import (
+    BoolMessage,
+    EmptyMessage,
+    Header,
+    JointState,
+    Joy,
+    Message,
+    OperatingState,
+    Point,
+    Pose,
+    PoseStamped,
+    Time,
+)
 
 RATE_HZ = 100
-Told = Iterator[tuple[float, str, Message]]
+Rows = Iterator[tuple[float, str, Message]]
 """Time (s), topic, message."""
 
 
@@ -46,15 +53,20 @@ def between(times: tuple[float, ...], values: list[list[float]], t: float) -> tu
     )
 
 
+def names(arm: str) -> tuple[str, ...]:
+    """Return the names of the joints of an arm."""
+    return tuple(joint.name for joint in chain(arm).joints)
+
+
 def joints(
     names: tuple[str, ...], times: tuple[float, ...], values: list[list[float]], t: float
 ) -> JointState:
-    """Return what a real arm tells of its joints at `t`."""
+    """Return the joints of a real arm at `t` (s)."""
     position, velocity = between(times, values, t)
     return JointState(name=list(names), position=position, velocity=velocity, effort=np.zeros(len(names)))
 
 
-def masters() -> Told:
+def masters() -> Rows:
     """Yield the console of a surgeon, 8 s."""
     for master in ("MTML", "MTMR"):
         yield 0.0, f"/{master}/operating_state", OperatingState(state="ENABLED", is_homed=True)
@@ -85,7 +97,7 @@ def masters() -> Told:
             yield t, f"/{master}/gripper/measured_js", joints(("gripper",), (0.0, 2.5, 3.5, 8.0), closing, t)
 
 
-def real_arms() -> Told:
+def real_arms() -> Rows:
     """Yield two arms that move, 6 s."""
     times = (0.0, 0.5, 2.0, 3.5, 5.0, 6.0)
     for t in np.arange(0, 6 * RATE_HZ) / RATE_HZ:
@@ -97,35 +109,29 @@ def real_arms() -> Told:
         yield (
             t,
             "/PSM1/measured_js",
-            joints(psm.JOINT_NAMES, times, [ways[0], ways[0], ways[1], ways[2], ways[0], ways[0]], t),
+            joints(names("PSM1"), times, [ways[0], ways[0], ways[1], ways[2], ways[0], ways[0]], t),
         )
         yield (
             t,
             "/PSM1/jaw/measured_js",
             joints(("jaw",), times, [[0.0], [0.0], [0.8], [0.2], [0.0], [0.0]], t),
         )
-        here, there = list(ecm.HOME), [0.15, 0.1, 0.14, 0.2]
-        yield t, "/ECM/measured_js", joints(ecm.JOINT_NAMES, times, [here, here, there, there, here, here], t)
+        here, there = [0.0, 0.0, 0.12, 0.0], [0.15, 0.1, 0.14, 0.2]
+        yield t, "/ECM/measured_js", joints(names("ECM"), times, [here, here, there, there, here, here], t)
 
 
-def write(directory: Path, told: Told) -> None:
-    """Write a new directory, replacing an old one."""
-    shutil.rmtree(directory, ignore_errors=True)
-    writer = Writer(directory, version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        connections = {}
-        for t, topic, message in sorted(told, key=lambda row: row[0]):
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, message.ros_type, typestore=typestore())
-            time_ns = round(t * 1e9)
-            if isinstance(header := getattr(message, "header", None), Header):
-                message = message.model_copy(
-                    update={"header": header.model_copy(update={"stamp": Time.from_ns(time_ns)})}
-                )
-            writer.write(connections[topic], time_ns, encode(message))
+def stamped(rows: Rows) -> Iterator[tuple[str, int, Message]]:
+    """Yield (topic, time in ns, message), oldest first, with the times as stamps."""
+    for t, topic, message in sorted(rows, key=lambda row: row[0]):
+        time_ns = round(t * 1e9)
+        if isinstance(header := getattr(message, "header", None), Header):
+            stamp = Time.from_ns(time_ns)
+            message = message.model_copy(update={"header": header.model_copy(update={"stamp": stamp})})
+        yield topic, time_ns, message
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]) / "masters", masters())
-    write(Path(sys.argv[1]) / "real_arms", real_arms())
+    for name, rows in (("masters", masters()), ("real_arms", real_arms())):
+        directory = Path(sys.argv[1]) / name
+        shutil.rmtree(directory, ignore_errors=True)
+        write_bag(directory, stamped(rows))

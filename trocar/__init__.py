@@ -11,7 +11,7 @@ units) is public. All other modules of the distribution (`schemas`, `robots`, `h
 `devices`, `configs`) are private: they may change in any release. `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `load_scenario`, `run_in_process`
-Results           `Recording`, `Series`, `Summary`, `VerifySummary`
+Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `write_bag` for samples to play
 Participants      `Stepped`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`, `Sample`, `Value`,
                   `state_hash`, `restore_arrays`
 Power bonds       `BondSide`, `BondPlan`, `ForceSide`, `MotionSide`
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         restore_arrays,
         state_hash,
     )
+    from hub.recording.bag_output import write_bag
     from hub.recording.recording import Recording
     from hub.recording.series import Series
     from hub.testing import check_device, check_engine, run_in_process
@@ -83,6 +84,7 @@ __all__ = [
     "run_in_process",
     "state_hash",
     "verify",
+    "write_bag",
 ]
 
 _MODULES = {
@@ -102,6 +104,7 @@ _MODULES = {
         "restore_arrays",
         "state_hash",
     ),
+    "hub.recording.bag_output": ("write_bag",),
     "hub.recording.recording": ("Recording",),
     "hub.recording.series": ("Series",),
     "hub.testing": ("check_device", "check_engine", "run_in_process"),

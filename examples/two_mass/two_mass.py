@@ -1,22 +1,32 @@
-"""Two masses coupled by a spring-damper, each an engine of its own: the smallest co-simulation that can go
-wrong.
+"""Two masses coupled by a spring-damper, each an engine of its own: the smallest co-simulation with a bond.
 
-Mass 1 takes a force and gives position and velocity; mass 2 carries the coupling spring, takes position and
-velocity and gives the force. Each is integrated in small sub-steps, so that all error seen comes from the
-coupling.
+Mass 1 receives a force and returns position and velocity. Mass 2 carries the coupling spring: it receives
+position and velocity and returns the force. Each is integrated in small sub-steps, so that any error comes
+from the coupling.
 """
 
 import numpy as np
 
-from hub.participant import ForceSide, Inputs, MotionSide, Outputs, Params, Setup, Stepped, state_hash
-from schemas.ports import BondSide, Port
+from trocar import (
+    BondSide,
+    ForceSide,
+    Inputs,
+    MotionSide,
+    Outputs,
+    Params,
+    Port,
+    Setup,
+    Stepped,
+    state_hash,
+)
 
 SUB_STEPS = 50
 
 
 class MassParams(Params):
-    """One mass on a spring-damper to ground, in SI units; on mass 2 also the coupling, and where mass 1
-    starts.
+    """One mass on a spring-damper to ground, in SI units.
+
+    Of mass 2 also the coupling, and the position at which mass 1 starts.
     """
 
     mass: float
@@ -29,7 +39,7 @@ class MassParams(Params):
 
 
 class Mass(Stepped):
-    """Mass 1: moves under the force it is given."""
+    """Mass 1: moves under the force that it receives."""
 
     params_model = MassParams
     ports: tuple[Port, ...] = ()
@@ -64,7 +74,7 @@ class Mass(Stepped):
 
 
 class SprungMass(Mass):
-    """Mass 2: carries the coupling spring-damper and gives its force."""
+    """Mass 2: carries the coupling spring-damper and returns its force."""
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:

@@ -47,6 +47,7 @@ PUBLIC = [
     "run_in_process",
     "state_hash",
     "verify",
+    "write_bag",
 ]
 TYPE_ALIASES = {"Outputs", "Value"}  # a text beside them says what they are; Python keeps none for an alias
 
