@@ -1,4 +1,4 @@
-"""What works on this machine, and for what does not, the line that mends it."""
+"""What works on this machine, and the line that mends what does not."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, entry_points
 from importlib.util import find_spec
 
+from hub.import_names import NAMES, collisions
 from hub.planning import registry
 from hub.security import credentials
 from hub.transport.endpoints import free_endpoint
@@ -21,7 +22,7 @@ __all__ = ["Finding", "as_json", "examine"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at. `remedy` is the line that mends it, where it does not work."""
+    """One thing that was checked. `remedy` is the line that mends it if it does not work."""
 
     area: str
     name: str
@@ -49,6 +50,7 @@ def examine() -> list[Finding]:
     """
     sections: tuple[Callable[[], Iterator[Finding]], ...] = (
         _python,
+        _import_names,
         _zenoh,
         _certificates,
         _extras,
@@ -69,6 +71,26 @@ def _python() -> Iterator[Finding]:
         "install Python 3.11 or newer",
         needed=True,
     )
+
+
+def _import_names() -> Iterator[Finding]:
+    """Check that no other distribution brings modules of our names: one hides or overwrites the other."""
+    found = collisions()
+    if not found:
+        yield Finding("base", "import names", True, f"{', '.join(NAMES)} are Trocar's alone", needed=True)
+    for one in found:
+        brought = f"also brought by {', '.join(one.others)}" if one.others else "also on the import path"
+        yield Finding(
+            "base",
+            f"import {one.name}",
+            False,
+            f"'{one.name}' is {brought}; Python imports {one.file}, which is of"
+            f" {one.owner or 'no distribution'}",
+            "python -m venv trocar-env, and install trocar there alone"
+            + (f"; or pip uninstall {' '.join(one.others)}" if one.others else "")
+            + ", then pip install --force-reinstall --no-deps trocar",
+            needed=one.owner != "trocar",
+        )
 
 
 def _zenoh() -> Iterator[Finding]:
@@ -97,7 +119,7 @@ def _zenoh() -> Iterator[Finding]:
 
 
 def _certificates() -> Iterator[Finding]:
-    """Look at the certificates of this user, by which a hub and other machines know each other."""
+    """Check the certificates of this user, by which a hub and other machines identify each other."""
     directory = credentials.default_directory()
     files = [file for file in sorted(directory.glob("*.pem")) if file.name != "ca.pem"]
     if not files:

@@ -71,7 +71,7 @@ class Series:
     @property
     def time(self) -> Vector:
         """Simulated time of each message, s, shape (n,)."""
-        return self._times_ns.astype(np.float64) * 1e-9
+        return self._times_ns / 1e9
 
     @cached_property
     def values(self) -> NDArray[np.float64]:
@@ -97,7 +97,7 @@ class Series:
         for time_ns, payload in zip(self._times_ns.tolist(), self._content[1], strict=True):
             with self._located(time_ns):
                 message = decode(model, payload)
-            yield time_ns * 1e-9, message
+            yield time_ns / 1e9, message
 
     def to_frame(self) -> DataFrame:
         """Return a pandas data frame with the index `time` (s) and one column for each of `columns`.

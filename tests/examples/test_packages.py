@@ -3,41 +3,29 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from tests.wheel.environments import install, succeed, with_our_packages
+
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PACKAGES = sorted(file.parent for file in EXAMPLES.glob("*/pyproject.toml"))
 SCENARIOS = sorted(EXAMPLES.glob("*/*.yaml"))
-CLEAN = {key: value for key, value in os.environ.items() if key not in {"PYTHONPATH", "VIRTUAL_ENV"}}
-
-
-def succeed(*command: str | Path, cwd: Path) -> str:
-    words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, env=CLEAN, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
 def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The interpreter of a new environment: the packages of this one, and the examples installed into it."""
-    directory = tmp_path_factory.mktemp("environment") / "venv"
-    succeed(sys.executable, "-m", "venv", "--without-pip", directory, cwd=directory.parent)
-    python = directory / "bin" / "python"
-    packages = succeed(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=directory)
-    here = [place for place in sys.path if "site-packages" in place]
-    root = str(EXAMPLES.parent)
-    (Path(packages.strip()) / "this_environment.pth").write_text("\n".join([*here, root]) + "\n")
-    copies = shutil.copytree(EXAMPLES, directory.parent / "examples")
-    command = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps"]
+    """The interpreter of a new environment with Trocar as it stands here and the examples."""
+    place = tmp_path_factory.mktemp("environment")
+    there = with_our_packages(place / "venv")
+    (root,) = (place / "venv").glob("lib/*/site-packages")
+    (root / "trocar.pth").write_text(f"{EXAMPLES.parent}\n")
+    copies = shutil.copytree(EXAMPLES, place / "examples")
     sources = [word for package in PACKAGES for word in ("--editable", copies / package.name)]
-    succeed(*command, "--no-build-isolation", *sources, cwd=directory.parent)
-    return python
+    install(there, "--no-deps", "--no-build-isolation", *sources)
+    return there / "python"
 
 
 def test_each_example_is_small_and_has_a_line() -> None:

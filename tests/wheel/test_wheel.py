@@ -1,43 +1,21 @@
-"""The built wheel in clean virtual environments: without extras, and with all of them."""
+"""The built wheel in clean environments: without extras, with all of them, beside another distribution."""
 
+import importlib.metadata
 import json
-import os
 import subprocess
 import sys
 import tomllib
 import zipfile
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from hub.import_names import NAMES
 from tests.devices.standins import build as standins
 from tests.hub.authorities import free_port
+from tests.wheel.environments import CLEAN, bare, install, run, succeed, with_our_packages
 
 ROOT = Path(__file__).resolve().parents[2]
-CLEAN = {
-    key: value
-    for key, value in os.environ.items()
-    if key not in {"PYTHONPATH", "PYTHONSAFEPATH", "VIRTUAL_ENV"}
-}
-
-
-def run(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [str(part) for part in command],
-        cwd=cwd,
-        env=CLEAN,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-
-
-def succeed(*command: str | Path, cwd: Path) -> str:
-    done = run(*command, cwd=cwd)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.fixture(scope="session")
@@ -48,57 +26,33 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(out.glob("*.whl"))
 
 
-def install(target: str, directory: Path) -> Path:
-    """Return the `bin` of a new virtual environment with `target` installed in it."""
-    succeed(sys.executable, "-m", "venv", "--without-pip", directory, cwd=directory.parent)
-    succeed(
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        directory / "bin" / "python",
-        "install",
-        "--quiet",
-        target,
-        cwd=directory.parent,
-    )
-    return directory / "bin"
-
-
 @pytest.fixture(scope="session")
 def base(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return install(str(wheel), tmp_path_factory.mktemp("base") / "venv")
+    """Trocar and what it depends on, from the index; nothing of an extra (that of `touch` is empty)."""
+    there = bare(tmp_path_factory.mktemp("base") / "venv")
+    install(there, f"{wheel}[touch]")
+    return there
 
 
 @pytest.fixture(scope="session")
 def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return install(f"{wheel}[all]", tmp_path_factory.mktemp("full") / "venv")
-
-
-@pytest.fixture(scope="session")
-def device_host(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return install(f"{wheel}[touch]", tmp_path_factory.mktemp("device_host") / "venv")
+    """Trocar from the wheel, with the packages of all extras as they are installed here."""
+    there = with_our_packages(tmp_path_factory.mktemp("full") / "venv")
+    install(there, "--no-deps", wheel)
+    return there
 
 
 @pytest.fixture
 def stray(tmp_path: Path) -> Path:
     """A directory with modules whose names are those of our packages."""
-    for name in ("schemas", "robots", "hub", "engines", "controllers", "devices", "configs"):
+    for name in NAMES:
         (tmp_path / f"{name}.py").write_text("raise SystemExit('the stray module was imported')\n")
     return tmp_path
 
 
 def test_it_holds_the_packages_and_the_scenarios_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {
-        "schemas",
-        "robots",
-        "hub",
-        "engines",
-        "controllers",
-        "devices",
-        "configs",
-    }
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {*NAMES}
     assert {
         "configs/palpation.yaml",
         "configs/scenario.schema.json",
@@ -108,7 +62,7 @@ def test_it_holds_the_packages_and_the_scenarios_and_nothing_else(wheel):
 
 def test_without_extras_the_command_line_works(base, tmp_path):
     assert "Exit codes" in succeed(base / "trocar", "--help", cwd=tmp_path)
-    assert succeed(base / "trocar", "--version", cwd=tmp_path).strip() == version("trocar")
+    assert succeed(base / "trocar", "--version", cwd=tmp_path).strip() == importlib.metadata.version("trocar")
     findings = {
         f["name"]: f
         for f in json.loads(succeed(base / "trocar", "doctor", "--json", cwd=tmp_path))["findings"]
@@ -166,14 +120,16 @@ def test_with_all_extras_a_stray_module_in_the_working_directory_is_not_imported
     succeed(full / "trocar", "verify", "recording", cwd=stray)
 
 
-def test_a_device_host_pulls_no_simulator(device_host, tmp_path):
+def test_a_device_host_pulls_no_simulator(base, tmp_path):
     names = succeed(
-        device_host / "python",
+        base / "python",
         "-c",
         "import importlib.metadata as m; print(*(d.name for d in m.distributions()))",
         cwd=tmp_path,
     ).split()
     assert "trocar" in names
+    requirements = importlib.metadata.requires("trocar") or []
+    assert not [requirement for requirement in requirements if 'extra == "touch"' in requirement]
     assert not {
         "mujoco",
         "manifold3d",
@@ -184,13 +140,14 @@ def test_a_device_host_pulls_no_simulator(device_host, tmp_path):
         "matplotlib",
         "pyopenxr",
         "pygame-ce",
+        "pandas",
         "cryptography",
     } & {*names}
 
 
 @pytest.mark.skipif(not standins.USABLE, reason=standins.WHY_NOT)
 def test_a_device_host_joins_a_simulation_with_nothing_but_its_extra_and_its_certificate(
-    full, device_host, tmp_path
+    full, base, tmp_path
 ):
     library = standins.compile_library("hd.c", tmp_path / "libHD.so")
     certificates, carried, endpoint = tmp_path / "certs", tmp_path / "carried", f"tls/127.0.0.1:{free_port()}"
@@ -225,7 +182,7 @@ def test_a_device_host_joins_a_simulation_with_nothing_but_its_extra_and_its_cer
             for line in hub.stderr:
                 if "waiting for" in line and not joined:
                     join = [
-                        device_host / "trocar",
+                        base / "trocar",
                         "device",
                         "stylus",
                         "--connect",
@@ -241,5 +198,66 @@ def test_a_device_host_joins_a_simulation_with_nothing_but_its_extra_and_its_cer
             hub.kill()
             for host in joined:
                 host.terminate()
-                told = host.communicate()[1]
-    assert summary["latency"]["device to grant"]["stylus.right/pose"]["count"] > 100, told
+                errors = host.communicate()[1]
+    assert summary["latency"]["device to grant"]["stylus.right/pose"]["count"] > 100, errors
+
+
+def other_distribution(directory: Path) -> Path:
+    """Return a wheel of another distribution that has the import names `devices` and `schemas`."""
+    wheel = directory / "gadgets-2.0-py3-none-any.whl"
+    info = "gadgets-2.0.dist-info"
+    content = {
+        "devices/__init__.py": "GADGETS = 7\n",
+        "devices/lamp.py": "",
+        "schemas.py": "",
+        f"{info}/METADATA": "Metadata-Version: 2.1\nName: gadgets\nVersion: 2.0\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for name, text in content.items():
+            archive.writestr(name, text)
+        archive.writestr(f"{info}/RECORD", "".join(f"{name},,\n" for name in [*content, f"{info}/RECORD"]))
+    return wheel
+
+
+def test_another_distribution_with_our_import_names_is_reported(wheel, tmp_path):
+    there = with_our_packages(tmp_path / "venv")
+    install(there, "--no-deps", wheel)
+    install(there, "--no-deps", other_distribution(tmp_path))
+
+    def found() -> dict[str, dict[str, str]]:
+        findings = json.loads(run(there / "trocar", "doctor", "--json", cwd=tmp_path).stdout)["findings"]
+        return {f["name"]: f for f in findings if f["area"] == "base" and f["name"].startswith("import")}
+
+    overwritten, beside = found()["import devices"], found()["import schemas"]
+    assert len(found()) == 2
+    assert "'devices' is also brought by gadgets" in overwritten["detail"]
+    assert "devices/__init__.py, which is of gadgets" in overwritten["detail"]
+    assert overwritten["needed"]
+    assert (
+        "pip uninstall gadgets, then pip install --force-reinstall --no-deps trocar" in overwritten["remedy"]
+    )
+    assert "schemas/__init__.py, which is of trocar" in beside["detail"]  # a package goes before a module
+    assert not beside["needed"]
+
+    install(there, "--no-deps", "--force-reinstall", wheel)
+    assert "devices/__init__.py, which is of trocar" in found()["import devices"]["detail"]
+
+
+def test_a_folder_on_the_path_with_our_import_names_is_reported(full, tmp_path):
+    (tmp_path / "robots.py").write_text("")
+    script = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from hub import doctor; print(doctor.as_json("
+    )
+    out = succeed(full / "python", "-P", "-c", script + "[*doctor._import_names()]))", cwd=tmp_path)
+    (finding,) = json.loads(out)["findings"]
+    assert finding["detail"] == (
+        f"'robots' is also on the import path; Python imports {tmp_path}/robots.py, which is of no distribution"
+    )
+    assert not json.loads(out)["works"]
+
+
+def test_the_import_names_are_those_of_the_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]
+    assert {*project["hatch"]["build"]["targets"]["wheel"]["packages"]} == {*NAMES}
+    assert {*project["importlinter"]["root_packages"]} == {*project["pyright"]["include"]} == {*NAMES}
