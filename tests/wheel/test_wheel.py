@@ -1,11 +1,13 @@
 """The built wheel in clean environments: without extras, with all of them, beside another distribution."""
 
+import hashlib
 import importlib.metadata
 import json
 import subprocess
 import sys
 import tomllib
 import zipfile
+from base64 import urlsafe_b64encode
 from pathlib import Path
 
 import pytest
@@ -216,7 +218,12 @@ def other_distribution(directory: Path) -> Path:
     with zipfile.ZipFile(wheel, "w") as archive:
         for name, text in content.items():
             archive.writestr(name, text)
-        archive.writestr(f"{info}/RECORD", "".join(f"{name},,\n" for name in [*content, f"{info}/RECORD"]))
+        digests = {
+            name: urlsafe_b64encode(hashlib.sha256(text.encode()).digest()).rstrip(b"=").decode()
+            for name, text in content.items()
+        }
+        rows = [f"{name},sha256={digest}," for name, digest in digests.items()]
+        archive.writestr(f"{info}/RECORD", "\n".join([*rows, f"{info}/RECORD,,", ""]))
     return wheel
 
 
@@ -229,14 +236,14 @@ def test_another_distribution_with_our_import_names_is_reported(wheel, tmp_path)
         findings = json.loads(run(there / "trocar", "doctor", "--json", cwd=tmp_path).stdout)["findings"]
         return {f["name"]: f for f in findings if f["area"] == "base" and f["name"].startswith("import")}
 
-    overwritten, beside = found()["import devices"], found()["import schemas"]
-    assert len(found()) == 2
+    before = found()
+    overwritten, beside = before.pop("import devices"), before.pop("import schemas")
+    assert not before
     assert "'devices' is also brought by gadgets" in overwritten["detail"]
     assert "devices/__init__.py, which is of gadgets" in overwritten["detail"]
     assert overwritten["needed"]
-    assert (
-        "pip uninstall gadgets, then pip install --force-reinstall --no-deps trocar" in overwritten["remedy"]
-    )
+    remedy = "pip uninstall gadgets, then pip install --force-reinstall --no-deps trocar"
+    assert remedy in overwritten["remedy"]
     assert "schemas/__init__.py, which is of trocar" in beside["detail"]  # a package goes before a module
     assert not beside["needed"]
 
@@ -247,13 +254,13 @@ def test_another_distribution_with_our_import_names_is_reported(wheel, tmp_path)
 def test_a_folder_on_the_path_with_our_import_names_is_reported(full, tmp_path):
     (tmp_path / "robots.py").write_text("")
     script = (
-        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from hub import doctor; print(doctor.as_json("
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from hub import doctor; print(doctor.as_json([*doctor._import_names()]))"
     )
-    out = succeed(full / "python", "-P", "-c", script + "[*doctor._import_names()]))", cwd=tmp_path)
+    out = succeed(full / "python", "-P", "-c", script, cwd=tmp_path)
     (finding,) = json.loads(out)["findings"]
-    assert finding["detail"] == (
-        f"'robots' is also on the import path; Python imports {tmp_path}/robots.py, which is of no distribution"
-    )
+    imported = f"Python imports {tmp_path}/robots.py, which is of no distribution"
+    assert finding["detail"] == f"'robots' is also on the import path; {imported}"
     assert not json.loads(out)["works"]
 
 
