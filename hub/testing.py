@@ -48,8 +48,17 @@ def run_in_process(
 ) -> Summary:
     """Run a scenario with these instances in this process, unrecorded, and return its summary.
 
-    `scenario` is the tree of a scenario file; what it says of a participant may be left out, its kind always.
-    Raises what `Session.run` raises.
+        tree = {"name": "swing", "step": "1 ms", "duration": "1 s"}
+        summary = trocar.run_in_process(tree, {"pendulum": Pendulum("pendulum", PendulumParams())})
+
+    Args:
+        scenario: The tree of a scenario file. A participant may be left out of it, and so may its kind.
+        participants: The instances, by name.
+        directory: Where relative paths start; by default the working directory.
+
+    Raises:
+        ScenarioError: The scenario is not valid.
+        SessionError: The session failed.
     """
     given: Mapping[str, Any] = scenario.get("participants", {})
     specs = {name: {"kind": type(p).__name__, **given.get(name, {})} for name, p in participants.items()}
@@ -64,7 +73,7 @@ def run_in_process(
 def check_engine(
     make: Callable[[], Stepped],
     *,
-    period_ns: int,
+    period_ns: int = 1_000_000,
     inputs: Mapping[str, ArrayLike | Message | tuple[Message, ...]] | None = None,
     bonds: Mapping[str, BondPlan] | None = None,
     counts_steps: bool = False,
@@ -72,14 +81,14 @@ def check_engine(
 ) -> None:
     """Check that what `make` returns keeps the contract of an engine or a controller.
 
+        trocar.check_engine(lambda: Pendulum("pendulum", PendulumParams()), inputs={"torque": [0.1]})
+
     Args:
         make: Returns a new instance of the same participant, not configured, each time it is called.
         period_ns: The step to try it with, in nanoseconds; it must work at twice this step as well.
-        inputs: Value of each input that is not to be at its start value; events come at every step. The
-        position of a
-            bond's force side moves on with its velocity, so a velocity into a contact puts the work to the
-            test; on a
-            motion side a force without torque does.
+        inputs: Value of each input that is not to be at its start value; events arrive at every step. The
+            position of a bond's force side moves with its velocity, so a velocity into a contact tests the
+            work; on a motion side a force without torque does.
         bonds: The bonds to connect, by name; default: all, coupled by `impulse`.
         counts_steps: What it does depends on the number of its steps and not on how long they are.
         directory: Where relative paths start.
@@ -414,9 +423,17 @@ def check_device(
 ) -> None:
     """Check that what `make` returns keeps the contract of a device.
 
-    A device of the wall clock is read for a fifth of a second, one that follows the clock for as much
-    simulated time. `inputs` are values to write to its input ports, before each read; the start or neutral
-    value where none is given. Raises AssertionError: the message says what the contract asks for.
+        trocar.check_device(lambda: Wave("wave", WaveParams(clock="wall")))
+
+    A device in wall time is read for a fifth of a second, one in simulated time for as much of that.
+
+    Args:
+        make: Returns a new instance of the same device, not opened, each time it is called.
+        inputs: Values to write to its input ports before each read; by default the start or neutral value.
+        directory: Where relative paths start.
+
+    Raises:
+        AssertionError: The contract is broken; the message says where.
     """
     with make() as device:
         _check_declarations(device)

@@ -24,7 +24,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class VerifySummary:
-    """What the comparison found."""
+    """The result of a comparison: whether every state hash is the same, or the first that differs.
+
+    Examples:
+        found = trocar.verify("recordings/table")
+        found.same or (found.first_difference_step, found.first_difference_participant)
+    """
 
     recording: str
     same: bool

@@ -14,6 +14,9 @@ __all__ = ["BondSide", "Port", "bond_ports"]
 class Port(BaseModel):
     """A named, typed input or output of a participant.
 
+        Port(name="PSM1/tip_wrench", causality="output", type="geometry_msgs/msg/WrenchStamped")
+        Port(name="force", causality="input", unit="N", start=(0.0,))     # an array of one number
+
     A *signal* has one value at a time, a float64 vector whenever the type has a fixed layout (see
     `schemas.vectors`). An *event* port carries a queue of messages of which none is lost. A signal may feed
     an event port: each new value is one message.
@@ -58,7 +61,10 @@ class Port(BaseModel):
 class BondSide(BaseModel):
     """One end of a power bond.
 
-    The motion side gives pose and twist and takes a wrench, the force side the reverse.
+        BondSide(name="tip", side="motion", dof=3, effective_mass=0.3)
+        BondSide(name="probe", side="force", dof=3, stiffness=500.0, damping=1.0, proxy_mass=0.05)
+
+    The motion side outputs pose and twist and receives a wrench, the force side the reverse.
 
     `dof` 6 is a rigid frame (pose, twist, wrench); 1 to 3 are generalised coordinates (position, velocity,
     force). With `dof` 3 there may be several `points`, the contact spheres of one instrument: their

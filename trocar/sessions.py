@@ -37,7 +37,7 @@ def load_scenario(
     *,
     set: Mapping[str, Any] | None = None,  # noqa: A002  (the word of the command line)
 ) -> ScenarioFile:
-    """Return a validated scenario: `scenario`, `params` by participant, and `source`, the file it came from.
+    """Return a validated scenario: `scenario`, `params` by participant, and `source`, its file.
 
         trocar.load_scenario("palpation").scenario.step     # 1000000 ns
 
@@ -104,7 +104,7 @@ def verify(
         progress: Is called several times a second of wall time.
 
     Raises:
-        RecordingError: This is no recording of a session, or it is damaged.
+        RecordingError: Not a recording of a session, or a damaged one.
         SessionError: The session failed.
     """
     _warn_of_other_bits()

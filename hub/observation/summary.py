@@ -25,7 +25,12 @@ class Progress:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run was like."""
+    """The result of a run: how far and how fast it went, its state hash and its measures.
+
+    Examples:
+        summary = trocar.run("table")
+        summary.sim_time_s, summary.real_time_factor, summary.measures["peak_hand_force_n"]
+    """
 
     session: str
     state: str

@@ -16,15 +16,25 @@ from schemas.vectors import Vector
 __all__ = ["Outputs", "Params", "Participant", "Value"]
 
 Value = Vector | Message | tuple[Message, ...]
-"""A signal with a fixed layout is a vector, any other signal a message, an event port a tuple of messages."""
+"""The value of a port: a float64 vector of shape (size,), a message, or a tuple of messages.
+
+A signal with a fixed layout is a vector, any other signal a message, an event port a tuple of messages.
+"""
 
 
 Outputs = Mapping[str, Value]
-"""Port name to value. The arrays may be the same ones at every step: whoever keeps a value copies it."""
+"""Port name to value. The arrays may be the same ones at every step, so copy a value to keep it."""
 
 
 class Params(BaseModel):
-    """Base of the parameters of a participant kind, as they stand in a scenario. SI units after validation."""
+    """Base of the parameters of a participant kind, as they stand in a scenario; in SI units once validated.
+
+        class SpringParams(Params):
+            rest: Length = 0.08                                   # m; "80 mm" in a scenario
+            stiffness: Annotated[Stiffness, Field(gt=0)] = 100.0  # N/m
+
+    Unknown keys are errors, with file, line and column.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -34,7 +44,7 @@ class Participant(ABC):
     """The pydantic model of the kind's parameters."""
 
     def __init__(self, name: str, params: Any) -> None:
-        """Take the participant's name and an instance of `params_model`.
+        """Store the participant's name and an instance of `params_model`.
 
         Cheap: no package of an extra is imported here.
         """
@@ -48,7 +58,7 @@ class Participant(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Give everything back. May be called twice, and before or after a failed `configure` or `open`."""
+        """Release everything. May be called twice, and before or after a failed `configure` or `open`."""
 
     def __enter__(self) -> Self:
         return self

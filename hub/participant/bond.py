@@ -20,10 +20,18 @@ __all__ = ["ForceSide", "MotionSide"]
 
 
 class ForceSide:
-    """The force side's view of a bond: where the other side is inside the step, and what was exchanged."""
+    """The force side of a bond: the predicted motion of the other side in a step, impulse and work.
+
+    Examples:
+        side = ForceSide(self.bonds[0], setup.bonds["tip"])    # in configure
+        side.begin(inputs, h / 1e9)                            # then in each step, with sub-steps of dt:
+        spring = k * (side.position(tau) - x)                  # N, at tau seconds into the step
+        damper = b * (side.velocity(tau) - v)
+        side.add(spring, damper, tau, dt)
+        return side.result(spring, damper)                     # outputs: reaction and work
+    """
 
     def __init__(self, bond: BondSide, plan: BondPlan) -> None:
-        """Take the declared bond and its plan."""
         self._position, self._velocity, self.force_port = (port.name for port in bond_ports(bond))
         self._plan = plan
         self._size = bond.size
@@ -111,10 +119,17 @@ class ForceSide:
 
 
 class MotionSide:
-    """The motion side's view of a bond: the force to apply in each sub-step, and the work it does."""
+    """The motion side of a bond: the force to apply in each sub-step, and the work that it does.
+
+    Examples:
+        side = MotionSide(self.bonds[0], setup.bonds["tip"])   # in configure
+        side.begin(inputs, x, v)                               # then in each step, with sub-steps:
+        force = side.force(tau, x, v)                          # N, at tau seconds into the step
+        side.add(force, moved)                                 # m, in the sub-step
+        return side.result(x, v)                               # outputs: position, velocity, work
+    """
 
     def __init__(self, bond: BondSide, plan: BondPlan) -> None:
-        """Take the declared bond and its plan."""
         self.position_port, self.velocity_port, self.force_port = (port.name for port in bond_ports(bond))
         self._correction = plan.correction
         self._linear = bond.linear

@@ -19,14 +19,33 @@ __all__ = ["Device", "Sample"]
 
 @dataclass(frozen=True)
 class Sample:
-    """One message of a device, stamped in the clock of its port."""
+    """One message of a device, stamped in the clock of its port.
+
+    Examples:
+        Sample("pose", PoseStamped(header=Header(stamp=Time.from_ns(t), frame_id="stylus_base")))
+    """
 
     port: str
     message: Message
 
 
 class Device(Participant):
-    """A participant that lives in wall time, or, if it can play by a script, in simulated time."""
+    """A participant that lives in wall time or, if all its outputs are stamped with it, in simulated time.
+
+        class Pedal(Device):
+            ports = (Port(name="pressed", causality="output", type="std_msgs/msg/Float64", clock="wall"),)
+
+            def open(self, directory: Path) -> None:
+                self.handle = open_pedal()
+
+            def read(self, t: int) -> Iterable[Sample]:
+                return [Sample("pressed", Float64Message(data=self.handle.read()))]
+
+            def close(self) -> None:
+                self.handle.close()
+
+    Samples enter the simulation through inlets at communication points, and only there.
+    """
 
     read_period_ns: ClassVar[int] = 1_000_000
     """How often it is read in wall time where the scenario does not say; a haptic stylus moves and is felt at

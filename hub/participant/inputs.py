@@ -14,6 +14,9 @@ __all__ = ["Inputs"]
 class Inputs:
     """The inputs of one participant in one step.
 
+        force = inputs["force"]               # (size,), at the start of the step
+        later = inputs.at("force", 0.5e-3)    # (size,), 0.5 ms into the step
+
     `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the
     connection is linear: between the source's last two values while it is ahead, beyond them while it is not.
     The arrays belong to whoever produced them: read, do not write.
@@ -22,7 +25,7 @@ class Inputs:
     __slots__ = ("_events", "_rates", "_stale", "_values")
 
     def __init__(self, values: dict[str, Any]) -> None:
-        """Take the value of every input port at time 0; the host writes the later ones."""
+        """Store the value of every input port at time 0; the host writes the later ones."""
         self._values = values
         self._rates: dict[str, Vector] = {}
         self._events: dict[str, tuple[Message, ...]] = {}

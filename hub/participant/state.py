@@ -14,7 +14,11 @@ __all__ = ["restore_arrays", "state_hash"]
 
 
 def state_hash(*parts: bytes | Vector) -> int:
-    """Return a 64-bit hash of `parts`, the same on every machine that has the same bits."""
+    """Return a 64-bit hash of `parts`, the same on every machine that has the same bits.
+
+    Examples:
+        state_hash(self.position, self.velocity, b"grasped")
+    """
     digest = hashlib.blake2b(digest_size=8)
     for part in parts:
         digest.update(part if isinstance(part, bytes) else part.tobytes())
@@ -24,7 +28,10 @@ def state_hash(*parts: bytes | Vector) -> int:
 def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:
     """Write `state`, the bytes of `arrays` one after the other, back into them.
 
-    Raises StateError if it has another size.
+        state = position.tobytes() + velocity.tobytes()
+        restore_arrays(self.name, [position, velocity], state)
+
+    `participant` is the name for the message. Raises StateError if `state` has another size.
     """
     held = tuple(arrays)
     size = sum(array.nbytes for array in held)

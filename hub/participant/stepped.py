@@ -28,7 +28,11 @@ class Correction:
 
 @dataclass(frozen=True)
 class BondPlan:
-    """How one bond of this participant is coupled."""
+    """How one bond of a participant is coupled; passed on to its `ForceSide` or `MotionSide`.
+
+    Examples:
+        BondPlan(prediction="velocity", mean=True)     # algorithm `impulse`
+    """
 
     prediction: str
     """What the force side assumes of the motion inside a step: `hold`, `velocity` (x + v t) or `slope` (x + v
@@ -41,7 +45,7 @@ class BondPlan:
 
 @dataclass(frozen=True)
 class Setup:
-    """All that a participant learns when it is configured."""
+    """What `Stepped.configure` receives: the step, the directory and the bonds of the participant."""
 
     period_ns: int
     """Its step, in nanoseconds."""
@@ -51,7 +55,27 @@ class Setup:
 
 
 class Stepped(Participant):
-    """An engine or a controller: advances when, and as far as, it is told to."""
+    """An engine or a controller: it advances when, and as far as, the hub grants.
+
+        class Counter(Stepped):
+            ports = (Port(name="count", causality="output"),)
+
+            def configure(self, setup: Setup) -> Outputs:
+                self.count = np.zeros(1)
+                return {"count": self.count}
+
+            def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
+                self.count = self.count + 1
+                return {"count": self.count}
+
+            def state_hash(self) -> int:
+                return state_hash(self.count)
+
+            def close(self) -> None:
+                pass
+
+    Equal inputs must give equal bits: a step reads no clock and draws no random number without a seed.
+    """
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:

@@ -116,7 +116,7 @@ class Bag:
     def __init__(self, path: str | Path) -> None:
         """Open a rosbag2 directory or an MCAP file.
 
-        Raises RecordingError if it is none, is cut short, or holds messages that are not in CDR.
+        Raises RecordingError if it is neither, is cut short, or holds messages that are not in CDR.
         """
         self.file = bag_file(Path(path))
         with reading(self.file):
@@ -221,7 +221,7 @@ class Bag:
 
 
 class LocatedMessage(NamedTuple):
-    """Where one message stands in the records of a chunk."""
+    """The place of one message in the records of a chunk."""
 
     channel: int
     time_ns: int

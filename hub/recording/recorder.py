@@ -1,8 +1,8 @@
 """Records a session to a rosbag2 directory without slowing its steps.
 
-`write` puts a message into a bounded queue; a thread takes a chunk's worth at a time, lays it out, compresses
-and writes it (docs/decisions/0005-recorder.md). Nothing is lost silently: what does not fit, or comes after
-the disk is full, is counted, logged once and marks the recording as incomplete.
+`write` puts a message into a bounded queue; a thread builds chunks of them, compresses and writes these
+(docs/decisions/0005-recorder.md). Nothing is lost silently: a message that does not fit into the queue, or
+arrives when the disk is full, is counted, logged once, and marks the recording as incomplete.
 """
 
 from __future__ import annotations
@@ -25,16 +25,18 @@ from schemas.errors import RecordingError, did_you_mean
 __all__ = ["Recorder", "RecorderSummary"]
 
 CHUNK_BYTES = 64 * 2**10
-"""A killed process loses about this much; small, so that laying it out does not keep the interpreter from the
-step loop for long (docs/decisions/0005-recorder.md).
+"""A killed process loses about this much.
+
+Small, so that building a chunk does not hold the interpreter for long, which the step loop needs
+(docs/decisions/0005-recorder.md).
 """
 
 CHUNK_AGE_S = 1.0
-"""Or, where little is recorded, the messages of this much wall time."""
+"""A chunk is written after this much wall time at the latest."""
 
 MAX_QUEUED_BYTES = 64 * 2**20
 MAX_QUEUED_MESSAGES = 250_000
-"""More than either waits only if the disk stands still; then messages are dropped."""
+"""If more than either waits for the disk, messages are dropped."""
 
 _log = logging.getLogger(__name__)
 
@@ -52,7 +54,7 @@ class RecorderSummary:
     messages: int
     """Messages in the file."""
     dropped: int
-    """Messages that are not."""
+    """Messages that are not in the file."""
     bytes: int
     """Size of the file."""
     error: str | None
@@ -91,7 +93,7 @@ class Recorder:
     def channel(self, topic: str, type_name: str) -> int:
         """Return the number under which messages of `topic` are written.
 
-        Raises RecordingError for a type nobody knows.
+        Raises RecordingError for an unknown type.
         """
         if type_name not in typestore().types:
             raise RecordingError(

@@ -1,4 +1,4 @@
-"""Saves what is whole of a recording that was cut short: attachments, channels and every complete chunk."""
+"""Saves the complete part of a recording that was cut short: attachments, channels and whole chunks."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ class RecoverSummary:
 
 
 def recover(path: Path, output: Path | None = None) -> RecoverSummary:
-    """Write what is whole of the recording at `path` to the new rosbag2 directory `output`.
+    """Write the complete part of the recording at `path` to the new rosbag2 directory `output`.
 
-    Without `output` it is called as the recording is, with `-recovered` behind. Raises RecordingError if
-    `path` is no recording, or if `output` holds something already or cannot be written.
+    By default it has the name of the recording with `-recovered` appended. Raises RecordingError if `path` is
+    not a recording, or if `output` is not empty or cannot be written.
     """
     source = bag_file(path)
     with reading(source), source.open("rb") as stream:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise RecordingError(f"'{source}' is no MCAP file")
+            raise RecordingError(f"'{source}' is not an MCAP file")
     named = path.resolve()
     target = create_bag(
         output or named.with_name(f"{named.name if named.is_dir() else named.stem}-recovered")

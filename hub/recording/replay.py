@@ -1,4 +1,4 @@
-"""Republishes a recorded session, so that consoles see it as they would see it live."""
+"""Publishes a recorded session again, so that consoles see it as if it were live."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["ReplaySummary", "is_replayed", "replay"]
 
 @dataclass(frozen=True)
 class ReplaySummary:
-    """What was republished."""
+    """What was published again."""
 
     session: str
     messages: int
@@ -56,12 +56,14 @@ def replay(
     """Publish the recorded values on the keys of session `name`, by default the recorded one.
 
     `rate` is simulated seconds per wall second; 0 is as fast as it goes. Ctrl-C, or `stop` set by another
-    thread, ends it early. Raises RecordingError if nothing in the recording can be republished, or if `name`
-    is no session name.
+    thread, ends it early. Raises RecordingError if the recording has no outputs, or if `name` is not
+    a session name.
     """
     name = recording.session() if name is None else name
     if not valid_name(name):
-        raise RecordingError(f"'{name}' is no session name: a letter, then letters, digits and underscores")
+        raise RecordingError(
+            f"'{name}' is not a session name: a letter, then letters, digits and underscores"
+        )
     topics = [topic for topic in recording.topics if is_replayed(topic)]
     if not topics:
         raise RecordingError(

@@ -40,7 +40,7 @@ def report(recording: Recording, output: Path) -> None:
     traces = [trace for bond in scenario.bonds if (trace := _trace(recording, bond)) is not None]
     books = {bond.name: _book(recording, bond) for bond in scenario.bonds}
     statuses = list(recording.statuses())
-    page = Template((files("hub") / "report_page.html").read_text(encoding="utf-8"))
+    page = Template((files("hub.recording") / "report_page.html").read_text(encoding="utf-8"))
     text = page.substitute(
         title=escape(scenario.name),
         description=escape(scenario.description),

@@ -32,7 +32,7 @@ CONTACT_SHARE = 0.05
 shows 2 % in the palpation scenario."""
 
 _POINTS = 1200
-"""Points of a line; more cannot be told apart at the width of a page."""
+"""Points of a line; at the width of a page more make no difference."""
 
 _INK, _GRID = "#101112", "#d0d1d2"
 _SERIES = ("#c00001", "#c00002", "#c00003", "#c00004")

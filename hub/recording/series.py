@@ -33,7 +33,7 @@ class Series:
         joints["position.insertion"]    # (n,), m
 
     Attributes:
-        name: The port, `participant.port`, or the topic where it is none.
+        name: The port, `participant.port`, or the topic, where it is not a port.
         topic: The topic that holds it.
         type: The ROS type of its messages.
     """
@@ -50,7 +50,7 @@ class Series:
 
     @property
     def frame(self) -> str:
-        """The frame in which the values are expressed; empty where there is none."""
+        """The frame in which the values are expressed; empty if it has none."""
         return self._port.frame
 
     @property

@@ -21,11 +21,13 @@ DEFAULT_INSTRUMENT = "LARGE_NEEDLE_DRIVER_400006"
 def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
     """Return the kinematics of `arm` from `base_frame(arm)` to its tip.
 
+        psm = chain("PSM1", "400006")
+        tips = psm.forward(q)             # joints (..., 6), rad and m -> tip in PSM1_base (..., 4, 4), m
+
     Args:
         arm: one of `ARMS`.
-        tool: name or number of the instrument of a PSM (a large needle driver 400006 unless given), endoscope
-        of the ECM
-            (straight unless given); nothing for the others.
+        tool: Of a PSM, name or number of the instrument (default: large needle driver 400006). Of the ECM,
+            the endoscope (default: straight). None for the other arms.
 
     Raises:
         MotionError: no such arm or tool; the message says which there are.

@@ -64,6 +64,8 @@ _WRIST_ALPHAS = (0.0, -pi / 2, -pi / 2)
 def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     """Return joint positions, shape (..., n), inside the joint ranges, at which the tip has `pose`.
 
+        joints = inverse(psm, tips, near=home)     # (..., 4, 4), m -> (..., 6), rad and m
+
     Args:
         chain: a PSM with a wrist of three joints or none, or an ECM.
         pose: of the tip in the chain's base frame, shape (..., 4, 4).

@@ -145,7 +145,7 @@ def test_what_cannot_be_played(tmp_path: Path) -> None:
     problems = {
         "missing.mcap": "no recording at",
         "empty.mcap": "holds no messages",
-        "text.mcap": "is no MCAP file",
+        "text.mcap": "is not an MCAP file",
         "cut.mcap": "was cut short",
         "foreign.mcap": "unknown message type 'sensor_msgs/msg/PointCloud2'",
     }

@@ -112,7 +112,7 @@ def test_overwrites_nothing_and_wants_a_recording(session: Path, tmp_path: Path)
     with pytest.raises(RecordingError, match="is not empty"):
         recover(session, session)
     (tmp_path / "x.mcap").write_bytes(b"nothing like it")
-    with pytest.raises(RecordingError, match="is no MCAP file"):
+    with pytest.raises(RecordingError, match="is not an MCAP file"):
         recover(tmp_path / "x.mcap")
     assert not (tmp_path / "x-recovered").exists()
     with pytest.raises(RecordingError, match="no recording at"):

@@ -59,7 +59,7 @@ def test_the_pace_follows_the_stamps(recording: Recording) -> None:
 def test_another_name(recording: Recording) -> None:
     _, samples = _collect(lambda session: replay(recording, session, 0, name="encore"))
     assert {str(s.key_expr).split("/")[1] for s in samples} == {"encore"}
-    with pytest.raises(RecordingError, match="'no/name' is no session name"):
+    with pytest.raises(RecordingError, match="'no/name' is not a session name"):
         _collect(lambda session: replay(recording, session, 0, name="no/name"))
 
 
