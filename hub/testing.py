@@ -239,6 +239,15 @@ class _Rig:
         self._move()
         return hashed
 
+    def remembered(self) -> tuple[dict[str, Any], dict[str, Value], dict[str, float], int]:
+        """Return what this knows of the participant's past, for `go_back`."""
+        return dict(self._values), self.outputs, dict(self._work), self.time_ns
+
+    def go_back(self, before: tuple[dict[str, Any], dict[str, Value], dict[str, float], int]) -> None:
+        """Return to what `remembered` returned."""
+        values, self.outputs, work, self.time_ns = before
+        self._values, self._work = dict(values), dict(work)
+
     def _start(self, port: Port, inputs: Mapping[str, Any]) -> Any:
         codec = self._codecs[port.name].vector
         if port.name in inputs:
@@ -385,25 +394,14 @@ def _check_restore(rig: _Rig) -> None:
         state = rig.participant.save()
     except StateError:
         return
-    saved, values, outputs, work, time_ns = (
-        rig.hash,
-        dict(rig._values),
-        rig.outputs,
-        dict(rig._work),
-        rig.time_ns,
-    )  # pyright: ignore[reportPrivateUsage]
+    saved, before = rig.hash, rig.remembered()
     _require(
         isinstance(cast(Any, state), bytes), f"save() returns bytes, but it returned {type(state).__name__}"
     )
     first = [rig.step() for _ in range(_STEPS)]
     rig.participant.restore(state)
     _require(rig.hash == saved, "restore() brings back the state, but the state hash is another one")
-    rig._values, rig.outputs, rig._work, rig.time_ns = (
-        values,
-        outputs,
-        work,
-        time_ns,
-    )  # pyright: ignore[reportPrivateUsage]
+    rig.go_back(before)
     again = [rig.step() for _ in range(_STEPS)]
     _require(first == again, "what follows restore() is, bit for bit, what followed save()")
 

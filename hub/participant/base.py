@@ -40,6 +40,8 @@ class Params(BaseModel):
 
 
 class Participant(ABC):
+    """What engines, controllers and devices have in common: a name, parameters and ports."""
+
     params_model: ClassVar[type[Params]] = Params
     """The pydantic model of the kind's parameters."""
 
