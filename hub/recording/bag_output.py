@@ -30,10 +30,10 @@ def write_bag(directory: str | Path, rows: Iterable[tuple[str, int, Message]]) -
     Raises:
         RecordingError: The directory exists or cannot be written.
     """
-    writer = Writer(Path(directory), version=_METADATA_VERSION, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     connections: dict[str, Connection] = {}
     try:
+        writer = Writer(Path(directory), version=_METADATA_VERSION, storage_plugin=StoragePlugin.MCAP)
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         with writer:
             for topic, time_ns, message in rows:
                 if topic not in connections:

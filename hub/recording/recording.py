@@ -128,18 +128,17 @@ class Recording(Bag):
 
     def scenario(self) -> Scenario:
         """Return the resolved scenario. Raises RecordingError if the recording is not one of a session."""
+        if "scenario.json" not in self.attachments:
+            raise RecordingError(f"'{self.file}' holds no scenario: it was not recorded by `trocar run`")
+        cannot = f"'{self.file}': this version cannot read the scenario in it"
         try:
             return Scenario.model_validate(current_names(json.loads(self.attachments["scenario.json"])))
-        except KeyError:
-            raise RecordingError(
-                f"'{self.file}' holds no scenario: it was not recorded by `trocar run`"
-            ) from None
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             path = ".".join(str(part) for part in first["loc"])
-            raise RecordingError(
-                f"'{self.file}': this version cannot read the scenario in it: {path}: {first['msg']}"
-            ) from error
+            raise RecordingError(f"{cannot}: {path}: {first['msg']}") from error
+        except (AttributeError, KeyError, TypeError, ValueError) as error:  # not JSON, or not a scenario
+            raise RecordingError(f"{cannot}: {type(error).__name__}: {error}") from error
 
     def versions(self) -> dict[str, str]:
         """Return the version of each installed package at that time; empty if not recorded."""
