@@ -1,0 +1,92 @@
+"""Wrap the prose of the Markdown files at 100 characters: `python docs/tools/wrap.py [FILE ...]`.
+
+Tables, headings, fenced code and HTML stay as they are. A code span is never broken. The test
+`tests/docs/test_prose.py` fails where this script would change a file.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+WIDTH = 100
+_GLUE = "\x00"
+_ITEM = re.compile(r"^(\s*)((?:[-*+]|\d+\.)\s+)")
+_UNITS = "%|[numk]?(?:m|s|g|N|J|W|Hz|Pa)|deg(?:rees)?|rad|[kKMG]i?B|uJ|times"
+"""What stays on the line of the number before it."""
+_VERBATIM = re.compile(r"^\s*(\||#|<|!!!|\?\?\?|:::|\[[^\]]+\]:|---$)")
+
+
+def pages() -> list[Path]:
+    """Return every Markdown file that is held to the width."""
+    top = [ROOT / name for name in ("README.md", "CONTRIBUTING.md")]
+    return [*top, *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def wrapped(text: str) -> str:
+    """Return `text` with its paragraphs and list items wrapped."""
+    return "\n".join(_lines(text.splitlines())) + "\n"
+
+
+def _lines(lines: list[str]) -> Iterator[str]:
+    paragraph: list[str] = []
+    fence = ""
+    for line in lines:
+        opening = re.match(r"^\s*(```+|~~~+)", line)
+        if fence:
+            fence = "" if opening and opening[1].startswith(fence) else fence
+            yield line
+            continue
+        if opening or not line.strip() or _VERBATIM.match(line):
+            yield from _paragraph(paragraph)
+            if paragraph and line.lstrip().startswith("|"):
+                yield ""  # Python-Markdown needs it
+            paragraph = []
+            fence = opening[1] if opening else ""
+            yield line.rstrip()
+            continue
+        if _ITEM.match(line):
+            yield from _paragraph(paragraph)
+            if paragraph and not _ITEM.match(paragraph[0]):
+                yield ""
+            paragraph = []
+        paragraph.append(line)
+    yield from _paragraph(paragraph)
+
+
+def _paragraph(lines: list[str]) -> Iterator[str]:
+    if not lines:
+        return
+    item = _ITEM.match(lines[0])
+    first = item[0] if item else lines[0][: len(lines[0]) - len(lines[0].lstrip())]
+    rest = " " * len(first)
+    text = " ".join(line.strip() for line in [lines[0][len(first) :], *lines[1:]])
+    text = re.sub(r"`[^`]+`", lambda code: code[0].replace(" ", _GLUE), text)
+    text = re.sub(r" (?=(?:[-+*#|]|\d+\.)(?: |$))", _GLUE, text)  # a line must not begin like a list
+    text = re.sub(rf"(?<=\d) (?=(?:{_UNITS})(?:\W|$))", _GLUE, text)
+    filled = textwrap.fill(
+        text,
+        WIDTH,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    yield filled.replace(_GLUE, " ")
+
+
+def main(names: list[str]) -> None:
+    """Wrap the named files, or all of them."""
+    for path in [Path(name) for name in names] or pages():
+        text = path.read_text("utf-8")
+        if wrapped(text) != text:
+            path.write_text(wrapped(text), "utf-8")
+            sys.stdout.write(f"wrapped {path}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
