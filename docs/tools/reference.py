@@ -9,14 +9,14 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import click
 import typer.main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 
 import trocar
 from hub.command_line.app import app
@@ -84,7 +84,7 @@ def _from_root(name: str) -> str:
 def command_line() -> str:
     """Return the page on the command line."""
     root = typer.main.get_command(app)
-    if not isinstance(root, click.Group):
+    if not isinstance(root, TyperGroup):
         raise TypeError("the command line is a group of commands")
     lines = [
         "# Command line",
@@ -107,25 +107,25 @@ def command_line() -> str:
     return "\n".join(lines)
 
 
-def _commands(group: click.Group, path: str) -> Iterator[tuple[str, click.Command]]:
+def _commands(group: TyperGroup, path: str) -> Iterator[tuple[str, TyperCommand]]:
     for name, command in sorted(group.commands.items()):
-        if isinstance(command, click.Group):
+        if isinstance(command, TyperGroup):
             yield from _commands(command, f"{path} {name}")
         else:
             yield f"{path} {name}", command
 
 
-def _usage(path: str, command: click.Command) -> list[str]:
-    words = command.collect_usage_pieces(click.Context(command))
+def _usage(path: str, command: TyperCommand | TyperGroup) -> list[str]:
+    words = command.collect_usage_pieces(typer.Context(command))
     return ["```text", " ".join([path, *words]), "```"]
 
 
-def _options_table(command: click.Command) -> list[str]:
+def _options_table(command: TyperCommand | TyperGroup) -> list[str]:
     rows: list[str] = []
     for param in command.params:
         default = "" if param.default in (None, False, ()) or callable(param.default) else f"`{param.default}`"
         text = getattr(param, "help", None) or ""
-        if isinstance(param, click.Option):
+        if isinstance(param, TyperOption):
             if param.hidden:
                 continue
             metavar = "" if param.is_flag else f" {_metavar(param)}"
@@ -136,7 +136,7 @@ def _options_table(command: click.Command) -> list[str]:
     return ["| argument or option | default | |", "|---|---|---|", *rows, ""] if rows else []
 
 
-def _metavar(param: click.Parameter) -> str:
+def _metavar(param: TyperOption | TyperArgument) -> str:
     return param.metavar or (param.name or "").upper()
 
 
@@ -291,7 +291,7 @@ def kind_page(name: str, scenes: Mapping[str, tuple[str, str, tuple[Port, ...]]]
         _prose(inspect.getdoc(loaded)),
         "",
         *_model("Parameters", schema),
-        "Beside these a participant has `host`, `period`, and a device `link` and `rate_limit`: see"
+        "Beside these a participant has `host`, `period`, and a device `network_link` and `rate_limit`: see"
         " [the scenario file](../scenario.md#participantspec).",
         "",
         *_definitions(schema),
@@ -435,7 +435,3 @@ def _cell(text: str) -> str:
     """Return a text as it may stand in a cell of a table."""
     flat = " ".join(text.split()).replace("|", "\\|")
     return re.sub(r"(`[^`]*`)|<", lambda found: found[1] or "&lt;", flat)
-
-
-def _lines(parts: Iterable[str]) -> str:
-    return "\n".join(parts)
