@@ -4,15 +4,18 @@ VENV := .venv
 RECORDING := recordings/palpation-$(shell date +%Y%m%d-%H%M%S)
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 
-.PHONY: demo test check format clean
+.PHONY: demo test check docs format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
 	trocar run palpation --record $(RECORDING)
 	trocar report $(RECORDING) -o $(RECORDING).html
 
-test: check ## everything that must hold before a change is merged
+test: check ## everything that must hold before a change is merged; tests/docs builds the documentation
 	pytest
+
+docs: $(VENV)/.dev ## the documentation, in build/site
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
 
 check: $(VENV)/.dev
 	ruff check .

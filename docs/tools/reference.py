@@ -74,7 +74,7 @@ def generated() -> dict[str, str]:
 
 def _from_root(name: str) -> str:
     text = (ROOT / name).read_text("utf-8")
-    text = re.sub(r"\]\(docs/([^)]+)\)", r"](\1)", text)
+    text = re.sub(r"\]\(docs/([^)]+)\)", r"](\1)", text.replace("](CHANGELOG.md)", "](changelog.md)"))
     return re.sub(r"\[([^]]+)\]\((?!https?:)[^)]*(?<!\.md)\)", r"\1", text)  # files that are not of the site
 
 
@@ -168,9 +168,9 @@ def _definitions(schema: Mapping[str, Any]) -> list[str]:
     lines: list[str] = []
     for name, definition in sorted(schema.get("$defs", {}).items()):
         if "properties" in definition:
-            lines += _model(name, definition)
+            lines += _model(name.lstrip("_"), definition)
         elif "enum" in definition:
-            lines += [f"## {name}", "", _type(definition), ""]
+            lines += [f"## {name.lstrip('_')}", "", _type(definition), ""]
     return lines
 
 
@@ -188,13 +188,24 @@ def _model(title: str, schema: Mapping[str, Any]) -> list[str]:
     return [*lines, ""]
 
 
+_A_TIME = "1 ms"
+"""The example that the schema of a duration states; its default is in nanoseconds."""
+
+
+def _example(part: Mapping[str, Any]) -> Any:
+    """Return the first example of a type, or of one of its alternatives."""
+    for place in (part, *part.get("anyOf", ())):
+        if place.get("examples"):
+            return place["examples"][0]
+    return None
+
+
 def _default(part: Mapping[str, Any]) -> str:
     if "default" not in part or part["default"] is None:
         return ""
     value = part["default"]
-    nanoseconds = re.fullmatch(r"(\d+) ns", str(value))
-    if nanoseconds:
-        return f"`{int(nanoseconds[1]) / 1e6:g} ms`"
+    if isinstance(value, int) and _example(part) == _A_TIME:
+        return f"`{value / 1e6:g} ms`"
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
     if isinstance(value, float):
@@ -208,7 +219,7 @@ def _type(part: Mapping[str, Any]) -> str:
     """Return the type of a JSON schema in words, with its limits."""
     if "$ref" in part:
         name = part["$ref"].rpartition("/")[2]
-        return f"[{name}](#{name.lower()})"
+        return f"[{name.lstrip('_')}](#{name.lstrip('_').lower()})"
     if "allOf" in part:
         return _type(part["allOf"][0])
     if "const" in part:

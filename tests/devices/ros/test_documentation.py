@@ -66,7 +66,7 @@ def lines_of(rows):
     ]
 
 
-WAYS = ["states", "events", "pictures", "heard", "service"]
+WAYS = ["states", "events", "pictures", "received", "service"]
 
 
 def way_of(row):
@@ -74,7 +74,7 @@ def way_of(row):
         return (
             "states" if row.periodic else "pictures" if row.name.startswith(("left/", "right/")) else "events"
         )
-    return {"subscribe": "heard", "serve": "service"}[row.way]
+    return {"subscribe": "received", "serve": "service"}[row.way]
 
 
 def tables():

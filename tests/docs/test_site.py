@@ -1,0 +1,60 @@
+"""The documentation builds without a warning, loads nothing from elsewhere, and misses nothing of the code."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hub.planning.registry import kinds
+
+pytest.importorskip("mkdocs")
+ROOT = Path(__file__).parents[2]
+LOADED = re.compile(r"<(?:script|link|img|iframe|source|video|audio|object|embed)\b[^>]*>")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built strictly."""
+    directory = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", directory],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return directory
+
+
+def test_nothing_on_it_is_loaded_from_elsewhere(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 80
+    for page in pages:
+        for tag in LOADED.findall(page.read_text("utf-8")):
+            assert not re.search(r"""(src|href)=["']?(https?:)?//""", tag), f"{page}: {tag}"
+    for style in site.rglob("*.css"):
+        assert not re.search(r"url\(\s*['\"]?(https?:)?//", style.read_text("utf-8")), style
+
+
+def test_no_page_has_a_diagram_that_the_browser_would_load_mermaid_for(site):
+    assert not any('class="mermaid"' in page.read_text("utf-8") for page in site.rglob("*.html"))
+
+
+def test_every_kind_has_a_page_with_its_parameters(site):
+    for name in kinds():
+        text = (site / "reference" / "kinds" / f"{name}.html").read_text("utf-8")
+        assert "Parameters" in text, name
+        assert "Ports" in text, name
+
+
+def test_every_decision_is_in_the_index():
+    folder = ROOT / "docs" / "decisions"
+    index = (folder / "index.md").read_text("utf-8")
+    for page in folder.glob("0*.md"):
+        assert f"({page.name})" in index, page
