@@ -106,7 +106,9 @@ class Figure:
 def overview() -> Figure:
     """Draw hub, hosts and devices."""
     f = Figure(860, 400, "A session: devices, hub, and hosts with engines and controllers")
-    for i, name in enumerate(["haptic stylus\nWindows or Linux", "ROS console\nCRTK topics", "headset\nOpenXR"]):
+    for i, name in enumerate(
+        ["haptic stylus\nWindows or Linux", "ROS console\nCRTK topics", "headset\nOpenXR"]
+    ):
         f.box(40 + 270 * i, 20, 240, 56, name, GREY)
         f.arrow(160 + 270 * i, 78, 330 + 100 * i, 128, colour=GREY, both=True)
     f.text(342, 98, "samples in, contact out", size=12)
@@ -125,7 +127,9 @@ def overview() -> Figure:
     f.box(626, 302, 140, 46, "tissue\nBullet", INK)
     f.arrow(372, 325, 570, 325, "bond: pose, twist / wrench", ORANGE, both=True, width=2.5)
     f.text(471, 346, "peer to peer, energy book", size=12, colour=ORANGE)
-    f.text(430, 388, "MCAP recording: all that enters is in the grants, so the grants determine the run", size=13)
+    f.text(
+        430, 388, "MCAP recording: all that enters is in the grants, so the grants determine the run", size=13
+    )
     return f
 
 
@@ -180,7 +184,9 @@ def bond() -> Figure:
     """Draw the exchange of a power bond."""
     f = Figure(860, 300, "The default coupling: predicted motion one way, mean force the other")
     f.box(40, 70, 250, 120, "motion side: robot\napplies the mean force\nbooks the work it gives", TEAL)
-    f.box(570, 70, 250, 120, "force side: tissue\nspring and damper to a proxy\nbooks the work it gets", ORANGE)
+    f.box(
+        570, 70, 250, 120, "force side: tissue\nspring and damper to a proxy\nbooks the work it gets", ORANGE
+    )
     f.arrow(292, 100, 568, 100, "1. position and velocity at t", TEAL, width=2)
     f.text(430, 122, "predicted as x + v t inside the step", size=12, colour=TEAL)
     f.arrow(568, 160, 292, 160, "2. mean force over the step", ORANGE, width=2)
@@ -188,7 +194,13 @@ def bond() -> Figure:
     f.box(300, 222, 260, 56, "energy book of the hub\nwork got minus work given, J", GREY)
     f.arrow(165, 192, 298, 246, "ack", GREY, shift=(-12, 10))
     f.arrow(695, 192, 562, 246, "ack", GREY, shift=(12, 10))
-    f.text(430, 40, "Action equals reaction in impulse, without iteration and without rollback", size=14, bold=True)
+    f.text(
+        430,
+        40,
+        "Action equals reaction in impulse, without iteration and without rollback",
+        size=14,
+        bold=True,
+    )
     return f
 
 
@@ -236,7 +248,12 @@ def recording() -> Figure:
     f.box(250, 40, 250, 210, "", GREY)
     f.text(375, 62, "DIR: a rosbag2 directory", bold=True)
     for i, text in enumerate(
-        ["scenario, plan, versions", "grants: all that entered", "acks: state hashes", "values of the outputs"]
+        [
+            "scenario, plan, versions",
+            "grants: all that entered",
+            "acks: state hashes",
+            "values of the outputs",
+        ]
     ):
         f.box(266, 76 + 42 * i, 218, 34, "", TEAL if i == 1 else GREY)
         f.text(375, 98 + 42 * i, text, size=13)
@@ -258,7 +275,15 @@ def recording() -> Figure:
 def safety() -> Figure:
     """Draw the chain of limits and what silence of the simulation does."""
     f = Figure(860, 400, "The chain that every force passes, and the gain after the last contact model")
-    steps = ["finite\nnumbers", "silence", "dead-man\ncalibration", "speed of\nthe hand", "norm\n2 N", "ramp\n1 s", "slew\n0.1 N/ms"]
+    steps = [
+        "finite\nnumbers",
+        "silence",
+        "dead-man\ncalibration",
+        "speed of\nthe hand",
+        "norm\n2 N",
+        "ramp\n1 s",
+        "slew\n0.1 N/ms",
+    ]
     f.text(44, 24, "contact model, rendered at 1 kHz", anchor="start", size=13)
     for i, text in enumerate(steps):
         x = 40 + 114 * i
@@ -280,12 +305,23 @@ def safety() -> Figure:
         f.line([(px(ms), py(0)), (px(ms), py(0) + 5)], GREY)
         f.text(px(ms), 362, f"{ms} ms", size=12)
     gain: Callable[[float], float] = lambda ms: 1.0 if ms <= 100 else math.exp(-(ms - 100) / 20)  # noqa: E731
-    f.line([*((px(ms), py(gain(ms))) for ms in range(131)), (px(130), py(0)), (px(160), py(0))], ORANGE, width=2.5)
+    f.line(
+        [*((px(ms), py(gain(ms))) for ms in range(131)), (px(130), py(0)), (px(160), py(0))],
+        ORANGE,
+        width=2.5,
+    )
     f.line([(px(150), py(0)), (px(150), py(1.0))], INK, dash="4 4")
     f.text(px(150) + 8, py(0.85), "promise: zero", anchor="start", size=13)
     f.text(px(150) + 8, py(0.85) + 18, "within 150 ms", anchor="start", size=13)
     f.text(430, 390, "time since the last contact model arrived", size=13)
-    f.text(px(4), py(1.0) - 10, "share of the force that reaches the hand", anchor="start", size=13, colour=ORANGE)
+    f.text(
+        px(4),
+        py(1.0) - 10,
+        "share of the force that reaches the hand",
+        anchor="start",
+        size=13,
+        colour=ORANGE,
+    )
     return f
 
 

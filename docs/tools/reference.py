@@ -123,7 +123,9 @@ def _usage(path: str, command: TyperCommand | TyperGroup) -> list[str]:
 def _options_table(command: TyperCommand | TyperGroup) -> list[str]:
     rows: list[str] = []
     for param in command.params:
-        default = "" if param.default in (None, False, ()) or callable(param.default) else f"`{param.default}`"
+        default = (
+            "" if param.default in (None, False, ()) or callable(param.default) else f"`{param.default}`"
+        )
         text = getattr(param, "help", None) or ""
         if isinstance(param, TyperOption):
             if param.hidden:
@@ -418,19 +420,22 @@ def _field_notes(model: type[Message]) -> dict[str, str]:
 # Public API
 
 
+_GROUP = re.compile(r"^(\w[\w ]*?) {2,}((?:`\w+`(?:,\s+)?)+)[^\n]*\n", re.MULTILINE)
+"""A line of the package's docstring: a group and its names."""
+
+
 def api() -> str:
-    """Return the page on the package `trocar`; mkdocstrings fills it."""
-    lines = [
-        "# Python: the package `trocar`",
-        "",
-        "The public names: plug-ins, notebooks and examples import from here. Everything else may move"
-        " between versions.",
-        "",
-        _prose(inspect.getdoc(trocar)),
-        "",
-    ]
-    for name in sorted(trocar.__all__, key=str.lower):
-        lines += [f"::: trocar.{name}", ""]
+    """Return the page on the package `trocar` in the groups of its docstring; mkdocstrings fills it."""
+    about = inspect.getdoc(trocar) or ""
+    groups = {name: re.findall(r"\w+", names) for name, names in _GROUP.findall(about)}
+    grouped = {name for names in groups.values() for name in names}
+    groups["Other names"] = [name for name in sorted(trocar.__all__) if name not in grouped]
+    lines = ["# Python: the package `trocar`", "", _prose(_GROUP.sub("", about)), ""]
+    for group, names in groups.items():
+        if names:
+            lines += [f"## {group}", ""]
+        for name in names:
+            lines += [f"::: trocar.{name}", "    options: {heading_level: 3}", ""]
     return "\n".join(lines)
 
 
