@@ -223,7 +223,7 @@ def coupling_error() -> Figure:
     def py(error: float) -> float:
         return 40 + 300 * (math.log10(error) - 0) / -6.0
 
-    for k in range(0, 7):
+    for k in range(7):
         f.line([(110, py(10**-k)), (590, py(10**-k))], "#cfd8dc", width=1)
         f.text(100, py(10**-k) + 5, "1 m" if k == 0 else f"1e-{k} m", anchor="end", size=12)
     for h in (1, 2, 5, 10):

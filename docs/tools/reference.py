@@ -1,4 +1,4 @@
-"""Pages of the reference, made from the code when the site is built: a hook of MkDocs (`hooks:` in mkdocs.yml).
+"""Pages of the reference, made from the code when the site is built; a hook of MkDocs (mkdocs.yml).
 
 Command line from typer, scenario and kinds from their pydantic models, ports from the shipped scenarios,
 messages from `schemas`. Nothing of it is written by hand.
@@ -23,7 +23,6 @@ from hub.command_line.app import app
 from hub.participant import Stepped
 from hub.planning import registry
 from hub.planning.scenario_file import installed_scenarios, load
-from hub.planning.wiring import make_plan
 from schemas import crtk, ros, trocar_msgs
 from schemas.message import Message, msg_text
 from schemas.ports import Port, bond_ports
@@ -338,7 +337,7 @@ def _port(port: Port) -> str:
 
 
 def _participants() -> dict[str, tuple[str, str, tuple[Port, ...]]]:
-    """Return for each kind a scenario, the participant in it, and that one's ports; the first that is found."""
+    """Return for each kind the first scenario that has it, the participant there, and its ports."""
     places = [(name, "") for name in ("palpation", "cart", *installed_scenarios())]
     found: dict[str, tuple[str, str, tuple[Port, ...]]] = {}
     for scene, override in [*places, *EXAMPLES.values()]:

@@ -70,3 +70,27 @@ def test_messages_in_troubleshooting_are_those_of_the_code(message):
     for part in message.split("..."):
         for words in re.split(r"'|: ", part):
             assert words.strip() in source(), words
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_and_modules_that_a_page_names_exist(page):
+    text = page.read_text("utf-8")
+    for name in re.findall(r"`((?:[a-z_0-9]+/)+[a-z_0-9]+\.(?:py|c|json|yaml))`", text):
+        roots = (ROOT, *(ROOT / folder for folder in ("engines/bullet", "engines/mujoco", "robots/dvrk")))
+        assert any((root / name).is_file() for root in roots), f"{page}: {name}"
+    for name in re.findall(r"`((?:hub|schemas|robots|engines|controllers|devices)(?:\.\w+)+)`", text):
+        assert exists(name) or name == "hub.lab", f"{page}: {name}"
+
+
+def exists(dotted):
+    """Say whether a dotted name is a module, or something in one."""
+    parts = dotted.split(".")
+    for length in range(len(parts), 0, -1):
+        base = ROOT.joinpath(*parts[:length])
+        if base.is_dir() or base.with_suffix(".py").is_file():
+            return length == len(parts) or all(
+                re.search(rf"\b{part}\b", module.read_text("utf-8"))
+                for part in parts[length : length + 1]
+                for module in [base / "__init__.py" if base.is_dir() else base.with_suffix(".py")]
+            )
+    return False

@@ -1,4 +1,4 @@
-"""The documentation builds without a warning, loads nothing from elsewhere, and misses nothing of the code."""
+"""The documentation builds without a warning, loads nothing from elsewhere, and covers the code."""
 
 import os
 import re
@@ -58,3 +58,12 @@ def test_every_decision_is_in_the_index():
     index = (folder / "index.md").read_text("utf-8")
     for page in folder.glob("0*.md"):
         assert f"({page.name})" in index, page
+
+
+def test_the_figures_are_those_of_the_script(tmp_path):
+    text = "import sys; sys.path.insert(0, 'docs/tools'); import figures, pathlib;"
+    text += f" figures.FOLDER = pathlib.Path({str(tmp_path)!r}); figures.main()"
+    subprocess.run([sys.executable, "-c", text], cwd=ROOT, check=True)
+    drawn = {file.name: file.read_text("utf-8") for file in tmp_path.glob("*.svg")}
+    kept = {file.name: file.read_text("utf-8") for file in (ROOT / "docs" / "figures").glob("*.svg")}
+    assert drawn == kept, "python docs/tools/figures.py"

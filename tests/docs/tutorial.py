@@ -1,9 +1,10 @@
 """Markdown pages as programs: the fenced blocks of a page, in order, are written to files, run and compared.
 
 - ```` ```python title="name.py" ````, `yaml`, `toml`: a file of that name in the page's directory.
-- ```` ```python ````: run, neighbouring blocks in one namespace; a `text` block right after one is what it prints.
-- ```` ```console ````: each `$ command` is run in a shell; the lines after it are what it prints, `...` stands
-  for anything. A command whose expected text begins with `error:` fails.
+- ```` ```python ````: run, neighbouring blocks in one namespace; a `text` block right after one is what it
+  prints.
+- ```` ```console ````: each `$ command` is run in a shell; the lines after it are what it prints, `...`
+  stands for anything. A command whose expected text begins with `error:` fails.
 - `<!-- not run: reason -->` on the line before a block: left out.
 """
 
@@ -112,7 +113,7 @@ class Runner:
 
 
 def compare(expected: str, printed: str, where: str) -> None:
-    """Compare line by line without space at the ends; `...` stands for any text, alone in a line for any lines."""
+    """Compare line by line; `...` stands for any text, alone in a line for any lines."""
     tidy = "\n".join(line.rstrip() for line in printed.strip().splitlines())
     pattern = r"\n".join(_line(line.rstrip()) for line in expected.strip().splitlines())
     pattern = pattern.replace(r"@any lines@\n", r"(?:.*\n)*?").replace(r"\n@any lines@", r"(?:\n.*)*")
