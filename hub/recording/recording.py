@@ -44,7 +44,6 @@ ENERGY_PREFIX = topic(_KEYS.energy(""))
 class Recording(Bag):
     """The recording of one session, read from a rosbag2 directory or an MCAP file.
 
-    Examples:
         recording = Recording("recordings/palpation")
         recording.ports                                          # what there is
         recording["robot.PSM1/measured_js"]["position"]          # (n, 6), rad and m

@@ -26,8 +26,8 @@ def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
 
     Args:
         arm: one of `ARMS`.
-        tool: Of a PSM, name or number of the instrument (default: large needle driver 400006). Of the ECM,
-            the endoscope (default: straight). None for the other arms.
+        tool: name or number of the instrument of a PSM (a large needle driver 400006 unless given),
+            endoscope of the ECM (straight unless given); nothing for the others.
 
     Raises:
         MotionError: no such arm or tool; the message says which there are.

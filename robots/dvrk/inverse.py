@@ -73,8 +73,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
 
     Raises:
         MotionError: wrong shape, not finite, no rigid transform, or not reachable; the message names the
-        joints, what they would
-            have to be and their ranges. Of many poses it speaks of the first that fails.
+            joints, the positions they would need and their ranges, for the first of many poses that fails.
     """
     n = len(chain.joints)
     poses, start = _goals(chain, pose, near)
