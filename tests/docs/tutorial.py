@@ -1,6 +1,7 @@
 """Markdown pages as programs: the fenced blocks of a page, in order, are written to files, run and compared.
 
-- ```` ```python title="name.py" ````, `yaml`, `toml`: a file of that name in the page's directory.
+- ```` ```python title="name.py" ````, `yaml`, `toml`: a file of that name in the page's directory; one of
+  `examples/` is compared with that of the repository.
 - ```` ```python ````: run, neighbouring blocks in one namespace; a `text` block right after one is what it
   prints.
 - ```` ```console ````: each `$ command` is run in a shell; the lines after it are what it prints, `...`
@@ -18,6 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 _FENCE = re.compile(
     r"(?:<!-- not run: (?P<skip>[^\n]+) -->\n)?^```(?P<language>\w*)(?: title=\"(?P<title>[^\"]+)\")?[^\n]*\n"
     r"(?P<text>.*?)^```$",
@@ -49,6 +51,7 @@ class Runner:
 
     def __init__(self, page: Path, directory: Path) -> None:
         self._page, self._directory = page, directory
+        (directory / "examples").symlink_to(ROOT / "examples")
 
     def run(self) -> int:
         """Run all blocks; return how many commands and programs were run."""
@@ -56,7 +59,12 @@ class Runner:
         count = 0
         program: list[tuple[Block, Block | None]] = []
         for block, after in zip(found, [*found[1:], None], strict=True):
-            if block.title:
+            if block.title.startswith("examples/"):
+                where = f"{self._page.name}:{block.line}"
+                assert block.text == (ROOT / block.title).read_text("utf-8"), (
+                    f"{where}: another {block.title}"
+                )
+            elif block.title:
                 (self._directory / block.title).write_text(block.text)
             elif block.language == "python":
                 program.append((block, after if after is not None and after.language == "text" else None))
