@@ -381,7 +381,7 @@ def messages() -> str:
         "",
     ]
     for model in _models(trocar_msgs):
-        lines += [f"### {model.__name__}", "", _prose(inspect.getdoc(model)), ""]
+        lines += [f"### {model.ros_type.rpartition('/')[2]}", "", _prose(inspect.getdoc(model)), ""]
         lines += ["```text", msg_text(model).rstrip(), "```", ""]
         notes = _field_notes(model)
         lines += [f"- `{field}`: {_cell(text)}" for field, text in notes.items()]
