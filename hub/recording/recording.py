@@ -48,6 +48,8 @@ class Recording(Bag):
         recording.ports                                          # what there is
         recording["robot.PSM1/measured_js"]["position"]          # (n, 6), rad and m
         recording["tissue.probe/wrench"].to_frame().plot()       # with pandas
+
+    Topics are the session's keys without `trocar/<session>`.
     """
 
     @cached_property
