@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -94,6 +95,8 @@ class Runner:
             line, _, expected = command.partition("\n")
             done = self._run(line, shell=True)
             if "Address already in use" in done.stderr:  # another session of this machine was quicker
+                for begun in re.findall(r"--record (\S+)", line):
+                    shutil.rmtree(self._directory / begun, ignore_errors=True)
                 done = self._run(line, shell=True)
             where = f"{self._page.name}:{block.line}: {line}"
             fails = expected.startswith("error:")
