@@ -44,12 +44,11 @@ ENERGY_PREFIX = topic(_KEYS.energy(""))
 class Recording(Bag):
     """The recording of one session, read from a rosbag2 directory or an MCAP file.
 
+    Examples:
         recording = Recording("recordings/palpation")
         recording.ports                                          # what there is
         recording["robot.PSM1/measured_js"]["position"]          # (n, 6), rad and m
         recording["tissue.probe/wrench"].to_frame().plot()       # with pandas
-
-    Topics are the session's keys without `trocar/<session>`.
     """
 
     @cached_property
