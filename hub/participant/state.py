@@ -179,7 +179,7 @@ def _view(name: str) -> str:
 
 
 class Record:
-    """State with named fields: the class body declares them by `array`, `number`, `flag`, `integer`, `choice`.
+    """State with named fields, which the class body declares (`array`, `number`, `flag`, `integer`, `choice`).
 
     They stand in `values` one after the other, in the order of their declaration.
     """

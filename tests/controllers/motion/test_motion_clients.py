@@ -114,7 +114,7 @@ class TestLatchedCommands:
         rig.step(1, state_command=command("disable", 1_700_000_050_000_000_000))
         rig.step(200, state_command=home)
         assert rig.said("warning") == [
-            "PSM1: state_command 'home' of time 1700000000.123456789 s is refused: it was heeded before; a"
+            "PSM1: state_command 'home' of time 1700000000.123456789 s is refused: it was executed before; a"
             " new one has a new stamp"
         ]
         assert not rig.states()
@@ -143,7 +143,7 @@ class TestLatchedCommands:
         other.motion.restore(rig.motion.save())
         other.t = rig.t
         other.step(1, state_command=command("resume", 20)).step(1, state_command=command("pause", 10))
-        assert "heeded before" in other.said("warning")[0]
+        assert "executed before" in other.said("warning")[0]
 
     def test_one_that_the_state_refused_may_come_again(self):
         rig = Rig().step().step(1, state_command=command("resume", 10))
@@ -189,8 +189,8 @@ def test_what_an_arm_holds_is_told_once_at_time_0():
             "'CADIERE_FORCEPS:400049[..]', the arm holds LARGE_NEEDLE_DRIVER:400006[..]",
         ),
         ({"emulate_tool_present": BoolMessage(data=True)}, None),
-        ({"emulate_tool_present": BoolMessage(data=False)}, "nobody is there to take it off"),
-        ({"emulate_adapter_present": BoolMessage(data=False)}, "nobody is there to take it off"),
+        ({"emulate_tool_present": BoolMessage(data=False)}, "which cannot be removed"),
+        ({"emulate_adapter_present": BoolMessage(data=False)}, "which cannot be removed"),
     ],
 )
 def test_what_an_arm_holds_is_not_a_client_s_to_change(order, reason):
