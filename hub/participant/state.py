@@ -179,7 +179,7 @@ def _view(name: str) -> str:
 
 
 class Record:
-    """State with named fields, which the class body declares (`array`, `number`, `flag`, `integer`, `choice`).
+    """State with named fields, which the class body declares: `array`, `number`, `flag`, `integer`, `choice`.
 
     They stand in `values` one after the other, in the order of their declaration.
     """
@@ -211,6 +211,12 @@ class Record:
                 setattr(self, _view(name), part.reshape(shape))
             else:
                 part[:] = field.start
+
+    def part(self, name: str) -> Vector:
+        """Return the part of `values` that a field takes: of a number a view, shape (1,), for an output port."""
+        index = list(self.fields).index(name)
+        end = (*self.offsets[1:], self.values.size)[index]
+        return self.values[self.offsets[index] : end]
 
     def check(self, values: Vector) -> None:
         """Raise StateError if `values`, shape (size,), cannot be those of this record."""

@@ -20,7 +20,7 @@ directions = (
 
 
 def estimate():
-    return ContactEstimate(np.zeros(ContactEstimate.SIZE))
+    return ContactEstimate()
 
 
 def press(surface, stiffness, normal, depths, dt=DT):

@@ -98,6 +98,15 @@ def test_arrays_are_views_that_are_written_in_place() -> None:
     assert sample.values.tolist() == [6.0, 7.0, 8.0, -1.0, 0.5, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 1.0, 7.0]
 
 
+def test_a_number_has_a_view_for_an_output() -> None:
+    sample = Sample(n=3)
+    elapsed = sample.part("elapsed")
+    sample.elapsed = 2.5
+    assert elapsed.tolist() == [2.5]
+    assert (sample.part("count").tolist(), sample.part("axes").shape) == ([7.0], (6,))
+    assert np.shares_memory(sample.part("position"), sample.values)
+
+
 def test_records_of_one_class_may_differ_in_size_and_share_nothing() -> None:
     small, large = Sample(n=1), Sample(n=8)
     small.phase, large.phase = Phase.REST, Phase.MOVE
