@@ -209,7 +209,7 @@ class Caliper(Controller):
         mesh, (triangles, rest) = self._mesh, divmod(len(state) - self._now.values.nbytes, 9 * 8)
         if triangles < 0 or rest:
             raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, which cannot be a caliper's;"
+                f"participant '{self.name}': a saved state of {len(state)} bytes, which is not a caliper's;"
                 " was it saved elsewhere?"
             )
         self._keep_mesh(np.zeros((triangles, 3, 3)))

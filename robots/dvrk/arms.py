@@ -50,5 +50,5 @@ def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
 
 
 def base_frame(arm: str) -> str:
-    """Return the name of the frame in which `chain(arm)` stands: the arm's own, the cart's for a setup joint."""
+    """Return the name of the base frame of `chain(arm)`: the arm's own, the cart's for a setup joint."""
     return "cart" if arm.startswith("SUJ/") else f"{arm}_base"

@@ -179,8 +179,9 @@ WRENCH_STATES = {
 }
 
 CAMERA_FRAME, CART_FRAME, WORLD_FRAME = "ECM", "Cart", "world"
-"""`frame_id` of the ECM's tip and of the patient cart, as the da Vinci's interface and the dVRK name them; the
-world is ours.
+"""`frame_id` of the ECM's tip, of the patient cart and of the world.
+
+The first two are the names of the da Vinci's own interface and the dVRK; the world is ours.
 """
 Mounting = Literal["free", "cart"]
 """How arms stand: each by itself, or on the setup joints of the cart, whose frame is then the world."""

@@ -83,9 +83,7 @@ def _joints(arm: CartArm) -> tuple[Joint, ...]:
 
 @cache
 def chain(arm: CartArm) -> SerialChain:
-    """Return the kinematics of the setup joint that carries `arm`, from the cart's frame to the arm's RCM
-    frame `<arm>_base`.
-    """
+    """Return the kinematics of the setup joint that carries `arm`, from the cart to `<arm>_base`, its RCM."""
     x, y, z, turn = _COLUMN[arm]
     base = Joint("", "revolute", 0.0, 0.0, 0.0, turn, 0.0, 0.0).transform(0.0)
     base[:3, 3] = x, y, z
@@ -96,8 +94,9 @@ def chain(arm: CartArm) -> SerialChain:
 
 
 def base_pose(arm: CartArm, q: Vector) -> Vector:
-    """Return the pose of the RCM frame `<arm>_base` in the cart's frame, shape (..., 4, 4), at setup joint
-    positions (..., 6).
+    """Return the pose of the RCM frame `<arm>_base` in the cart's frame, shape (..., 4, 4).
+
+    Setup joint positions have shape (..., 6).
     """
     return chain(arm).forward(q)
 

@@ -63,7 +63,8 @@ def test_a_program_homes_all_arms_by_the_console_and_reads_what_the_console_says
 ):
     controller = motion(arms=ARMS, mounting="cart")
     console = DvrkConsole(
-        "console", DvrkConsoleParams.model_validate({"arms": ["PSM1", "PSM2"], "teleoperations": ["MTMR_PSM1"]})
+        "console",
+        DvrkConsoleParams.model_validate({"arms": ["PSM1", "PSM2"], "teleoperations": ["MTMR_PSM1"]}),
     )
     gateway = MemoryGateway(
         "ros",
