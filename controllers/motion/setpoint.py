@@ -247,16 +247,16 @@ class Setpoint:
         share = h / wait
         return mean + now - share * (2.0 * now + then) + share * share * (now + then) - self._arrival
 
-    def _steer(self, wanted: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
-        """Take a step with the allowed velocity nearest to `wanted`, shape (n,).
+    def _steer(self, target: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
+        """Take a step with the allowed velocity nearest to `target`, shape (n,).
 
         Allowed is what the limits and the way left to either side permit.
         """
         room = h * self._most
-        wanted = _clip(
-            _clip(wanted, -self._velocity, self._velocity), self.velocity - room, self.velocity + room
+        target = _clip(
+            _clip(target, -self._velocity, self._velocity), self.velocity - room, self.velocity + room
         )
-        self.velocity[:] = _clip(wanted, -most_down, most_up)
+        self.velocity[:] = _clip(target, -most_down, most_up)
         self.position += h * self.velocity
         self.position[:] = _clip(self.position, self._lower, self._upper)
         self.state.acceleration[:] = 0.0

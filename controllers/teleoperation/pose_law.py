@@ -8,7 +8,7 @@ orientation of the one frame in the other, s the scale, and 0 for the reference:
 
 A reference is taken from where hand and command are whenever the hand takes over, and from the *last* hand
 and goal when scale or view change while it leads: so no change moves the tip, and no motion of the hand is
-lost. It is taken anew as well while the tip, at a limit of its joints, is turned too far away from the goal:
+lost. It is also taken again while the tip, at a limit of its joints, is turned too far away from the goal:
 past half a turn the nearest way there is the other way round.
 """
 

@@ -30,7 +30,7 @@ def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
             the endoscope (default: straight). None for the other arms.
 
     Raises:
-        MotionError: no such arm or tool; the message says which there are.
+        MotionError: no such arm or tool; the message lists which there are.
     """
     if arm in ("PSM1", "PSM2", "PSM3"):
         return psm.chain(tool if isinstance(tool, Instrument) else instrument(tool or DEFAULT_INSTRUMENT))

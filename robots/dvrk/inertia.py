@@ -84,7 +84,7 @@ _FINGER_MASS = 3.90696e-5
 """kg of one finger (same file)."""
 
 PROBE_RADIUS = 5e-3
-"""m, of the sphere of a palpation probe unless a scene says otherwise."""
+"""m, of the sphere of a palpation probe unless the scene states another one."""
 
 ENDOSCOPE_MASS: Mapping[str, float] = MappingProxyType(
     {"Classic_SD": 1.5, "Classic_HD": 2.5, "Si_HD": 1.8, "Custom": 0.8, "none": 0.1}

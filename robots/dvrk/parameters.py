@@ -20,7 +20,6 @@ __all__ = [
     "HandPositions",
     "InstrumentName",
     "MountedPositions",
-    "PsmPositions",
     "SetupPositions",
     "UnitQuaternion",
     "check_start",
@@ -67,9 +66,6 @@ InstrumentName = Annotated[
     ),
 ]
 """Name or number of an instrument that can be mounted on a PSM; the name, once it is validated."""
-
-PsmPositions = tuple[Angle, Angle, Length, Angle, Angle, Angle]
-"""Positions of a PSM's six joints (rad, m)."""
 
 EcmPositions = tuple[Angle, Angle, Length, Angle]
 """Positions of the ECM's four joints (rad, m)."""
