@@ -213,7 +213,7 @@ class Record:
                 part[:] = field.start
 
     def part(self, name: str) -> Vector:
-        """Return the part of `values` that a field takes: of a number a view, shape (1,), for an output port."""
+        """Return the view of `values` that a field takes: shape (1,) of a number, as outputs have it."""
         index = list(self.fields).index(name)
         end = (*self.offsets[1:], self.values.size)[index]
         return self.values[self.offsets[index] : end]

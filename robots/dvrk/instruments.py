@@ -52,7 +52,7 @@ _JAW_LENGTHS = {
     "205": 0.021,
     "309": 0.0155,
 }
-"""From the wrist yaw axis to the end of the jaws (m), by the last digits of the number, which are of the type
+"""From the wrist yaw axis to the end of the jaws (m), by the last digits of the number, which name its type
 (jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as the
 Maryland ones, 172).
 """
