@@ -205,7 +205,7 @@ class EcmMasters(Controller):
         return outputs
 
     def _engage(self, left: Vector, right: Vector, endoscope: Vector) -> None:
-        """Take the reference."""
+        """Set the reference to the present poses."""
         self._middle[:], self._up[:], side = _picture(left[:3], right[:3])
         between = right[:3] - left[:3]
         self._span[:] = 0.5 * (side @ between), 0.5 * (self._middle @ between) / np.linalg.norm(self._middle)

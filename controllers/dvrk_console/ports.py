@@ -42,7 +42,6 @@ class EventOutputs:
     """The event outputs of the present step, by port."""
 
     def __init__(self, ports: Iterable[Port]) -> None:
-        """Take the ports of the participant."""
         self.outputs: dict[str, Any] = {
             port.name: () for port in ports if port.causality == "output" and port.variability == "event"
         }

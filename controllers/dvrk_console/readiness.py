@@ -17,7 +17,6 @@ class Readiness:
     """The operating states of all arms and masters. All that lasts from step to step is in `state`."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Take the names of arms and masters."""
         self._rows = {name: i for i, name in enumerate(names)}
         self.state = np.zeros((len(names), 3))
         """For each: 1 if it has published anything, if it is ENABLED, if it is homed."""

@@ -64,7 +64,6 @@ class Repeats:
     """
 
     def __init__(self) -> None:
-        """Start without any."""
         self.state = np.zeros((REMEMBERED_COMMANDS, 3))
         """Stamps (s, ns) and checksums of the last commands that were executed, the newest first."""
 

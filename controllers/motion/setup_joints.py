@@ -39,7 +39,6 @@ class SetupJoints:
     """The setup joints of all driven arms; without a cart there are none."""
 
     def __init__(self, params: MotionParams) -> None:
-        """Take the parameters of the controller."""
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
         self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names()) for arm in arms}

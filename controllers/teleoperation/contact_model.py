@@ -85,7 +85,6 @@ class ContactModelBuilder:
     """
 
     def __init__(self, force: ForceParams, planes: Sequence[PlaneParams]) -> None:
-        """Take the parameters of the force, and the surfaces of the scenario."""
         self._force, self._planes = force, planes
         self._normals: list[Vector] = [np.array(plane.normal) for plane in planes]
         self._tissue, self._rigid = ContactEstimate(), ContactEstimate()

@@ -51,7 +51,6 @@ class Engagement:
     """Whether the arm follows."""
 
     def __init__(self, params: TeleoperationParams) -> None:
-        """Take the parameters of the teleoperation."""
         self._arm, self._max_age = params.arm, params.max_age
         self._clutch, self._must_hold = params.buttons.clutch, params.engage == "held"
         self._gate = AlignmentGate() if params.align == "gate" else None

@@ -44,7 +44,6 @@ class JawGhost:
     """The angle that is commanded to the jaw."""
 
     def __init__(self, jaw: Jaw) -> None:
-        """Take the jaw's range."""
         self._lower, self._upper = jaw.lower, jaw.upper
         self.state = JawState()
 

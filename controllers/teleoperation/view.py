@@ -33,7 +33,6 @@ class View:
     """Turns the hand's frame into the arm's base frame."""
 
     def __init__(self, params: TeleoperationParams) -> None:
-        """Take the parameters of the teleoperation."""
         self._registration = np.array(params.registration)
         self._hand_in_camera: Vector | None = self._registration if params.view == "display" else None
         if params.view == "camera":
