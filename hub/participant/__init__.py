@@ -5,7 +5,7 @@ from hub.participant.bond import ForceSide, MotionSide
 from hub.participant.controller import Controller
 from hub.participant.device import Device, Sample
 from hub.participant.inputs import Inputs
-from hub.participant.state import Record, array, choice, flag, integer, number, state_hash
+from hub.participant.state import Record, array, choice, flag, integer, number, restore_arrays, state_hash
 from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
 
 __all__ = [
@@ -29,5 +29,6 @@ __all__ = [
     "flag",
     "integer",
     "number",
+    "restore_arrays",
     "state_hash",
 ]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from hub.participant.state import Record, state_hash
+from hub.participant.state import Record, split_state, state_hash
 from hub.participant.stepped import Stepped
 from schemas.errors import StateError
 from schemas.vectors import Vector
@@ -39,15 +37,8 @@ class Controller(Stepped):
 
         Raises StateError, and changes nothing, if its size is wrong or a field cannot have its value.
         """
-        size = sum(array.nbytes for array in self._arrays)
-        if len(state) != size:
-            raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, expected {size}; was it"
-                " saved elsewhere?"
-            )
-        ends = np.cumsum([array.size for array in self._arrays], dtype=np.int64)
-        values = np.split(np.frombuffer(state), ends[:-1])
-        for part, saved in zip(self._kept, values, strict=False):
+        values = split_state(self.name, self._arrays, state)
+        for part, saved in zip(self._kept, values, strict=True):
             if isinstance(part, Record):
                 try:
                     part.check(saved)
@@ -55,8 +46,8 @@ class Controller(Stepped):
                     raise StateError(
                         f"participant '{self.name}': a saved state with {error}; was it saved elsewhere?"
                     ) from error
-        for array, saved in zip(self._arrays, values, strict=False):
-            array[...] = saved.reshape(array.shape)
+        for array, saved in zip(self._arrays, values, strict=True):
+            array[...] = saved
 
     def close(self) -> None:
         """Do nothing: there is nothing to give back."""

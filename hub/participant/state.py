@@ -15,7 +15,7 @@ The vector is what is hashed and saved: nothing has to be collected for it, and 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from math import copysign, prod
 from operator import attrgetter
@@ -26,7 +26,17 @@ import numpy as np
 from schemas.errors import StateError
 from schemas.vectors import Vector
 
-__all__ = ["Record", "array", "choice", "flag", "integer", "number", "state_hash"]
+__all__ = [
+    "Record",
+    "array",
+    "choice",
+    "flag",
+    "integer",
+    "number",
+    "restore_arrays",
+    "split_state",
+    "state_hash",
+]
 
 E = TypeVar("E", bound=IntEnum)
 
@@ -45,6 +55,34 @@ def state_hash(*parts: bytes | Vector) -> int:
     for part in parts:
         digest.update(part if isinstance(part, bytes) else part.tobytes())
     return int.from_bytes(digest.digest(), "little")
+
+
+def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:
+    """Write `state`, the bytes of `arrays` one after the other, back into them.
+
+        state = position.tobytes() + velocity.tobytes()
+        restore_arrays(self.name, [position, velocity], state)
+
+    `participant` is the name for the message. Raises StateError if `state` has another size.
+    """
+    held = tuple(arrays)
+    for array, values in zip(held, split_state(participant, held, state), strict=True):
+        array[...] = values
+
+
+def split_state(participant: str, arrays: Sequence[Vector], state: bytes) -> list[Vector]:
+    """Return the values that `state` has for each of `arrays`, in its shape; StateError if it does not fit."""
+    size = sum(array.nbytes for array in arrays)
+    if len(state) != size:
+        raise StateError(
+            f"participant '{participant}': a saved state of {len(state)} bytes, expected {size}; was it saved"
+            " elsewhere?"
+        )
+    values, found, at = np.frombuffer(state), list[Vector](), 0
+    for array in arrays:
+        found.append(values[at : at + array.size].reshape(array.shape))
+        at += array.size
+    return found
 
 
 def array(*shape: int | str) -> Vector:
