@@ -1,5 +1,6 @@
-"""How far an instrument jumps and drifts over 10 000 clutch cycles of a hand on random paths, and what a step
-of teleoperation costs.
+"""Jumps and drift of an instrument over 10 000 clutch cycles, and the time of a step of teleoperation.
+
+The hand moves on random paths.
 
 In each cycle the hand strays for some steps while it leads and leaps anywhere while it is free; in between
 the scale changes. Jump: the largest motion of the tip in the step in which the hand takes over. Drift: how

@@ -1,5 +1,6 @@
-"""Fit bodies to the identified dynamics of the PSM: makes robots/dvrk/data/psm_inertia.json and prints how
-well they agree.
+"""Fit bodies to the identified dynamics of the PSM.
+
+It writes robots/dvrk/data/psm_inertia.json and prints how well they agree.
 
 The pseudo-inertia of each body is that of a guess L L^T, changed to (L M) (L M)^T with M lower triangular,
 its diagonal exp(x): whatever x is, a body can have this inertia (Rucker and Wensing, "Smooth parameterization
@@ -59,8 +60,9 @@ def pseudo_inertias(x, roots):
 
 
 def terms():
-    """Return what makes inertia and gravity of the pseudo-inertias, and what they should be less the share of
-    the instrument.
+    """Return the terms of inertia and gravity by the pseudo-inertias, and their values.
+
+    The values are without the share of the instrument.
     """
     chain = psm.chain(TOOL)
     boxes = {

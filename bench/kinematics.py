@@ -1,5 +1,6 @@
-"""How many configurations a second the kinematics take, one by one and ten thousand at once: `python
-bench/kinematics.py`.
+"""How many configurations a second the kinematics take, one by one and ten thousand at once.
+
+Run `python bench/kinematics.py`.
 """
 
 from __future__ import annotations

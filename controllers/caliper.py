@@ -1,7 +1,6 @@
-"""Measuring with a hand: two opposed fingers close on an organ until both feel it, and their kinematics say
-how wide it is.
+"""Measuring with a hand: two opposed fingers close on an organ, and their kinematics yield its width.
 
-For comparison the width of the organ's mesh at rest is taken along the same line.
+For comparison the width of the organ's mesh at rest is computed along the same line.
 """
 
 from __future__ import annotations
@@ -11,13 +10,14 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, number
+from robots.dvrk import crtk
 from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError, StateError
 from schemas.ports import Port
 from schemas.quantity import Force
-from schemas.ros import JointState
+from schemas.ros import Float64Message, JointState
 from schemas.trocar_msgs import SoftBodyState
 from schemas.vectors import Vector
 
@@ -42,45 +42,53 @@ class CaliperParams(Params):
     )
 
 
-class Caliper(Stepped):
+class CaliperState(Record):
+    """Progress of the measurement."""
+
+    closing = array(_FINGERS)
+    """Of each finger: 0 open to 1 closed."""
+    touched = array(_FINGERS)
+    """Of each finger: 1 if its tip has felt the organ."""
+    started = flag()
+    width = number()
+    """m; 0: not yet measured."""
+    true_width = number()
+
+
+class Caliper(Controller):
     """Closes the two fingers from where they are once `start` is 1.
 
-    Each stops when its tip feels the organ; when both have, the width is told.
+    Each stops when its tip feels the organ; when both have, the width is published.
     """
 
     params_model: ClassVar[type[Params]] = CaliperParams
     params: CaliperParams
 
     def __init__(self, name: str, params: CaliperParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._memory = np.zeros(2 * _FINGERS + 3)
-        # of each finger: 0 open to 1 closed; 0 or 1
-        self._closing, self._touched = self._memory[:_FINGERS], self._memory[_FINGERS : 2 * _FINGERS]
-        self._started, self._width, self._true_width = (
-            self._memory[i : i + 1] for i in range(2 * _FINGERS, 2 * _FINGERS + 3)
-        )
-        self._mesh = np.zeros((0, 3, 3))  # triangles of the organ at rest
+        self._now = CaliperState()
+        self._closing, self._touched = self._now.closing, self._now.touched
+        self._keep_mesh(np.zeros((0, 3, 3)))
         self._command = f"{params.arm}/hand/servo_jp"
         self._outputs: dict[str, Any] = {
             self._command: (),
-            "width": self._width,
-            "true_width": self._true_width,
+            "width": self._now.part("width"),
+            "true_width": self._now.part("true_width"),
         }
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """What hand and tissue say in; the command to the fingers and the widths out."""
-        state, number = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
+        """Hand and tissue in; the command to the fingers and the widths out."""
+        state, scalar = JointState.ros_type, Float64Message.ros_type
         motors, bones = tuple(joint.name for joint in HAND.joints), tuple(link.name for link in HAND.links)
         return (
-            Port(name="start", causality="input", type=number, start=(0.0,), description="1: measure"),
+            Port(name="start", causality="input", type=scalar, start=(0.0,), description="1: measure"),
             Port(
                 name="hand",
                 causality="input",
                 type=state,
                 names=motors,
-                fields=("position", "velocity", "effort"),
+                fields=crtk.MEASURED,
                 description="its measured_js",
             ),
             Port(
@@ -88,7 +96,7 @@ class Caliper(Stepped):
                 causality="input",
                 type=state,
                 names=bones,
-                fields=("position", "velocity", "effort"),
+                fields=crtk.MEASURED,
                 description="their measured_js",
             ),
             Port(
@@ -118,34 +126,37 @@ class Caliper(Stepped):
             Port(
                 name="width",
                 causality="output",
-                type=number,
+                type=scalar,
                 unit="m",
                 description="between the fingertips' surfaces when both have touched; 0 before",
             ),
             Port(
                 name="true_width",
                 causality="output",
-                type=number,
+                type=scalar,
                 unit="m",
                 description="of the mesh at rest along the line through both fingertips",
             ),
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
-        """Wait for the start."""
+        """Wait for `start`."""
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Close what has not touched yet. Raises SessionError if a finger is closed and has felt nothing."""
+        """Close the fingers that have not touched the organ.
+
+        Raises SessionError if one is closed and has felt nothing.
+        """
         self._outputs[self._command] = ()
-        self._remember(inputs)
-        if not inputs["start"][0] or self._width[0]:
+        self._read_mesh(inputs)
+        if not inputs["start"][0] or self._now.width:
             return self._outputs
-        if not self._started[0]:
+        if not self._now.started:
             closings = (inputs["hand"][:_FINGERS] - _OPEN[:_FINGERS])[list(_JAWS)] / (_CLOSED - _OPEN)[
                 list(_JAWS)
             ]
-            self._started[0], self._closing[list(_JAWS)] = 1.0, np.clip(closings, 0.0, 1.0)
+            self._now.started, self._closing[list(_JAWS)] = True, np.clip(closings, 0.0, 1.0)
         self._feel(inputs["force"].reshape(_FINGERS, _PHALANGES, 3))
         if self._touched[list(_JAWS)].all():
             self._measure(inputs)
@@ -153,14 +164,19 @@ class Caliper(Stepped):
             self._close(h * 1e-9)
         return self._outputs
 
-    def _remember(self, inputs: Inputs) -> None:
-        """Keep the mesh at rest: the first state, with which the triangles come."""
+    def _keep_mesh(self, mesh: Vector) -> None:
+        """Keep the corners of the organ's triangles at rest, m, shape (n, 3, 3)."""
+        self._mesh = mesh
+        self.keep(self._now, mesh)
+
+    def _read_mesh(self, inputs: Inputs) -> None:
+        """Read the mesh at rest from the first state of the organ, which has the triangles."""
         body = cast("SoftBodyState | None", inputs.message("nodes"))
         if not len(self._mesh) and body is not None and body.triangles.size:
-            self._mesh = body.nodes_m.astype(np.float64).reshape(-1, 3)[body.triangles.reshape(-1, 3)]
+            self._keep_mesh(body.nodes_m.astype(np.float64).reshape(-1, 3)[body.triangles.reshape(-1, 3)])
 
     def _feel(self, forces: Vector) -> None:
-        """Note which fingertips are touched; the published hand has its force sensors there."""
+        """Note which fingertips are touched; the real hand has its force sensors there."""
         for finger in _JAWS:
             if np.linalg.norm(forces[finger, -1]) >= self.params.touch:
                 self._touched[finger] = 1.0
@@ -181,41 +197,33 @@ class Caliper(Stepped):
     def _measure(self, inputs: Inputs) -> None:
         contacts = HAND.contacts(inputs["phalanges"][:_SPHERES].reshape(_FINGERS, _PHALANGES))
         one, other = (contacts[finger, -1] for finger in _JAWS)
-        self._width[0] = np.linalg.norm(one - other) - 2.0 * HAND.radius
+        self._now.width = float(np.linalg.norm(one - other)) - 2.0 * HAND.radius
         ends = inputs["position"].reshape(_FINGERS, _PHALANGES, 3)
-        self._true_width[0] = width_of_mesh(self._mesh, ends[_JAWS[0], -1], ends[_JAWS[1], -1])
-
-    def state_hash(self) -> int:
-        """Return the hash of how far it has come."""
-        return state_hash(self._memory, self._mesh)
-
-    def save(self) -> bytes:
-        """Return how far it has come, and the mesh."""
-        return self._memory.tobytes() + self._mesh.tobytes()
+        self._now.true_width = width_of_mesh(self._mesh, ends[_JAWS[0], -1], ends[_JAWS[1], -1])
 
     def restore(self, state: bytes) -> None:
-        """Go on from where a state was saved. Raises StateError if it is none of a caliper's."""
-        if len(state) < self._memory.nbytes or (len(state) - self._memory.nbytes) % (
-            9 * self._memory.itemsize
-        ):
-            raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, which is none of a"
-                " caliper's; was it saved elsewhere?"
-            )
-        values = np.frombuffer(state)
-        self._memory[:], self._mesh = (
-            values[: self._memory.size],
-            values[self._memory.size :].reshape(-1, 3, 3),
-        )
+        """Return to a saved state, whose mesh may be another one.
 
-    def close(self) -> None:
-        """Nothing to give back."""
+        Raises StateError, and changes nothing, if its size is wrong or a field cannot have its value.
+        """
+        mesh, (triangles, rest) = self._mesh, divmod(len(state) - self._now.values.nbytes, 9 * 8)
+        if triangles < 0 or rest:
+            raise StateError(
+                f"participant '{self.name}': a saved state of {len(state)} bytes, which is not a caliper's;"
+                " was it saved elsewhere?"
+            )
+        self._keep_mesh(np.zeros((triangles, 3, 3)))
+        try:
+            super().restore(state)
+        except StateError:
+            self._keep_mesh(mesh)
+            raise
 
 
 def width_of_mesh(triangles: Vector, one: Vector, other: Vector) -> float:
-    """Return how wide a closed surface is along the line through two points: between the outermost points
-    where the line meets it; 0 if it misses.
+    """Return the width of a closed surface along the line through two points.
 
+    It is measured between the outermost points where the line meets the surface, and 0 if it misses.
     Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", Journal of Graphics Tools 2
     (1997).
 

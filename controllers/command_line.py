@@ -1,4 +1,4 @@
-"""The commands `trocar study`: what can be done with an instrument, counted over a set of tasks."""
+"""The commands `trocar study`: what an instrument can do, counted over a set of tasks."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(
-    help="What can be done with an instrument, counted over a set of tasks.", no_args_is_help=True
-)
+app = typer.Typer(help="What an instrument can do, counted over a set of tasks.", no_args_is_help=True)
 
 _COLUMNS = {
     "feasible_share": "rolling",
@@ -29,7 +27,7 @@ _COLUMNS = {
 
 @app.callback()
 def _group() -> None:
-    """Stand for the group, so that it is one with a single command too."""
+    """Make it a group, although it has a single command."""
 
 
 @app.command()
@@ -40,11 +38,14 @@ def rolling(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")] = False,
 ) -> None:
-    """Print which share of a set of stitches a PSM can make, with a needle driver that rolls the needle in
-    hand and without; takes some seconds.
+    """Print which share of a set of stitches a PSM can make; takes some seconds.
+
+    It compares a needle driver that rolls the needle in hand with one that does not.
     """
     if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise typer.BadParameter(f"'{plot}' is no picture: .png, .svg or .pdf", param_hint="--plot")
+        raise typer.BadParameter(
+            f"'{plot}' is not a picture file, allowed are .png, .svg and .pdf", param_hint="--plot"
+        )
     from robots.dvrk.stitch_study import study
 
     made = study()
@@ -90,15 +91,15 @@ def _text(found: dict[str, Any]) -> str:
             ),
         ]
     without = (
-        f"without: the needle grasped at a roll of {found['grasp_without_deg']:.0f} degrees, which of all"
-        " serves most stitches"
+        f"without: the needle grasped at a roll of {found['grasp_without_deg']:.0f} degrees, which serves"
+        " most stitches"
     )
     return "\n".join(
         [
             *lines,
             "",
             without,
-            "regrasped: at whichever roll each stitch needs; rolling: the needle turned in hand on the way",
+            "regrasped: at the roll that each stitch needs; rolling: the needle is turned in hand on the way",
         ]
     )
 

@@ -1,28 +1,27 @@
-"""Both masters drag the picture: the endoscope as the camera pedal of a dVRK lets surgeons lead it.
+"""Both masters drag the picture: they lead the endoscope, as with the camera pedal of a dVRK.
 
 The law of jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationECM.cpp (RunEnabled). With c the middle between
 the masters in the display's frame and u the normal of the plane through both and the display's origin, each
-against what it was when the pedal went down:
+relative to its value when the pedal was pressed:
 
     a = -angle about y of c,  b = angle about x of c,  i = s (|c0| - |c|),  r = -angle about z of u,    g =
     q0_roll + r
     q = q0 + (a cos g - b sin g,  b cos g + a sin g,  i,  r)
 
-The masters are held at their distance by springs, rubbed, and turned against the picture, so that hands feel
-one thing that they hold. The reference is taken from the endoscope's setpoint, so the first step moves
-nothing.
+The masters are held at their distance by springs, damped, and turned against the picture, so that both hands
+feel as if they held one thing. The reference is the endoscope's setpoint, so the first step moves nothing.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, cast
 
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, restore_arrays, state_hash
+from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, Value, array, flag
 from robots import rotation
-from robots.dvrk import ecm
+from robots.dvrk import crtk, ecm
 from schemas.crtk import OperatingState
 from schemas.ports import Port
 from schemas.quantity import Duration
@@ -31,9 +30,11 @@ from schemas.ros import (
     Header,
     JointState,
     Joy,
+    PoseStamped,
     Quaternion,
     StringMessage,
     Time,
+    TwistStamped,
     Vector3,
     Wrench,
     WrenchStamped,
@@ -43,11 +44,10 @@ from schemas.vectors import Vector
 __all__ = ["EcmMasters", "EcmMastersParams"]
 
 _MASTERS = ("MTML", "MTMR")
-_MEASURED: tuple[Literal["position", "velocity", "effort"], ...] = ("position", "velocity", "effort")
 _X, _Y, _Z = np.eye(3)
 _SPRING = 150.0
 """N/m between a master and where it was relative to the other one (distanceForceCoeff)."""
-_RUB = np.array([-10.0, -10.0, -40.0])
+_DAMPER = np.array([-10.0, -10.0, -40.0])
 """N s/m along the axes of the display (frictionForceCoeff)."""
 _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
 
@@ -63,33 +63,43 @@ class EcmMastersParams(Params):
     )
 
 
-class EcmMasters(Stepped):
-    """Two masters, one endoscope: it follows while button 0 is held, the arm is ready and both masters are
-    heard.
+class EcmMastersState(Record):
+    """The pedal, and the reference from when it was pressed."""
+
+    pressed = flag()
+    ready = flag(start=True)
+    """Whether the endoscope's arm is ENABLED and homed."""
+    follows = flag()
+    middle = array(3)
+    """Between the masters, m."""
+    up = array(3)
+    """Normal of the plane through the masters and the display's origin."""
+    span = array(2)
+    """Half of the way between the masters, along the picture's right and along the middle, m."""
+    start = array(4)
+    """Joint positions of the endoscope."""
+    turns = array(2, 4)
+    """Orientations of the masters, quaternions (x, y, z, w)."""
+    unused = array(2)
+    """Kept so that state hashes stay comparable with those of older recordings."""
+
+
+class EcmMasters(Controller):
+    """Two masters, one endoscope.
+
+    It follows while button 0 is held, the arm is ready and the poses of both masters are fresh.
     """
 
     params_model: ClassVar[type[Params]] = EcmMastersParams
     params: EcmMastersParams
 
     def __init__(self, name: str, params: EcmMastersParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._chain = ecm.chain()
-        self._state = np.zeros(25)
-        parts = np.split(self._state, [1, 2, 3, 6, 9, 11, 15, 19, 23])
-        (
-            self._pressed,
-            self._ready,
-            self._follows,
-            self._middle,
-            self._up,
-            self._span,
-            self._start,
-            *turns,
-            _,
-        ) = parts
-        self._turns = dict(zip(_MASTERS, turns, strict=True))
-        self._ready[0] = 1.0
+        self._now = EcmMastersState()
+        self.keep(self._now)
+        self._middle, self._up, self._span = self._now.middle, self._now.up, self._now.span
+        self._start, self._turns = self._now.start, dict(zip(_MASTERS, self._now.turns, strict=True))
         self._commands = [f"{master}/{name}" for master in _MASTERS for name in _COMMANDS]
         self._silent: dict[str, Value] = {
             "ECM/servo_jp": (),
@@ -99,16 +109,9 @@ class EcmMasters(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """The masters, the pedal and the endoscope's setpoint in; its commands, and those to the masters,
-        out.
-        """
-        age, pose, twist = (
-            self.params.max_age,
-            "geometry_msgs/msg/PoseStamped",
-            "geometry_msgs/msg/TwistStamped",
-        )
-        still = ecm.HOME + (0.0,) * 8
-        joints, told = "sensor_msgs/msg/JointState", "of a motion controller, whose setpoint_js it is"
+        """The masters, the pedal and the endoscope's setpoint in; commands to it and to the masters out."""
+        age, pose, twist = self.params.max_age, PoseStamped.ros_type, TwistStamped.ros_type
+        still, joints = ecm.HOME + (0.0,) * 8, JointState.ros_type
         return (
             *(
                 Port(name=f"{master}/measured_cp", causality="input", type=pose, max_age_ns=age)
@@ -130,9 +133,9 @@ class EcmMasters(Stepped):
                 causality="input",
                 type=joints,
                 names=ecm.JOINT_NAMES,
-                fields=_MEASURED,
+                fields=crtk.MEASURED,
                 start=still,
-                description=told,
+                description="setpoint_js of a motion controller",
             ),
             Port(
                 name="operating_state",
@@ -169,25 +172,26 @@ class EcmMasters(Stepped):
         )
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
-        """Start with the pedal up."""
+        """Start with the pedal released."""
         return self._silent | {"following": _HOLDS}
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Follow the masters while the pedal is down."""
         for joy in cast("tuple[Joy, ...]", inputs.events("buttons")):
             if joy.buttons.size:
-                self._pressed[0] = joy.buttons[0] != 0
+                self._now.pressed = bool(joy.buttons[0] != 0)
         for state in cast("tuple[OperatingState, ...]", inputs.events("operating_state")):
-            self._ready[0] = state.state == "ENABLED" and state.is_homed
+            self._now.ready = crtk.is_ready(state)
         silent = [master for master in _MASTERS if inputs.stale(f"{master}/measured_cp")]
-        before, self._follows[0] = self._follows[0], self._pressed[0] and self._ready[0] and not silent
-        outputs = self._silent | {"following": _FOLLOWS if self._follows[0] else _HOLDS}
-        if before and not self._follows[0]:
+        before = self._now.follows
+        self._now.follows = follows = self._now.pressed and self._now.ready and not silent
+        outputs = self._silent | {"following": _FOLLOWS if follows else _HOLDS}
+        if before and not follows:
             outputs |= {f"{master}/body/servo_cf": (WrenchStamped(),) for master in _MASTERS}
-            if self._pressed[0]:
+            if self._now.pressed:
                 reason = f"{silent[0]} is silent" if silent else "it is not ENABLED and homed"
                 outputs["warning"] = (StringMessage(data=f"ECM holds: {reason}"),)
-        if self._follows[0]:
+        if follows:
             left, right = (inputs[f"{master}/measured_cp"] for master in _MASTERS)
             if not before:
                 self._engage(left, right, inputs["measured_js"])
@@ -201,7 +205,7 @@ class EcmMasters(Stepped):
         return outputs
 
     def _engage(self, left: Vector, right: Vector, endoscope: Vector) -> None:
-        """Take the reference."""
+        """Set the reference to the present poses."""
         self._middle[:], self._up[:], side = _picture(left[:3], right[:3])
         between = right[:3] - left[:3]
         self._span[:] = 0.5 * (side @ between), 0.5 * (self._middle @ between) / np.linalg.norm(self._middle)
@@ -210,7 +214,7 @@ class EcmMasters(Stepped):
             self._turns[master][:] = pose[3:]
 
     def _lead(self, left: Vector, right: Vector, stamp: Time) -> dict[str, Value]:
-        """Return the command to the endoscope, and how the masters are turned against it."""
+        """Return the command to the endoscope, and the orientations at which the masters are held."""
         middle, up, _ = _picture(left, right)
         a, b, r = (
             -_angle(_Y, self._middle, middle),
@@ -232,45 +236,32 @@ class EcmMasters(Stepped):
         return locks | {"ECM/servo_jp": (JointState(header=Header(stamp=stamp), position=goal),)}
 
     def _hold_together(self, left: Vector, right: Vector, inputs: Inputs) -> dict[str, Value]:
-        """Return the forces on the masters: springs to where each is relative to the other, and friction."""
+        """Return the forces on the masters: springs that keep them apart, and dampers."""
         middle, _, side = _picture(left, right)
-        reach = self._span[0] * side + self._span[1] * middle / np.linalg.norm(middle)
+        right_share, middle_share = self._span.tolist()
+        reach = right_share * side + middle_share * middle / np.linalg.norm(middle)
         forces: dict[str, Value] = {}
         for master, goal, at in (("MTML", middle - reach, left), ("MTMR", middle + reach, right)):
-            force = _SPRING * (goal - at) + _RUB * inputs[f"{master}/measured_cv"][:3]
+            force = _SPRING * (goal - at) + _DAMPER * inputs[f"{master}/measured_cv"][:3]
             wrench = Wrench(force=Vector3(**dict(zip("xyz", force.tolist(), strict=True))))
             forces[f"{master}/body/servo_cf"] = (WrenchStamped(wrench=wrench),)
         return forces
 
-    def state_hash(self) -> int:
-        """Return the hash of the pedal and the reference."""
-        return state_hash(self._state)
-
-    def save(self) -> bytes:
-        """Return what is hashed."""
-        return self._state.tobytes()
-
-    def restore(self, state: bytes) -> None:
-        """Return to a saved state. Raises StateError if it has the wrong size."""
-        restore_arrays(self.name, (self._state,), state)
-
-    def close(self) -> None:
-        """Nothing is held."""
-
 
 _COMMANDS = {
-    "use_gravity_compensation": BoolMessage.ros_type,
-    "body/set_cf_orientation_absolute": BoolMessage.ros_type,
-    "body/servo_cf": WrenchStamped.ros_type,
-    "lock_orientation": Quaternion.ros_type,
+    name: (crtk.COMMANDS | crtk.MTM_COMMANDS)[name]
+    for name in (
+        "use_gravity_compensation",
+        "body/set_cf_orientation_absolute",
+        "body/servo_cf",
+        "lock_orientation",
+    )
 }
-"""To each master: type."""
+"""To each master: ROS type."""
 
 
 def _picture(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the middle between the masters, the way up in the picture that they hold, and the way to its
-    right.
-    """
+    """Return the middle between the masters, and up and right in the picture that they hold."""
     middle = 0.5 * (left + right)
     up = np.cross(right - left, middle)
     up /= np.linalg.norm(up)
@@ -279,14 +270,15 @@ def _picture(left: Vector, right: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 def _angle(axis: Vector, one: Vector, other: Vector) -> float:
-    """Return the angle (rad) about `axis` from `one` to `other`, as seen along it."""
+    """Return the angle (rad) about `axis` from `one` to `other`."""
     one, other = one - (axis @ one) * axis, other - (axis @ other) * axis
     return float(np.arctan2(axis @ np.cross(one, other), one @ other))
 
 
 def _turned(q: Vector) -> Vector:
-    """Return how the picture is turned at joint positions `q`: roll about z, yaw about y, pitch about x, as a
-    quaternion.
+    """Return the orientation of the picture, a quaternion, at joint positions `q`.
+
+    Roll is about z, yaw about y, pitch about x.
     """
     return rotation.product(
         rotation.product(rotation.exp(q[3] * _Z), rotation.exp(q[0] * _Y)), rotation.exp(q[1] * _X)

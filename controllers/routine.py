@@ -1,9 +1,8 @@
-"""A scripted procedure: CRTK commands to the motion controller, one after the other or together, each waited
-for.
+"""A scripted procedure: CRTK commands to the motion controller, in sequence or at the same time.
 
-The routine is a client like any other: it gives a command, waits until the arm's operating state has said
-busy and then not busy, and goes on. A command that is refused (the arm's `error` or `warning` port speaks)
-ends the session with the controller's own words.
+The routine is a client like any other: it sends a command, waits until the arm's operating state was busy and
+is not busy any more, and continues. A command that is refused, with an event on the arm's `error` or
+`warning`, ends the session with the text of that event.
 """
 
 from __future__ import annotations
@@ -14,26 +13,35 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
+from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, integer
 from robots.dvrk.musha import HAND
 from robots.dvrk.parameters import UnitQuaternion
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState, StringStamped
-from schemas.errors import SessionError, StateError
+from schemas.errors import SessionError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.quantity import Angle, Duration, Length
-from schemas.ros import Header, JointState, Point, Pose, PoseStamped, Quaternion, StringMessage
+from schemas.ros import (
+    Float64Message,
+    Header,
+    JointState,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    StringMessage,
+)
 
 __all__ = ["Routine", "RoutineParams"]
 
 
-class _Order(Params):
+class _Command(Params):
     arm: CartArm
 
 
-class MoveTip(_Order):
-    """Bring the tip to a pose."""
+class MoveTip(_Command):
+    """Move the tip to a pose."""
 
     do: Literal["move_cp"]
     position: tuple[Length, Length, Length]
@@ -51,8 +59,8 @@ class MoveTip(_Order):
         )
 
 
-class MoveJoints(_Order):
-    """Bring the joints to positions (rad, m)."""
+class MoveJoints(_Command):
+    """Move the joints to positions (rad, m)."""
 
     do: Literal["move_jp"]
     positions: tuple[float, ...] = Field(description="of all joints of the arm, in rad and m")
@@ -62,14 +70,12 @@ class MoveJoints(_Order):
         return f"{self.arm}/move_jp", JointState(position=np.array(self.positions))
 
 
-class MoveJaw(_Order):
-    """Open or close the jaw; where it has a roller, roll what it holds."""
+class MoveJaw(_Command):
+    """Open or close the jaw; one with a roller also rolls the needle that it holds."""
 
     do: Literal["jaw"]
     angle: Angle
-    roll: Angle | None = Field(
-        default=None, description="for a jaw with a roller: by how much to have rolled the needle"
-    )
+    roll: Angle | None = Field(default=None, description="for a jaw with a roller: angle of the roller")
 
     def message(self) -> tuple[str, Message]:
         """Return port and message."""
@@ -78,8 +84,8 @@ class MoveJaw(_Order):
         )
 
 
-class MoveHand(_Order):
-    """Bring the fingers of a hand into a mode."""
+class MoveHand(_Command):
+    """Move the fingers of a hand into a mode."""
 
     do: Literal["hand"]
     mode: Literal["folded", "retractor", "grasp", "caliper"]
@@ -90,7 +96,7 @@ class MoveHand(_Order):
         return f"{self.arm}/hand/move_jp", JointState(position=HAND.command(self.mode, self.closing))
 
 
-class ChangeState(_Order):
+class ChangeState(_Command):
     """Change the operating state."""
 
     do: Literal["state"]
@@ -102,20 +108,20 @@ class ChangeState(_Order):
 
 
 class Wait(Params):
-    """Let time pass."""
+    """Wait."""
 
     do: Literal["wait"]
     time: Duration = Field(ge=0)
 
 
-Order = Annotated[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState, Field(discriminator="do")]
+Command = Annotated[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState, Field(discriminator="do")]
 
 
 class Together(Params):
-    """Give several orders at once, and wait for all."""
+    """Send several commands at once, and wait for all."""
 
     do: Literal["together"]
-    orders: tuple[Order, ...] = Field(min_length=1)
+    orders: tuple[Command, ...] = Field(min_length=1)
 
 
 Step = Annotated[
@@ -130,38 +136,51 @@ class RoutineParams(Params):
     limit: Duration = Field(
         default=10 * 10**9,
         gt=0,
-        description="simulated time after which an order that is not done ends the session",
+        description="simulated time after which a command that is not done ends the session",
     )
 
 
-class Routine(Stepped):
-    """Works through its steps; `step` says which one is under way, `done` becomes 1 when all are."""
+class RoutineState(Record):
+    """Progress of the routine."""
+
+    step = integer()
+    """Number of the present step, from 0."""
+    done = flag()
+    """Whether all steps are."""
+    begun_ns = integer(-1)
+    """When the present step began, ns; -1: it has not begun."""
+    busy = array("arms")
+    """Of each arm: 0 nothing is awaited, 1 busy is awaited, 2 not busy is awaited."""
+
+
+class Routine(Controller):
+    """Executes its steps; `step` is the number of the present one, `done` becomes 1 after the last."""
 
     params_model: ClassVar[type[Params]] = RoutineParams
     params: RoutineParams
 
     def __init__(self, name: str, params: RoutineParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
-        self._arms = sorted({order.arm for step in params.steps for order in _orders(step)})
-        self._commands = sorted({order.message()[0] for step in params.steps for order in _orders(step)})
-        self._position, self._done = np.zeros(1), np.zeros(1)
-        self._begun = np.full(1, -1.0)  # ns; -1: the step has not begun
-        # 0: nothing is awaited, 1: busy is awaited, 2: not busy is awaited
-        self._busy = np.zeros(len(self._arms))
+        self._arms = sorted({command.arm for step in params.steps for command in _commands(step)})
+        self._commands = sorted(
+            {command.message()[0] for step in params.steps for command in _commands(step)}
+        )
+        self._now = RoutineState(arms=len(self._arms))
+        self._busy = self._now.busy
+        self.keep(self._now)
         self._outputs: dict[str, Any] = {
-            "step": self._position,
-            "done": self._done,
+            "step": self._now.part("step"),
+            "done": self._now.part("done"),
             **dict.fromkeys(self._commands, ()),
         }
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Per arm its events in and the commands that the steps need out; progress."""
+        """The events of each arm in; the commands of the steps and the progress out."""
         types = {
-            order.message()[0]: order.message()[1].ros_type
+            command.message()[0]: command.message()[1].ros_type
             for step in self.params.steps
-            for order in _orders(step)
+            for command in _commands(step)
         }
         events = (
             ("operating_state", OperatingState.ros_type),
@@ -181,13 +200,13 @@ class Routine(Stepped):
             Port(
                 name="step",
                 causality="output",
-                type="std_msgs/msg/Float64",
-                description="number of the step under way, from 0",
+                type=Float64Message.ros_type,
+                description="number of the present step, from 0",
             ),
             Port(
                 name="done",
                 causality="output",
-                type="std_msgs/msg/Float64",
+                type=Float64Message.ros_type,
                 description="1 when all steps are done",
             ),
         )
@@ -197,37 +216,37 @@ class Routine(Stepped):
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
-        """Listen to the arms; give the next orders if the last ones are done. Raises SessionError if one is
-        refused or takes too long.
+        """Read the events of the arms, and send the next commands when the last ones are done.
+
+        Raises SessionError if a command is refused or takes too long.
         """
         for name in self._commands:
             self._outputs[name] = ()
-        self._listen(inputs)
-        if self._done[0]:
+        self._receive(inputs)
+        now = self._now
+        if now.done:
             return self._outputs
-        step = self.params.steps[int(self._position[0])]
-        if self._begun[0] < 0.0:
+        step = self.params.steps[now.step]
+        if now.begun_ns < 0:
             self._begin(step, t)
         elif self._is_over(step, t):
-            self._position[0] += 1.0
-            self._begun[0] = -1.0
-            self._done[0] = float(self._position[0] == len(self.params.steps))
+            now.step, now.begun_ns = now.step + 1, -1
+            now.done = now.step == len(self.params.steps)
         return self._outputs
 
     def _begin(self, step: Step, t: int) -> None:
-        self._begun[0] = t
-        for order in _orders(step):
-            port, message = order.message()
+        self._now.begun_ns = t
+        for command in _commands(step):
+            port, message = command.message()
             self._outputs[port] += (message,)
-            self._busy[self._arms.index(order.arm)] = 1.0
+            self._busy[self._arms.index(command.arm)] = 1.0
 
-    def _listen(self, inputs: Inputs) -> None:
-        where = int(self._position[0])
+    def _receive(self, inputs: Inputs) -> None:
         for i, arm in enumerate(self._arms):
             for kind in ("error", "warning"):
                 for message in inputs.events(f"{arm}/{kind}"):
                     raise SessionError(
-                        f"routine '{self.name}', step {where}: {cast('StringMessage', message).data}"
+                        f"routine '{self.name}', step {self._now.step}: {cast('StringMessage', message).data}"
                     )
             for message in inputs.events(f"{arm}/operating_state"):
                 busy = cast("OperatingState", message).is_busy
@@ -236,43 +255,18 @@ class Routine(Stepped):
 
     def _is_over(self, step: Step, t: int) -> bool:
         if isinstance(step, Wait):
-            return t - self._begun[0] >= step.time
-        if t - self._begun[0] > self.params.limit:
+            return t - self._now.begun_ns >= step.time
+        if t - self._now.begun_ns > self.params.limit:
             late = ", ".join(arm for arm, busy in zip(self._arms, self._busy, strict=True) if busy)
             raise SessionError(
-                f"routine '{self.name}', step {int(self._position[0])}: {late} not done within"
+                f"routine '{self.name}', step {self._now.step}: {late} not done within"
                 f" {self.params.limit / 1e9:g} s"
             )
         return not self._busy.any()
 
-    def _state(self) -> bytes:
-        return np.concatenate([self._position, self._done, self._begun, self._busy]).tobytes()
 
-    def state_hash(self) -> int:
-        """Return the hash of how far it has come."""
-        return state_hash(self._state())
-
-    def save(self) -> bytes:
-        """Return how far it has come."""
-        return self._state()
-
-    def restore(self, state: bytes) -> None:
-        """Go on from where a state was saved. Raises StateError if it is none of this routine's."""
-        if len(state) != len(self._state()):
-            raise StateError(
-                f"participant '{self.name}': a saved state of {len(state)} bytes, this routine's has"
-                f" {len(self._state())}; was it saved elsewhere?"
-            )
-        self._position[:], self._done[:], self._begun[:], self._busy[:] = np.split(
-            np.frombuffer(state), [1, 2, 3]
-        )
-
-    def close(self) -> None:
-        """Nothing to give back."""
-
-
-def _orders(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState]:
-    """Yield what `step` orders arms to do."""
+def _commands(step: Step) -> Iterator[MoveTip | MoveJoints | MoveJaw | MoveHand | ChangeState]:
+    """Yield the commands of a step."""
     if isinstance(step, Together):
         yield from step.orders
     elif not isinstance(step, Wait):

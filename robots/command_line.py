@@ -1,4 +1,4 @@
-"""What `trocar model fk` says: where an arm's tip stands.
+"""What `trocar model fk` prints: where an arm's tip stands.
 
 The command itself is mounted beside the model's other commands.
 """

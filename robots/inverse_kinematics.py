@@ -39,8 +39,9 @@ _CORRECTIONS = 4
 def pursue(
     chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector
 ) -> Vector:
-    """Return joint positions, shape (n,), that meet the goal, or come nearer to it than `q` inside the joint
-    ranges and `largest_move`.
+    """Return joint positions, shape (n,), that meet the goal, or are nearer to it than `q`.
+
+    They are inside the joint ranges and `largest_move`.
 
     For each step of a control loop: a goal that moves at the usual speeds is met to 1e-15 m, one out of reach
     followed to where the weighted error is least; a goal that is met moves nothing, not by rounding either.
@@ -69,8 +70,9 @@ def pursue(
 
 
 def _error(tip: Vector, position: Vector, orientation: Vector, length: float) -> Vector:
-    """Return what is left to the goal from the pose `tip`, shape (4, 4): way, then turn as a rotation vector
-    in metres, shape (6,).
+    """Return the error from the pose `tip`, shape (4, 4), to the goal, shape (6,).
+
+    The displacement comes first, then the rotation vector in metres.
     """
     error = np.empty(6)
     error[:3] = position - tip[:3, 3]
@@ -81,8 +83,9 @@ def _error(tip: Vector, position: Vector, orientation: Vector, length: float) ->
 
 
 def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector, length: float) -> Vector:
-    """Return a move, shape (n,), that stays inside the joint ranges: joints that would leave theirs go to its
-    end, and the others make the best of it.
+    """Return a move, shape (n,), that stays inside the joint ranges.
+
+    Joints that would leave theirs go to its end, and the others correct as much as they can.
     """
     jacobian = chain.jacobian(frames)
     jacobian[3:] *= length

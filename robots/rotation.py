@@ -66,8 +66,7 @@ def matrix(q: Vector) -> Vector:
 
 
 def from_matrix(r: Vector) -> Vector:
-    """Return the unit quaternion, shape (4,), of the rotation matrix `r`, shape (3, 3) or the corner of a (4,
-    4).
+    """Return the unit quaternion, shape (4,), of the rotation matrix `r`, (3, 3) or the corner of a (4, 4).
 
     Each row below is 4 q_i q, so the one with the largest q_i is well scaled for every rotation
     (Bar-Itzhack's observation that q is the dominant eigenvector of this matrix, without the eigenvalues).

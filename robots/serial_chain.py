@@ -19,13 +19,26 @@ import numpy as np
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Joint", "SerialChain"]
+__all__ = ["Joint", "SerialChain", "jerk_limit"]
+
+_RISE = 0.1
+"""Time (s) in which a trajectory's acceleration grows from 0 to its limit.
+
+The dVRK's own trajectories (Reflexxes, type II) do not limit jerk; for the choice see docs/decisions/0007.
+"""
+
+
+def jerk_limit(acceleration: float) -> float:
+    """Return the jerk limit (rad/s^3, m/s^3) for a limit of the acceleration (rad/s^2, m/s^2)."""
+    return acceleration / _RISE
 
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: its modified DH row (rad, m) and what it can do (rad, m; rad/s, m/s; N m, N; rad/s^2, m/s^2;
-    rad/s^3, m/s^3).
+    """One joint: its modified DH row and its limits, all in rad or m, s, N m or N.
+
+    Units of the limits: range rad, m; velocity rad/s, m/s; effort N m, N; acceleration rad/s^2, m/s^2; jerk
+    rad/s^3, m/s^3.
     """
 
     name: str
@@ -107,8 +120,9 @@ class SerialChain:
 
     @classmethod
     def from_standard(cls, joints: Sequence[Joint], tip: Vector) -> SerialChain:
-        """Return the chain whose joints carry rows of standard form: link i stands to link i-1 as Rz(theta)
-        Tz(d) Tx(a) Rx(alpha).
+        """Return the chain of joints with DH rows of standard form.
+
+        There, link i is at Rz(theta) Tz(d) Tx(a) Rx(alpha) in link i-1.
 
         Only the frames between base and tip differ from those of the standard form: each stands before the a
         and alpha of its own row, which go to the row after it, the last ones to the tip.
@@ -121,8 +135,9 @@ class SerialChain:
         )
 
     def frames(self, q: Vector) -> Vector:
-        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4), at `q`,
-        shape (..., n).
+        """Return the poses of all links and of the tip in the base frame, shape (..., n + 1, 4, 4).
+
+        Positions `q` have shape (..., n).
 
         Raises MotionError for another number of joints.
         """
@@ -156,8 +171,9 @@ class SerialChain:
         return poses
 
     def out_of_range(self, q: Vector, *, slack: float = 0.0) -> list[str]:
-        """Return what is wrong with the positions `q`, shape (n,): a sentence for each joint outside its
-        range by more than `slack`.
+        """Return what is wrong with `q`, shape (n,).
+
+        That is a sentence for each joint outside its range by more than `slack`.
         """
         return [
             f"joint {joint.name} at {value:.6g} {joint.unit}, allowed are {joint.lower:g} .. {joint.upper:g}"
@@ -185,8 +201,9 @@ class SerialChain:
             raise MotionError("; ".join(wrong))
 
     def forward(self, q: Vector) -> Vector:
-        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n), inside the
-        joint ranges or not.
+        """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n).
+
+        Positions may be outside the joint ranges.
 
         Raises MotionError for another number of joints, or a position that is not finite.
         """

@@ -1,6 +1,6 @@
-"""The surgeon's console: pedals, who is selected, scale, and what the masters are told."""
+"""The surgeon's console of a dVRK: pedals, selection of teleoperations, scale, commands to masters."""
 
-from controllers.dvrk_console.controller import Console
-from controllers.dvrk_console.params import ConsoleParams
+from controllers.dvrk_console.controller import DvrkConsole
+from controllers.dvrk_console.params import DvrkConsoleParams
 
-__all__ = ["Console", "ConsoleParams"]
+__all__ = ["DvrkConsole", "DvrkConsoleParams"]

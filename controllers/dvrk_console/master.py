@@ -1,6 +1,6 @@
-"""What a master with motors is told: to turn as the tip does, to float while it leads, to keep its
-orientation while the clutch is pressed.
+"""Commands to a master with motors.
 
+It turns as the tip does, floats while it leads, and keeps its orientation while the clutch is pressed.
 As jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp (RunAligningMTM, EnterEnabled, Clutch) does.
 """
 
@@ -10,8 +10,7 @@ from math import radians
 
 import numpy as np
 
-from controllers.dvrk_console.ports import NO_GRIPPER
-from controllers.dvrk_console.voice import Voice
+from controllers.dvrk_console.ports import NO_GRIPPER, EventOutputs
 from robots import rotation
 from schemas.ros import BoolMessage, EmptyMessage, Point, Pose, PoseStamped, Quaternion, WrenchStamped
 from schemas.vectors import Vector
@@ -25,30 +24,33 @@ _GRIPPER_ZERO, _GRIPPER_MAX = 0.0, radians(60.0)
 class Master:
     """The commands to one master."""
 
-    def __init__(self, name: str, voice: Voice) -> None:
-        """Take the master's name, `MTMR`, and what speaks."""
-        self._name, self._voice = name, voice
+    def __init__(self, name: str, events: EventOutputs) -> None:
+        """Take the master's name, `MTMR`, and where commands are published."""
+        self._name, self._events = name, events
 
     def hold(self) -> None:
         """Stay."""
-        self._voice.say(f"{self._name}/hold", EmptyMessage())
+        self._events.publish(f"{self._name}/hold", EmptyMessage())
 
     def turn(self, where: Vector, orientation: Vector) -> None:
-        """Stay at the pose `where` but turn to `orientation` (x, y, z, w), which is the tip's in the camera's
-        frame.
+        """Stay at the position of `where` but turn to `orientation`, the tip's in the camera's frame.
+
+        Args:
+            where: pose of the master (x, y, z, qx, qy, qz, qw).
+            orientation: quaternion (x, y, z, w).
         """
         position = Point(**dict(zip("xyz", where[:3].tolist(), strict=True)))
         pose = Pose(position=position, orientation=_quaternion(orientation))
-        self._voice.say(f"{self._name}/move_cp", PoseStamped(pose=pose))
+        self._events.publish(f"{self._name}/move_cp", PoseStamped(pose=pose))
 
     def float(self, locked: Vector | None) -> None:
-        """Follow the hand without a force; keep the orientation `locked` (x, y, z, w), if it is not to turn."""
-        self._voice.say(f"{self._name}/use_gravity_compensation", BoolMessage(data=True))
-        self._voice.say(f"{self._name}/body/servo_cf", WrenchStamped())
+        """Follow the hand without a force; keep the orientation `locked` (x, y, z, w), if there is one."""
+        self._events.publish(f"{self._name}/use_gravity_compensation", BoolMessage(data=True))
+        self._events.publish(f"{self._name}/body/servo_cf", WrenchStamped())
         if locked is None:
-            self._voice.say(f"{self._name}/unlock_orientation", EmptyMessage())
+            self._events.publish(f"{self._name}/unlock_orientation", EmptyMessage())
         else:
-            self._voice.say(f"{self._name}/lock_orientation", _quaternion(locked))
+            self._events.publish(f"{self._name}/lock_orientation", _quaternion(locked))
 
 
 def opening(angle: float) -> float:
@@ -61,8 +63,9 @@ def opening(angle: float) -> float:
 
 
 def offset(master: Vector, tip: Vector) -> Quaternion:
-    """Return how the tip is turned as the master sees it; both quaternions (x, y, z, w) in frames whose axes
-    stand for each other.
+    """Return the orientation of the tip relative to the master's.
+
+    Both are quaternions (x, y, z, w) in frames whose axes correspond: the camera's and the display's.
     """
     return _quaternion(rotation.product(rotation.conjugate(master), tip))
 

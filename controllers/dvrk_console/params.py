@@ -1,4 +1,4 @@
-"""What a scenario may say about the console of a dVRK. SI units, radians."""
+"""Parameters of the dVRK's console. SI units, radians."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pydantic import Field, model_validator
 from hub.participant import Params
 from robots.dvrk.setup_joints import CartArm
 
-__all__ = ["ComponentName", "ConsoleParams"]
+__all__ = ["ComponentName", "DvrkConsoleParams"]
 
 ComponentName = Annotated[str, Field(pattern=r"^MTM[LR]_PSM[123]$")]
 """A master and the arm that it leads: `MTMR_PSM1`."""
 
 
-class ConsoleParams(Params):
+class DvrkConsoleParams(Params):
     """Which arms there are, and which master may lead which of them."""
 
     arms: tuple[CartArm, ...] = Field(
@@ -33,10 +33,7 @@ class ConsoleParams(Params):
     )
     enabled: bool = Field(
         default=False,
-        description=(
-            "whether teleoperation is enabled at time 0; on the real system nobody is led until somebody asks"
-            " for it"
-        ),
+        description=("whether teleoperation is enabled at time 0; on the real system it is not"),
     )
     align_mtm: bool = Field(
         default=True,
@@ -46,7 +43,7 @@ class ConsoleParams(Params):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         if len(set(self.teleoperations)) < len(self.teleoperations):
-            raise ValueError(f"a teleoperation is named twice: {', '.join(self.teleoperations)}")
+            raise ValueError(f"a teleoperation is listed twice: {', '.join(self.teleoperations)}")
         for name in self.teleoperations:
             if (arm := name.partition("_")[2]) not in self.arms:
                 raise ValueError(f"'{name}' leads {arm}, which is not among the arms: {', '.join(self.arms)}")

@@ -1,50 +1,82 @@
-"""The ports of the console: named as the topics of a dVRK; `pedals/` from what is pressed, `teleop/` to and
-from those who lead.
+"""The ports of the dVRK's console, named as its topics, and its event outputs.
+
+Beside them there are `pedals/`, from a device, and `teleop/`, to and from the teleoperations that lead arms.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import pi
+from typing import Any
 
-from controllers.dvrk_console.params import ConsoleParams
+from controllers.dvrk_console.params import DvrkConsoleParams
+from robots.dvrk import crtk
 from robots.dvrk.console_topics import BUTTON, CONSOLE, PEDALS, SYSTEM, TELEOPERATION
+from schemas.crtk import OperatingState, StringStamped
+from schemas.message import Message
 from schemas.ports import Port
+from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage
 
-__all__ = ["NO_GRIPPER", "console_ports"]
-
-_JOINT_STATE, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
-_STATE_COMMAND, _OPERATING_STATE = "crtk_msgs/msg/StringStamped", "crtk_msgs/msg/OperatingState"
-_EMPTY, _STRING, _BOOL, _FLOAT = (f"std_msgs/msg/{name}" for name in ("Empty", "String", "Bool", "Float64"))
+__all__ = ["NO_GRIPPER", "EventOutputs", "console_ports"]
 
 NO_GRIPPER = -pi
 """rad; angle of a gripper that is not connected: no master's opens that far the other way."""
 
-_SYSTEM_HEARD = ("power_on", "power_off", "home", "set_volume")
-"""A hub has no loudspeaker: what else the system of a dVRK hears are sounds."""
-_MASTER_TOLD = {
-    "state_command": _STATE_COMMAND,
-    "hold": _EMPTY,
-    "move_cp": _POSE,
-    "lock_orientation": "geometry_msgs/msg/Quaternion",
-    "unlock_orientation": _EMPTY,
-    "body/servo_cf": "geometry_msgs/msg/WrenchStamped",
-    "use_gravity_compensation": _BOOL,
+_SYSTEM_COMMANDS = ("power_on", "power_off", "home", "set_volume")
+"""A hub has no loudspeaker: the other commands of a dVRK's system are sounds."""
+_MASTER_COMMANDS = {
+    name: (crtk.COMMANDS | crtk.MTM_COMMANDS)[name]
+    for name in (
+        "state_command",
+        "hold",
+        "move_cp",
+        "lock_orientation",
+        "unlock_orientation",
+        "body/servo_cf",
+        "use_gravity_compensation",
+    )
 }
 
 
-def console_ports(params: ConsoleParams) -> tuple[Port, ...]:
-    """Return the ports of a console as `params` say."""
+class EventOutputs:
+    """The event outputs of the present step, by port."""
+
+    def __init__(self, ports: Iterable[Port]) -> None:
+        self.outputs: dict[str, Any] = {
+            port.name: () for port in ports if port.causality == "output" and port.variability == "event"
+        }
+        self._published: set[str] = set()
+
+    def begin(self) -> None:
+        """Clear the events of the last step."""
+        for port in self._published:
+            self.outputs[port] = ()
+        self._published.clear()
+
+    def publish(self, port: str, message: Message) -> None:
+        """Publish `message` on `port`."""
+        self.outputs[port] += (message,)
+        self._published.add(port)
+
+
+def console_ports(params: DvrkConsoleParams) -> tuple[Port, ...]:
+    """Return the ports of a console with these parameters."""
     masters, led = (sorted({name.split("_")[i] for name in params.teleoperations}) for i in (0, 1))
-    heard = (
-        _named("console", CONSOLE.heard)
-        | {f"system/{name}": SYSTEM.heard[name] for name in _SYSTEM_HEARD}
-        | _named("pedals", PEDALS.told)
+    commands = (
+        _named("console", CONSOLE.commands)
+        | {f"system/{name}": SYSTEM.commands[name] for name in _SYSTEM_COMMANDS}
+        | _named("pedals", PEDALS.events)
     )
-    told = _named("console", CONSOLE.told) | _named("system", SYSTEM.told) | _named("footpedals", PEDALS.told)
+    events = (
+        _named("console", CONSOLE.events)
+        | _named("system", SYSTEM.events)
+        | _named("footpedals", PEDALS.events)
+    )
     return (
-        *_events("input", heard | {f"{arm}/operating_state": _OPERATING_STATE for arm in params.arms}),
-        *_events("output", told | {f"{arm}/state_command": _STATE_COMMAND for arm in params.arms}),
+        *_events(
+            "input", commands | {f"{arm}/operating_state": OperatingState.ros_type for arm in params.arms}
+        ),
+        *_events("output", events | {f"{arm}/state_command": StringStamped.ros_type for arm in params.arms}),
         Port(
             name="teleop/ECM/buttons",
             causality="output",
@@ -72,7 +104,7 @@ def _pose(name: str, meaning: str) -> Port:
     return Port(
         name=name,
         causality="input",
-        type=_POSE,
+        type=PoseStamped.ros_type,
         start=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
         description=meaning,
     )
@@ -83,46 +115,47 @@ def _named(prefix: str, types: Mapping[str, str]) -> dict[str, str]:
 
 
 def _master(master: str) -> Iterable[Port]:
-    gripper, opening = (
-        f"{master}/gripper/measured_js",
-        "opening of the gripper, as the motors' encoders tell it",
-    )
-    fields = ("position", "velocity", "effort")
     return (
-        *_events("input", {f"{master}/operating_state": _OPERATING_STATE}),
+        *_events("input", {f"{master}/operating_state": OperatingState.ros_type}),
         _pose(f"{master}/measured_cp", "of the master, in the display's frame"),
         Port(
-            name=gripper,
+            name=f"{master}/gripper/measured_js",
             causality="input",
-            type=_JOINT_STATE,
+            type=JointState.ros_type,
             names=("gripper",),
-            fields=fields,
+            fields=crtk.MEASURED,
             start=(NO_GRIPPER, 0.0, 0.0),
-            description=opening,
+            description="opening of the gripper, as the motors' encoders measure it",
         ),
-        *_events("output", _named(master, _MASTER_TOLD)),
+        *_events("output", _named(master, _MASTER_COMMANDS)),
     )
 
 
-def _teleoperation(name: str, params: ConsoleParams) -> Iterable[Port]:
-    leads, tells = f"teleop/{name}", "to the `teleoperation`"
+def _teleoperation(name: str, params: DvrkConsoleParams) -> Iterable[Port]:
+    leads = f"teleop/{name}"
     return (
         *_events(
             "input",
-            _named(name, TELEOPERATION.heard) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING},
+            _named(name, TELEOPERATION.commands)
+            | dict.fromkeys((f"{leads}/state", f"{leads}/warning"), StringMessage.ros_type),
         ),
-        *_events("output", _named(name, TELEOPERATION.told)),
+        *_events("output", _named(name, TELEOPERATION.events)),
         *_events(
             "output",
-            {f"{leads}/buttons": BUTTON, f"{leads}/lock_rotation": _BOOL, f"{leads}/lock_translation": _BOOL},
+            {f"{leads}/buttons": BUTTON}
+            | dict.fromkeys((f"{leads}/lock_rotation", f"{leads}/lock_translation"), BoolMessage.ros_type),
         ),
         Port(
-            name=f"{leads}/scale", causality="output", type=_FLOAT, start=(params.scale,), description=tells
+            name=f"{leads}/scale",
+            causality="output",
+            type=Float64Message.ros_type,
+            start=(params.scale,),
+            description="to the `teleoperation`",
         ),
         Port(
             name=f"{leads}/gripper",
             causality="output",
-            type=_FLOAT,
-            description=f"{tells}: 0 closed .. 1 open, negative: none",
+            type=Float64Message.ros_type,
+            description="to the `teleoperation`: 0 closed .. 1 open, negative: none",
         ),
     )

@@ -1,4 +1,4 @@
-"""Which arms and masters are enabled and homed, as far as they have told."""
+"""Which arms and masters are enabled and homed, as far as they have published it."""
 
 from __future__ import annotations
 
@@ -14,20 +14,19 @@ __all__ = ["Readiness"]
 
 
 class Readiness:
-    """What the operating states of all arms and masters have told. All that changes is in `state`."""
+    """The operating states of all arms and masters. All that lasts from step to step is in `state`."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Take the names of arms and masters."""
         self._rows = {name: i for i, name in enumerate(names)}
         self.state = np.zeros((len(names), 3))
-        """For each: has it told anything, is it ENABLED, is it homed."""
+        """For each: 1 if it has published anything, if it is ENABLED, if it is homed."""
         self.lost: frozenset[str] = frozenset()
         """Those that have stopped being ready in this step."""
         self.new: frozenset[str] = frozenset()
-        """Those that have told something for the first time in this step."""
+        """Those that have published something for the first time in this step."""
 
-    def hear(self, inputs: Inputs) -> None:
-        """Take what they say."""
+    def receive(self, inputs: Inputs) -> None:
+        """Read what they have published."""
         lost: set[str] = set()
         silent = {name for name, row in self._rows.items() if not self.state[row, 0]}
         for name, row in self._rows.items():
@@ -40,7 +39,7 @@ class Readiness:
         self.new = frozenset(name for name in silent if self.state[self._rows[name], 0])
 
     def is_ready(self, name: str) -> bool:
-        """Say whether it has told that it is ENABLED and homed."""
+        """Say whether it is ENABLED and homed."""
         return bool(self.state[self._rows[name]].all())
 
     def may_lead(self, master: str) -> bool:
@@ -48,6 +47,6 @@ class Readiness:
         return self.is_ready(master) or not self.state[self._rows[master], 0]
 
     def orders(self, name: str) -> tuple[str, ...]:
-        """Return the state commands that make it ready; none while nobody knows how it is."""
-        told, enabled, homed = self.state[self._rows[name]]
-        return () if not told else (*(() if enabled else ("enable",)), *(() if homed else ("home",)))
+        """Return the state commands that make it ready; none before it has published its state."""
+        known, enabled, homed = self.state[self._rows[name]]
+        return () if not known else (*(() if enabled else ("enable",)), *(() if homed else ("home",)))

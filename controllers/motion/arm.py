@@ -1,4 +1,4 @@
-"""One arm under CRTK's commands: what arrives, what is told, step by step."""
+"""One arm under CRTK's commands: what it receives and publishes, step by step."""
 
 from __future__ import annotations
 
@@ -13,19 +13,13 @@ from controllers.motion.commands import Commands
 from controllers.motion.drives import Drives
 from controllers.motion.equipment import Equipment
 from controllers.motion.frames import BaseFrame, base_in_world
-from controllers.motion.gravity import KnownWeight
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import (
-    CARTESIAN_COMMANDS,
-    COMMANDS,
-    EQUIPMENT_COMMANDS,
-    EVENTS,
-    GRIPPER_COMMANDS,
-)
-from controllers.motion.telemetry import Telemetry
-from hub.participant import Inputs
+from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
+from controllers.motion.telemetry import KnownWeight, Telemetry
+from hub.participant import Inputs, Record, flag
+from robots.dvrk import crtk
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import StringStamped
 from schemas.errors import MotionError
@@ -34,36 +28,45 @@ from schemas.vectors import Vector
 
 __all__ = ["Arm"]
 
-_ANY_TIME = (
-    *("use_gravity_compensation", "body/set_cf_orientation_absolute", "set_base_frame"),
-    *(command for commands in EQUIPMENT_COMMANDS.values() for command in commands),
-    *("trajectory_j/set_ratio", "trajectory_j/set_ratio_v", "trajectory_j/set_ratio_a"),
-)
-"""Commands that are heeded whatever the operating state."""
+_ANY_TIME = crtk.SETTINGS.union(*EQUIPMENT_COMMANDS.values())
+"""Commands that are executed in every operating state."""
 _BARE = 2.0
 """What `control_mode` adds to position and effort without gravity compensation."""
 
 
+class ArmState(Record):
+    """Whether the arm has made a step."""
+
+    started = flag()
+
+
 class Arm:
-    """One arm. All that changes is in the arrays of `state`."""
+    """One arm. All that changes is in `state`."""
 
     def __init__(
         self, name: CartArm, params: MotionParams, camera: Callable[[], Vector | None], period: float
     ) -> None:
-        """Take the arm's name, what the scenario says, what returns the ECM's tip in the world, shape (4, 4),
-        and the step (s).
+        """Build the arm as the scenario states it.
+
+        Args:
+            name: its name.
+            params: parameters of the controller.
+            camera: returns the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+            period: the controller's step, s.
         """
         arm = params.arms.driven[name]
         self._name, self._period = name, period
         held = arm.equipment
-        self._messages = Messages(name, (*EVENTS, held[0]))
+        self._messages = Messages(name, event_names(arm))
         self._equipment = Equipment(*held, self._messages)
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
         self._telemetry = Telemetry(name, arm.chain)
         self._weight = KnownWeight(name, arm.chain, base_in_world(name, params))
         self._commands = Commands(self._drives, period)
-        self._cartesian = CartesianCommands(name, self._drives, self._base, self._commands.ratio, period)
+        self._cartesian = CartesianCommands(
+            name, self._drives, self._base, self._commands.settings.ratio, period
+        )
         self._lifecycle = Lifecycle(
             self._drives,
             self._messages,
@@ -71,11 +74,11 @@ class Arm:
             params.power_time * 1e-9,
             homed=params.initial_state == "homed",
         )
-        heeding = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
+        handlers = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
         self._state_port = f"{name}/state_command"
-        commands = (*COMMANDS, *self._equipment.handlers)
+        commands = (*crtk.COMMANDS, *self._equipment.handlers)
         self._ports = [
-            (command, f"{name}/{command}", heeding[command])
+            (command, f"{name}/{command}", handlers[command])
             for command in commands
             if command != "state_command"
         ]
@@ -83,15 +86,16 @@ class Arm:
         if (gripper := arm.gripper) is not None:
             self._prefixes.append(f"{name}/{gripper.name}")
             grasping = [
-                (f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS
+                (f"{gripper.name}/{command}", handlers[f"gripper/{command}"])
+                for command in crtk.GRIPPER_COMMANDS
             ]
-            self._ports += [(command, f"{name}/{command}", heed) for command, heed in grasping]
-        self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
+            self._ports += [(command, f"{name}/{command}", handler) for command, handler in grasping]
+        self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
         self.state = (
-            self._started,
-            *self._commands.state,
+            self._now,
+            self._commands.settings,
             *self._base.state,
-            *self._lifecycle.arrays,
+            *self._lifecycle.records,
             self._messages.state,
             *self._drives.state,
         )
@@ -130,90 +134,90 @@ class Arm:
         return self._drives.joints.chain.forward(self._drives.joints.position)
 
     def sense(self, inputs: Inputs) -> None:
-        """Take what is measured; the first time the setpoint starts from there."""
+        """Read what is measured; the setpoint starts from there."""
         for port, axes in self._sensed:
             axes.measured[:] = inputs[port]
-            if not self._started[0]:
+            if not self._now.started:
                 axes.setpoint.reset(axes.position)
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:
-        """Heed the commands that have arrived, and advance from `t` to `t + h` (ns)."""
+        """Execute the commands that have arrived, and advance from `t` to `t + h` (ns)."""
         self._messages.begin(t + h)
-        before = self._condition() if self._started[0] else None
+        before = self._condition() if self._now.started else None
         if before is None:
-            self._started[0] = 1.0
+            self._now.started = True
             self._messages.desired_state(self._lifecycle.desired_state)
-            self._equipment.tell()
+            self._equipment.publish()
         self._lifecycle.watch(self._period)
-        heeded = self._heed(inputs)
+        awaited = self._execute(inputs)
         self._lifecycle.step(self._period)
         self._drives.step(self._period)
-        if heeded or self._condition() != before:
+        if awaited or self._condition() != before:
             state, homed, busy = self._condition()
             self._messages.operating_state(state, homed=homed, busy=busy)
-        self._tell_modes()
+        self._update_modes()
 
     def publish(self) -> None:
-        """Bring the states that are not published at every step up to date."""
+        """Update the states that are not published at every step."""
         drives, commands = self._drives, self._commands
         joints = drives.joints
         self._telemetry.update(
-            joints.measured, joints.commanded, self._base.pose, absolute=bool(drives.absolute[0])
+            joints.measured, joints.commanded, self._base.pose, absolute=drives.control.absolute
         )
-        bears = joints.mode is not Mode.OFF and bool(commands.gravity_compensation[0])
-        self._telemetry.tell_settings(commands.ratio, bears * self._weight.effort(joints.position))
+        carries = joints.mode is not Mode.OFF and commands.settings.gravity_compensation
+        self._telemetry.update_settings(
+            commands.settings.ratio, carries * self._weight.effort(joints.position)
+        )
         if drives.gripper is not None:
             self._gripper_setpoint[:] = drives.gripper.commanded
 
     def restored(self) -> None:
-        """Bring what is not in `state` up to it."""
+        """Compute what follows from `state` after it was restored."""
         for axes in self._drives.groups:
             axes.setpoint.restored()
-        self._tell_modes()
+        self._update_modes()
 
-    def _tell_modes(self) -> None:
+    def _update_modes(self) -> None:
         self._modes[:] = self._drives.modes
-        if self._modes[0] and not self._commands.gravity_compensation[0]:
+        if self._modes[0] and not self._commands.settings.gravity_compensation:
             self._modes[0] += _BARE
 
     def _condition(self) -> tuple[Any, bool, bool]:
         return self._lifecycle.state, self._lifecycle.is_homed, self._lifecycle.is_busy
 
-    def _heed(self, inputs: Inputs) -> bool:
-        """Carry out what has arrived; return whether there was a command after which clients wait for the
-        operating state.
-        """
+    def _execute(self, inputs: Inputs) -> bool:
+        """Execute what has arrived; return whether clients now wait for the operating state."""
         if inputs.quiet:  # nearly always, and an arm has 35 ports
             return False
         awaited = False
         for message in inputs.events(self._state_port):
             awaited |= self._lifecycle.command(cast("StringStamped", message))
-        for command, port, heed in self._ports:
+        for command, port, handler in self._ports:
             for message in inputs.events(port):
-                self._heed_one(command, heed, message)
-                awaited |= "move_" in command
+                self._execute_one(command, handler, message)
+                awaited |= crtk.is_move(command)
         return awaited
 
-    def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> None:
+    def _execute_one(self, command: str, handler: Callable[[Any], None], message: Message) -> None:
         if reason := self._not_ready(command):
             self._messages.refuse(command, reason, ready=False)
             return
         try:
-            heed(message)
+            handler(message)
         except MotionError as error:
             self._messages.refuse(command, str(error), ready=True)
-            if "move_" in command and not self._drives.is_moving:
-                # as the real controller does; a move under way goes on
+            if crtk.is_move(command) and not self._drives.is_moving:
+                # as the real controller does; a move that is under way continues
                 self._messages.goal_reached(reached=False)
             return
-        self._messages.heeded(command)
-        if command in CARTESIAN_COMMANDS:
-            self._drives.cartesian[0] = 1.0
+        self._messages.executed(command)
+        if command in crtk.CARTESIAN_COMMANDS:
+            self._drives.control.cartesian = True
 
     def _not_ready(self, command: str) -> str:
-        """Return why the arm does not take `command` now; empty if it does."""
+        """Return why the arm refuses `command` now; empty if it does not."""
         if command in _ANY_TIME:
             return ""
         return self._lifecycle.not_ready() or (
-            self._cartesian.not_ready() if command in CARTESIAN_COMMANDS else ""
+            self._cartesian.not_ready() if command in crtk.CARTESIAN_COMMANDS else ""
         )

@@ -1,6 +1,4 @@
-"""Joints that are driven together, an arm's or its gripper's: what is measured of them, and what their drives
-are told.
-"""
+"""Joints that are driven together, an arm's or its gripper's: measured state and commands to their drives."""
 
 from __future__ import annotations
 
@@ -9,6 +7,7 @@ from enum import IntEnum
 import numpy as np
 
 from controllers.motion.setpoint import Activity, Setpoint
+from hub.participant import Record, array, choice, flag
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
@@ -23,6 +22,18 @@ class Mode(IntEnum):
     EFFORT = 2
 
 
+class AxesState(Record):
+    """All of n joints that changes, except their setpoint."""
+
+    measured = array(3, "n")
+    """Positions, velocities and efforts."""
+    effort = array("n")
+    """As commanded."""
+    mode = choice(Mode.OFF)
+    moving = flag()
+    """Whether a move was commanded whose end `finished` has not reported yet."""
+
+
 class Axes:
     """n joints with their setpoint.
 
@@ -33,9 +44,8 @@ class Axes:
         """Take the joints, and their positions at time 0, shape (n,)."""
         n = len(chain.joints)
         self.chain, self.setpoint = chain, Setpoint(chain.joints)
-        self._state = np.zeros(4 * n + 2)
-        self.measured, self.effort = self._state[: 3 * n], self._state[3 * n : 4 * n]
-        self._mode, self._moving = self._state[4 * n : 4 * n + 1], self._state[4 * n + 1 :]
+        self._state = AxesState(n=n)
+        self.measured, self.effort = self._state.measured.reshape(3 * n), self._state.effort
         self.position = self.measured[:n]
         """As measured, shape (n,)."""
         self.position[:] = start
@@ -45,12 +55,12 @@ class Axes:
     @property
     def mode(self) -> Mode:
         """What the drives do."""
-        return Mode(int(self._mode[0]))
+        return self._state.mode
 
     @property
     def is_moving(self) -> bool:
-        """Whether a move has been asked for whose end nobody has noticed yet (`finished`)."""
-        return bool(self._moving[0])
+        """Whether a move was commanded whose end `finished` has not reported yet."""
+        return self._state.moving
 
     @property
     def commanded(self) -> Vector:
@@ -59,66 +69,66 @@ class Axes:
 
     @property
     def newest_goal(self) -> Vector:
-        """What relative commands start from, shape (n,): the goal that is followed or moved to, else the
-        setpoint.
-        """
+        """What relative commands start from, shape (n,): the goal if there is one, else the setpoint."""
         under_way = self.setpoint.activity is Activity.FOLLOW or self.setpoint.is_moving
         return self.setpoint.goal if under_way else self.setpoint.position
 
     def finished(self) -> bool:
-        """Say, once, that the move has arrived: a step later, so that even a move to where the joints are
-        takes a step.
+        """Return, once, that the move has arrived.
+
+        It does so a step later, so that even a move to where the joints are takes a step.
         """
         arrived = self.is_moving and not self.setpoint.is_moving
         if arrived:
-            self._moving[0] = 0.0
+            self._state.moving = False
         return arrived
 
     def follow(self, goal: Vector, h: float, velocity: Vector | None = None) -> None:
-        """Follow `goal`, shape (n,), inside the ranges, with the velocity that the sender states, if any."""
+        """Follow a goal inside the ranges; arguments as of `Setpoint.follow`."""
         self._hold_position()
-        self._moving[0] = 0.0
+        self._state.moving = False
         self.setpoint.follow(goal, h, velocity)
 
     def drift(self, velocity: Vector) -> None:
-        """Go on with `velocity`, shape (n,), for as long as it is told again."""
+        """Move with `velocity`, shape (n,), for as long as it is sent again."""
         self._hold_position()
-        self._moving[0] = 0.0
+        self._state.moving = False
         self.setpoint.drift(velocity)
 
     def move(self, goal: Vector, ratio: Vector) -> None:
-        """Move to `goal`, shape (n,), inside the ranges, at the shares `ratio`, shape (2,), of velocity and
-        acceleration.
+        """Move to `goal`, shape (n,), inside the ranges.
+
+        `ratio`, shape (2,), are the shares of velocity and acceleration that it uses.
         """
         self._hold_position()
-        self._moving[0] = 1.0
+        self._state.moving = True
         self.setpoint.move(goal, ratio)
 
     def hold(self) -> None:
         """Brake and stay."""
         self._hold_position()
-        self._moving[0] = 0.0
+        self._state.moving = False
         self.setpoint.brake()
 
     def apply(self, effort: Vector) -> None:
-        """Apply efforts, shape (n,), and leave the positions to themselves."""
-        self._mode[0], self._moving[0] = Mode.EFFORT, 0.0
+        """Apply efforts, shape (n,), at whatever position the joints are."""
+        self._state.mode, self._state.moving = Mode.EFFORT, False
         self.effort[:] = effort
         self.setpoint.reset(self.position)
 
     def power(self, *, on: bool) -> None:
         """Switch the drives off, or on to hold the joints where they are."""
-        self._mode[0], self._moving[0] = (Mode.POSITION if on else Mode.OFF), 0.0
+        self._state.mode, self._state.moving = Mode.POSITION if on else Mode.OFF, False
         self.effort[:] = 0.0
         self.setpoint.reset(self.position)
 
     def step(self, h: float) -> None:
         """Advance the setpoint by `h` seconds."""
-        if self._mode[0] == Mode.POSITION:
+        if self._state.mode is Mode.POSITION:
             self.setpoint.step(h)
         else:
             self.setpoint.reset(self.position)
 
     def _hold_position(self) -> None:
-        if self._mode[0] != Mode.POSITION:
+        if self._state.mode is not Mode.POSITION:
             self.power(on=True)

@@ -1,6 +1,6 @@
-"""CRTK's commands to the tip of one arm: from a message to what its drives are to do.
+"""CRTK's commands to the tip of one arm: from messages to commands to its drives.
 
-Whatever is wrong with a command raises MotionError before anything has changed.
+An invalid command raises MotionError before anything has changed.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from controllers.motion.drives import Drives, WrenchFrame
 from controllers.motion.frames import BaseFrame, turned
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.crtk import tip_frame
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import CartesianImpedance, CartesianState
@@ -25,17 +26,21 @@ from schemas.vectors import Vector
 __all__ = ["CartesianCommands"]
 
 _SINGULAR = 1e-6
-"""Singular values of the Jacobian below this share of the largest move no joint, as for the wrench that is
-told (`telemetry`).
-"""
+"""Singular values of the Jacobian below this share of the largest move no joint; as in `telemetry`."""
 
 
 class CartesianCommands:
-    """What carries out the Cartesian commands of one arm, by their names, in `handlers`."""
+    """Executes the Cartesian commands of one arm: `handlers`, by name."""
 
     def __init__(self, arm: CartArm, drives: Drives, base: BaseFrame, ratio: Vector, period: float) -> None:
-        """Take the arm, its drives, its base frame, the shares that moves use (shape (2,), read as it is
-        then), and the controller's step (s).
+        """Prepare the handlers.
+
+        Args:
+            arm: its name.
+            drives: what they command.
+            base: the arm's base frame.
+            ratio: shares of velocity and acceleration that moves use, shape (2,); read at each move.
+            period: the controller's step, s.
         """
         self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
         self._joints, self._chain = drives.joints, drives.joints.chain
@@ -53,11 +58,11 @@ class CartesianCommands:
         }
 
     def not_ready(self) -> str:
-        """Return why the arm takes no Cartesian commands; empty if it does."""
-        return "" if self._drives.cartesian[0] else self._cannula.not_past(self._joints.position)
+        """Return why the arm refuses Cartesian commands; empty if it does not."""
+        return "" if self._drives.control.cartesian else self._cannula.not_past(self._joints.position)
 
     def _set_cf_orientation_absolute(self, message: BoolMessage) -> None:
-        self._drives.absolute[0] = message.data
+        self._drives.control.absolute = message.data
 
     def _set_base_frame(self, message: PoseStamped) -> None:
         self._base.check_free()
@@ -104,7 +109,8 @@ class CartesianCommands:
 
     def _body_servo_cf(self, message: WrenchStamped) -> None:
         goals.check_frame(
-            message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip"
+            message.header.frame_id,
+            self._base.reference if self._drives.control.absolute else tip_frame(self._arm),
         )
         self._drives.press(goals.wrench(message.wrench), WrenchFrame.BODY)
 
@@ -121,23 +127,26 @@ class CartesianCommands:
         return self._inverse(frame @ goals.frame(message.pose))
 
     def _from(self, frame_id: str) -> Vector:
-        """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4); by default
-        the reference.
+        """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4).
+
+        An empty name is the reference's.
         """
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
         return np.eye(4) if named == self._base.local else inverse_pose(self._base.pose)
 
     def _inverse(self, tip: Vector) -> Vector:
-        """Return the joint positions, shape (n,), nearest to the setpoint, of a pose in the arm's base frame,
-        shape (4, 4).
+        """Return the joint positions, shape (n,), of a pose in the arm's base frame, shape (4, 4).
+
+        Of several solutions it is the nearest to the setpoint.
         """
         goal = inverse_kinematics(self._chain, tip, self._joints.setpoint.position)
         self._cannula.check(goal, self._joints.position)
         return goal
 
     def _joint_velocity(self, twist: Vector) -> Vector:
-        """Return the joint velocities, shape (n,), of a twist of the tip in the base frame: slower as a whole
-        where a joint is at its limit.
+        """Return the joint velocities, shape (n,), of a twist of the tip in the base frame.
+
+        Where one would exceed its limit, all are slower.
         """
         jacobian = self._chain.jacobian(self._chain.frames(self._joints.setpoint.position))
         velocity = np.linalg.pinv(jacobian, rcond=_SINGULAR) @ twist

@@ -1,6 +1,6 @@
-"""CRTK's commands to one arm in joint space: from a message to what its drives are to do.
+"""CRTK's commands to one arm in joint space: from messages to commands to its drives.
 
-Whatever is wrong with a command raises MotionError before anything has changed.
+An invalid command raises MotionError before anything has changed.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from controllers.motion import goals
 from controllers.motion.drives import Drives
+from hub.participant import Record, array, flag
 from schemas.errors import MotionError
 from schemas.ros import BoolMessage, EmptyMessage, Float64Message, JointState
 from schemas.vectors import Vector
@@ -19,20 +20,27 @@ from schemas.vectors import Vector
 __all__ = ["Commands"]
 
 
+class CommandState(Record):
+    """Settings of one arm."""
+
+    ratio = array(2)
+    """Shares of velocity and of acceleration that moves use."""
+    gravity_compensation = flag(start=True)
+    """Whether the drives carry the weight that the controller knows."""
+
+
 class Commands:
-    """What carries out the commands of one arm, by their names, in `handlers`; those of its jaw or hand by
-    `gripper/...`.
+    """Executes the commands of one arm in joint space: `handlers`, by name.
+
+    Commands of its jaw or hand are `gripper/...`.
     """
 
     def __init__(self, drives: Drives, period: float) -> None:
         """Take the arm's drives and the controller's step (s)."""
         self._drives, self._period = drives, period
         self._joints, self._chain = drives.joints, drives.joints.chain
-        self.ratio = np.ones(2)
-        """Shares of velocity and of acceleration that moves use."""
-        self.gravity_compensation = np.ones(1)
-        """1: the drives bear the weight that the controller knows, 0: they do not."""
-        self.state = (self.ratio, self.gravity_compensation)
+        self.settings = CommandState()
+        self.settings.ratio[:] = 1.0
         self.handlers: Mapping[str, Callable[[Any], None]] = {
             "use_gravity_compensation": self._use_gravity_compensation,
             "trajectory_j/set_ratio": self._set_ratio,
@@ -51,16 +59,16 @@ class Commands:
         }
 
     def _use_gravity_compensation(self, message: BoolMessage) -> None:
-        self.gravity_compensation[0] = message.data
+        self.settings.gravity_compensation = message.data
 
     def _set_ratio(self, message: Float64Message) -> None:
-        self.ratio[:] = _share(message)
+        self.settings.ratio[:] = _share(message)
 
     def _set_ratio_v(self, message: Float64Message) -> None:
-        self.ratio[0] = _share(message)
+        self.settings.ratio[0] = _share(message)
 
     def _set_ratio_a(self, message: Float64Message) -> None:
-        self.ratio[1] = _share(message)
+        self.settings.ratio[1] = _share(message)
 
     def _hold(self, _: EmptyMessage) -> None:
         self._drives.rest()
@@ -89,7 +97,7 @@ class Commands:
         self._move(self._joints.newest_goal + goals.joint_values(self._chain, message, "position"))
 
     def _move(self, goal: Vector) -> None:
-        self._drives.move(self._joints, goal, self.ratio)
+        self._drives.move(self._joints, goal, self.settings.ratio)
 
     def _gripper_servo_jp(self, message: JointState) -> None:
         if (gripper := self._drives.gripper) is not None:
@@ -101,10 +109,12 @@ class Commands:
 
     def _gripper_move_jp(self, message: JointState) -> None:
         if (gripper := self._drives.gripper) is not None:
-            self._drives.move(gripper, goals.joint_values(gripper.chain, message, "position"), self.ratio)
+            self._drives.move(
+                gripper, goals.joint_values(gripper.chain, message, "position"), self.settings.ratio
+            )
 
 
 def _share(message: Float64Message) -> float:
     if not 0.0 < message.data <= 1.0:
-        raise MotionError(f"ratio {message.data:g}, allowed are over 0 to 1")
+        raise MotionError(f"ratio {message.data:g}, allowed is above 0 and up to 1")
     return message.data

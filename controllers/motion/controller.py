@@ -5,11 +5,12 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from controllers.motion.frames import CART_FRAME, base_in_world, reference_frame
+from controllers.motion.frames import base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
-from controllers.motion.setup_joints import SetupJoints, joint_names
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from controllers.motion.setup_joints import SetupJoints
+from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from robots.dvrk.crtk import CART_FRAME
 from schemas.errors import MissingExtraError
 from schemas.ports import Port
 from schemas.vectors import Vector
@@ -20,16 +21,16 @@ if TYPE_CHECKING:
 __all__ = ["MotionController"]
 
 
-class MotionController(Stepped):
-    """Takes CRTK's commands for each arm, and tells the drives where to be: `motion.drive/* -> robot.*`,
-    `robot.* -> motion.sense/*`.
+class MotionController(Controller):
+    """Executes CRTK's commands to each arm, and commands its drives.
+
+    Connect `motion.drive/* -> robot.*` and `robot.* -> motion.sense/*`.
     """
 
     params_model: ClassVar[type[Params]] = MotionParams
     params: MotionParams
 
     def __init__(self, name: str, params: MotionParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._arms: dict[str, Arm] = {}
         self._setup_joints = SetupJoints(params)
@@ -38,10 +39,10 @@ class MotionController(Stepped):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Per arm: CRTK's commands in, its states and events out; `drive/<arm>/...` and `sense/<arm>/...`
-        towards the robot.
+        """CRTK's commands, states and events of each arm, and its drives and sensors on the robot.
 
-        On the cart also `SUJ/<arm>/...`, the setup joints that carry it.
+        These are `<arm>/...`, `drive/<arm>/...` and `sense/<arm>/...`; on the cart also `SUJ/<arm>/...`, the
+        setup joints that carry the arm.
         """
         params, period = self.params, self.params.publish_period
         ports = [
@@ -51,14 +52,12 @@ class MotionController(Stepped):
         ]
         if params.mounting == "cart":
             ports += [
-                port
-                for name in params.arms.driven
-                for port in setup_joint_ports(name, joint_names(name), CART_FRAME, period)
+                port for name in params.arms.driven for port in setup_joint_ports(name, CART_FRAME, period)
             ]
         return tuple(ports)
 
     def configure(self, setup: Setup) -> Outputs:
-        """Put every arm where the parameters say."""
+        """Put every arm where the parameters state it."""
         if find_spec("ruckig") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind motion)", "motion", "ruckig")
         from controllers.motion.arm import Arm
@@ -70,6 +69,7 @@ class MotionController(Stepped):
             arm.publish()
             self._outputs |= arm.outputs
         self._outputs |= self._setup_joints.outputs
+        self.keep(*(part for arm in self._arms.values() for part in arm.state), *self._setup_joints.state)
         return self._outputs
 
     def _camera(self) -> Vector | None:
@@ -77,7 +77,7 @@ class MotionController(Stepped):
         return None if self._camera_stand is None else self._camera_stand @ self._arms["ECM"].tip
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Heed commands and advance all setpoints by `h` nanoseconds."""
+        """Execute commands and advance all setpoints by `h` nanoseconds."""
         arms = self._arms.values()
         for arm in arms:
             arm.sense(inputs)
@@ -91,24 +91,13 @@ class MotionController(Stepped):
         self._outputs |= self._setup_joints.outputs
         return self._outputs
 
-    def _state(self) -> tuple[Vector, ...]:
-        return (*(array for arm in self._arms.values() for array in arm.state), *self._setup_joints.state)
-
-    def state_hash(self) -> int:
-        """Return the hash of what is measured and commanded, and of every arm's operating state."""
-        return state_hash(*self._state())
-
-    def save(self) -> bytes:
-        """Return the state of every arm; trajectories as their start, goal and age."""
-        return b"".join(array.tobytes() for array in self._state())
-
     def restore(self, state: bytes) -> None:
-        """Return to a saved state. Raises StateError if it has the wrong size."""
-        restore_arrays(self.name, self._state(), state)
+        """Return to a saved state, of trajectories from their start, goal and age."""
+        super().restore(state)
         for arm in self._arms.values():
             arm.restored()
 
     def close(self) -> None:
-        """Let go of the arms."""
+        """Release the arms."""
         self._arms.clear()
         self._outputs.clear()

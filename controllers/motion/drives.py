@@ -1,6 +1,4 @@
-"""Arm and gripper (jaw or hand) together: what is done with them, and telling when a move has ended or was
-given up.
-"""
+"""Arm and gripper (jaw or hand) together: their commands, and reports of moves that end or are abandoned."""
 
 from __future__ import annotations
 
@@ -15,6 +13,7 @@ from controllers.motion.impedance import Impedance
 from controllers.motion.messages import Messages
 from controllers.motion.params import EcmParams, PsmParams
 from controllers.motion.telemetry import body_to_spatial
+from hub.participant import Record, array, choice, flag
 from robots.serial_chain import SerialChain
 from schemas.crtk import CartesianImpedance
 from schemas.vectors import Vector
@@ -25,7 +24,7 @@ __all__ = ["Drives", "WrenchFrame"]
 class WrenchFrame(IntEnum):
     """How a commanded wrench is meant.
 
-    At the tip along the tip's axes (or the reference's, see `Drives.absolute`), at the base frame's origin
+    At the tip along the tip's axes (or the reference's, see `DrivesState`), at the base frame's origin
     along the base frame's, at the tip along the reference's, or as the impedance has it.
     """
 
@@ -36,12 +35,28 @@ class WrenchFrame(IntEnum):
     IMPEDANCE = 4
 
 
+class DrivesState(Record):
+    """Cartesian control of one arm."""
+
+    wrench = array(6)
+    """As commanded: force and torque."""
+    frame = choice(WrenchFrame.NONE)
+    absolute = flag()
+    """Whether body wrenches are along the axes of the reference."""
+    cartesian = flag()
+    """Whether the arm executes a Cartesian command."""
+
+
 class Drives:
     """The joints of an arm, and its gripper if it has one."""
 
     def __init__(self, arm: PsmParams | EcmParams, messages: Messages, base: Callable[[], Vector]) -> None:
-        """Take the arm's parameters, where to tell what ends, and what returns the base frame in the
-        reference, shape (4, 4).
+        """Build arm and gripper.
+
+        Args:
+            arm: its parameters.
+            messages: where the end of a move is reported.
+            base: returns the base frame in the reference, shape (4, 4).
         """
         self._messages, self._base = messages, base
         self.joints = Axes(arm.chain, np.array(arm.start))
@@ -51,16 +66,12 @@ class Drives:
         )
         self.groups = (self.joints,) if self.gripper is None else (self.joints, self.gripper)
         """All that is driven: the arm's joints, then the gripper."""
-        self._control = np.zeros(9)
-        self._wrench, self._frame, self.absolute, self.cartesian = np.split(self._control, [6, 7, 8])
-        """`absolute`: 1 where body wrenches are along the axes of the reference; `cartesian`: 1 while the arm
-        is under Cartesian control.
-        """
+        self.control = DrivesState()
         self._impedance = Impedance()
         self.state = (
-            self._control,
+            self.control,
             self._impedance.state,
-            *(array for axes in self.groups for array in axes.state),
+            *(part for axes in self.groups for part in axes.state),
         )
 
     @property
@@ -75,22 +86,21 @@ class Drives:
 
     def power(self, *, on: bool) -> None:
         """Switch all drives off, or on to hold what they hold."""
-        self._give_up(*self.groups)
+        self._abandon(*self.groups)
         self._leave()
         for axes in self.groups:
             axes.power(on=on)
 
     def rest(self) -> None:
         """Brake and stay; a gripper that presses goes on pressing."""
-        self._give_up(*self.groups)
+        self._abandon(*self.groups)
         self._leave()
         for axes in self.groups:
             if axes is self.joints or axes.mode is Mode.POSITION:
                 axes.hold()
 
     def follow(self, axes: Axes, goal: Vector, h: float, velocity: Vector | None = None) -> None:
-        """Let `axes` follow `goal`, shape (n,), with the velocity that the sender states, if any; `h` is the
-        step (s).
+        """Let `axes` follow a goal; arguments as of `Setpoint.follow`.
 
         Raises MotionError if it is out of range.
         """
@@ -99,13 +109,12 @@ class Drives:
         axes.follow(goal, h, velocity)
 
     def drift(self, velocity: Vector) -> None:
-        """Let the arm go on with joint velocities, shape (n,), for as long as they are told again."""
+        """Let the arm move with joint velocities, shape (n,), for as long as they are sent again."""
         self._take_over(self.joints)
         self.joints.drift(velocity)
 
     def move(self, axes: Axes, goal: Vector, ratio: Vector) -> None:
-        """Let `axes` move to `goal`, shape (n,), at the shares `ratio`, shape (2,), of velocity and
-        acceleration.
+        """Let `axes` move to a goal; arguments as of `Axes.move`.
 
         Raises MotionError if it is out of range.
         """
@@ -122,65 +131,63 @@ class Drives:
     def press(self, wrench: Vector, frame: WrenchFrame) -> None:
         """Apply `wrench`, shape (6,), with the arm from now on, wherever it goes."""
         self._take_over(self.joints)
-        self._wrench[:], self._frame[0] = wrench, frame
+        self.control.wrench[:], self.control.frame = wrench, frame
         self._balance()
 
     def resist(self, message: CartesianImpedance) -> None:
-        """Let the arm be held by springs and dampers. Raises MotionError if the message makes no sense."""
+        """Let the arm be held by springs and dampers. Raises MotionError if the message is invalid."""
         self._impedance.set(message)
         self._take_over(self.joints)
-        self._frame[0] = WrenchFrame.IMPEDANCE
+        self.control.frame = WrenchFrame.IMPEDANCE
         self._balance()
 
     def step(self, h: float) -> None:
         """Advance by `h` seconds."""
-        if self._frame[0]:
+        if self.control.frame is not WrenchFrame.NONE:
             self._balance()
         for axes in self.groups:
             axes.step(h)
 
-    def tell_arrivals(self, *, silent: bool) -> None:
-        """Tell of moves that have arrived since the last step; `silent`: not of the arm's, which homes."""
+    def report_arrivals(self, *, silent: bool) -> None:
+        """Report moves that have arrived since the last step; `silent`: not the arm's, which homes."""
         for axes in self.groups:
             if axes.finished() and not (silent and axes is self.joints):
                 self._messages.goal_reached(reached=True)
 
     def _take_over(self, axes: Axes) -> None:
-        self._give_up(axes)
+        self._abandon(axes)
         if axes is self.joints:
             self._leave()
 
     def _leave(self) -> None:
-        """Let go of what the arm was last told in Cartesian space."""
-        self._frame[0], self.cartesian[0] = WrenchFrame.NONE, 0.0
+        """End the last Cartesian command."""
+        self.control.frame, self.control.cartesian = WrenchFrame.NONE, False
 
-    def _give_up(self, *groups: Axes) -> None:
+    def _abandon(self, *groups: Axes) -> None:
         if any(axes.is_moving for axes in groups):
             self._messages.goal_reached(reached=False)
 
     def _balance(self) -> None:
-        """Apply the joint efforts J^T w, none over what its drive can do."""
+        """Apply the joint efforts J^T w, limited to what the drives can do."""
         chain = self.joints.chain
         frames = chain.frames(self.joints.position)
-        frame = self._frame[0]
+        frame = self.control.frame
         if frame in (WrenchFrame.REFERENCE, WrenchFrame.IMPEDANCE) or (
-            frame == WrenchFrame.BODY and self.absolute[0]
+            frame is WrenchFrame.BODY and self.control.absolute
         ):
             jacobian = chain.jacobian(frames)
             wrench = self._in_base(frames[-1], jacobian)
         else:
-            jacobian, wrench = chain.jacobian(frames, frame="tip"), self._wrench
-            if frame == WrenchFrame.SPATIAL:
+            jacobian, wrench = chain.jacobian(frames, frame="tip"), self.control.wrench
+            if frame is WrenchFrame.SPATIAL:
                 jacobian = body_to_spatial(frames[-1]) @ jacobian
         self.joints.apply(np.clip(jacobian.T @ wrench, -chain.effort, chain.effort))
 
     def _in_base(self, tip: Vector, jacobian: Vector) -> Vector:
-        """Return the wrench at the tip, shape (6,), from the axes of the reference in those of the base
-        frame.
-        """
+        """Return the wrench at the tip, shape (6,), along the axes of the base frame, not the reference's."""
         base, n = self._base(), len(self.joints.chain.joints)
-        wrench = self._wrench
-        if self._frame[0] == WrenchFrame.IMPEDANCE:
+        wrench = self.control.wrench
+        if self.control.frame is WrenchFrame.IMPEDANCE:
             wrench = self._impedance.wrench(
                 base @ tip, turned(base[:3, :3], jacobian @ self.joints.measured[n : 2 * n])
             )

@@ -19,8 +19,9 @@ _VERSIONS = {"420006": ("..11", "12.."), "420093": ("..13", "14..")}
 
 
 def tool_type(instrument: Instrument) -> str:
-    """Return `NAME:NUMBER[VERSIONS]` (SAW mtsToolList.cpp, Name), such as `LARGE_NEEDLE_DRIVER:400006[..]`;
-    the name alone of what has no number.
+    """Return `NAME:NUMBER[VERSIONS]`, such as `LARGE_NEEDLE_DRIVER:400006[..]` (SAW mtsToolList.cpp, Name).
+
+    An instrument without a number has its name alone.
     """
     if not instrument.number:
         return instrument.name
@@ -34,19 +35,18 @@ def tool_type(instrument: Instrument) -> str:
 
 
 def endoscope_type(endoscope: Endoscope) -> str:
-    """Return the name of an endoscope of the Classic with its SD camera, the one whose mass the model has
-    (SAW mtsIntuitiveResearchKitEndoscopeTypes.cdg).
+    """Return the name of an endoscope of the Classic with its SD camera, whose mass the model has.
+
+    Names are those of SAW mtsIntuitiveResearchKitEndoscopeTypes.cdg.
     """
     return f"Classic_SD_{endoscope.upper()}"
 
 
 class Equipment:
-    """What one arm holds for as long as the session lasts, and what carries out the commands about it, by
-    their names, in `handlers`.
-    """
+    """What one arm holds while the session lasts, and the `handlers` of commands about it, by name."""
 
     def __init__(self, event: Literal["tool_type", "endoscope_type"], name: str, messages: Messages) -> None:
-        """Take the event that tells what the arm holds, its name there, and where to tell it."""
+        """Take the event that publishes what the arm holds, the name to publish, and the arm's events."""
         self._event, self._name, self._messages = event, name, messages
         self.handlers: Mapping[str, Callable[[Any], None]] = {f"set_{event}": self._set}
         if event == "tool_type":
@@ -56,20 +56,20 @@ class Equipment:
                 "emulate_tool_present": self._emulate_present,
             }
 
-    def tell(self) -> None:
-        """Tell what the arm holds."""
+    def publish(self) -> None:
+        """Publish what the arm holds."""
         self._messages.equipment(self._event, self._name)
 
     def _set(self, message: StringMessage) -> None:
         if message.data.partition("[")[0] != self._name.partition("[")[0]:
             raise MotionError(
-                f"'{message.data}', the arm holds {self._name}; what it holds is the scenario's to say"
+                f"'{message.data}', the arm holds {self._name}; the scenario states what it holds"
             )
-        self.tell()
+        self.publish()
 
     def _emulate_present(self, message: BoolMessage) -> None:
         if not message.data:
             raise MotionError(
-                f"the arm holds {self._name}, and nobody is there to take it off; what it holds is the"
-                " scenario's to say"
+                f"the arm holds {self._name}, which cannot be removed while the session runs; the scenario"
+                " states what it holds"
             )

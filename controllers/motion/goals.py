@@ -1,6 +1,6 @@
 """From CRTK's messages to goals of an arm.
 
-Whatever is wrong with a message raises MotionError, which says what is allowed.
+An invalid message raises MotionError, which states what is allowed.
 """
 
 from __future__ import annotations
@@ -31,17 +31,15 @@ __all__ = [
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
 _MOST = 1e9
-"""In SI units.
-
-No force, velocity, gain or place is meant to be larger, and what is computed of such numbers stays finite.
-"""
+"""SI units; what is computed from numbers up to this stays finite, and no force, gain or place is larger."""
 
 
 def joint_values(
     chain: SerialChain, message: JointState, part: Literal["position", "velocity", "effort"]
 ) -> Vector:
-    """Return positions, velocities or efforts, shape (n,), in the order of the chain; a message that names
-    its joints may have them in any.
+    """Return positions, velocities or efforts, shape (n,), in the order of the chain.
+
+    A message that names its joints may have them in any order.
     """
     names = [joint.name for joint in chain.joints]
     values: Vector = getattr(message, part)
@@ -56,14 +54,12 @@ def joint_values(
 
 
 def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
-    """Return the velocities, shape (n,), with which a goal is to be passed; None where none are stated, or
-    zeros alone.
-    """
+    """Return the velocities at a goal, shape (n,); None where none are stated, or zeros alone."""
     return joint_values(chain, message, "velocity") if message.velocity.any() else None
 
 
 def efforts(chain: SerialChain, message: JointState) -> Vector:
-    """Return the efforts, shape (n,), none over what its drive can do."""
+    """Return the efforts, shape (n,), all within what the drives can do."""
     values = joint_values(chain, message, "effort")
     wrong = [
         f"joint {joint.name} at {value:.6g} {'N m' if joint.kind == 'revolute' else 'N'}, allowed are"
@@ -113,7 +109,7 @@ def wrench(message: Wrench) -> Vector:
 
 
 def vector(message: Point | Vector3, part: str) -> Vector:
-    """Return the vector, shape (3,); `part` names it where it is not finite, or too large to be meant."""
+    """Return the vector, shape (3,); `part` names it in the error if it is not finite or too large."""
     values = np.array([message.x, message.y, message.z])
     _check_finite(values, part)
     if (np.abs(values) > _MOST).any():

@@ -1,5 +1,4 @@
-"""Cartesian impedance: springs and dampers between the tip and a goal, with gains of their own on either side
-of it.
+"""Cartesian impedance: springs and dampers between the tip and a goal, with gains for either side of it.
 
 The law is that of the real controller (jhu-saw/sawControllers, osaCartesianImpedanceController.cpp). With e
 the tip's displacement along the axes of an orientation, v its velocity along them, and the gains of the side
@@ -12,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from controllers.motion import goals
+from hub.participant import Record, array
 from robots import rotation
 from schemas.crtk import CartesianImpedance, CartesianImpedanceHalfPlaneGains
 from schemas.vectors import Vector
@@ -19,21 +19,30 @@ from schemas.vectors import Vector
 __all__ = ["Impedance"]
 
 
+class ImpedanceState(Record):
+    """The goal of one arm, and its gains."""
+
+    force_axes = array(3, 3)
+    torque_axes = array(3, 3)
+    """Along which forces and torques act, and the goal's orientation."""
+    position = array(3)
+    gains = array(4, 2, 2, 3)
+    """p, d, bias and deadband; on the positive and on the negative side; of force and torque; x, y, z."""
+
+
 class Impedance:
     """The goal of one arm, and its gains."""
 
     def __init__(self) -> None:
-        """Start without any."""
-        self.state = np.zeros(21 + 48)
-        self._force_axes, self._torque_axes = self.state[:18].reshape(2, 3, 3)
-        self._position = self.state[18:21]
-        self._gains = self.state[21:].reshape(4, 2, 2, 3)
-        """p, d, bias and deadband; on the positive and on the negative side; of force and torque; x, y, z."""
+        """Start with zeros."""
+        self.state = ImpedanceState()
+        self._force_axes, self._torque_axes = self.state.force_axes, self.state.torque_axes
+        self._position, self._gains = self.state.position, self.state.gains
 
     def set(self, message: CartesianImpedance) -> None:
         """Take another goal.
 
-        Raises MotionError, and keeps the old one, if a number is not finite or a quaternion is none.
+        Raises MotionError, and keeps the old one, if a number is not finite or a quaternion not of unit norm.
         """
         axes = (
             goals.rotation_matrix(message.force_orientation),
@@ -52,8 +61,11 @@ class Impedance:
         self._position[:], self._gains[:] = position, gains.transpose(2, 0, 1, 3)
 
     def wrench(self, tip: Vector, twist: Vector) -> Vector:
-        """Return the wrench on the tip, shape (6,), of its pose, shape (4, 4), and twist, shape (6,), all in
-        the frame of the goal.
+        """Return the wrench on the tip, shape (6,), in the frame of the goal.
+
+        Args:
+            tip: its pose in that frame, shape (4, 4).
+            twist: its twist in that frame, shape (6,).
         """
         turn = rotation.log(rotation.from_matrix(self._torque_axes.T @ tip[:3, :3]))
         away = np.array([self._force_axes.T @ (tip[:3, 3] - self._position), turn])  # (2, 3)

@@ -1,24 +1,57 @@
-"""An arm's way through its operating states: powering, homing, pausing, faults."""
+"""The operating state of one arm: powering, homing, pausing, faults.
+
+Source of the tolerances: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68).
+"""
 
 from __future__ import annotations
+
+from math import radians
 
 import numpy as np
 
 from controllers.motion.axes import Mode
 from controllers.motion.drives import Drives
-from controllers.motion.limits import GOAL_TOLERANCE, HOMING_TIMEOUT, TRACKING_TOLERANCE
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import Desired, Repeats, State, refusal
+from hub.participant import Record, choice, flag, number
 from schemas.crtk import StringStamped
 from schemas.vectors import Vector
 
 __all__ = ["Lifecycle"]
 
+_TRACKING_TOLERANCE = (0.5, 0.5, 0.05, 0.6, 0.6, 0.6)
+"""Largest distance of a joint from its setpoint, rad and m, before the arm goes to FAULT.
+
+From SAW share/pid/sawControllersPID-PSM.json; the first four are used for the ECM too.
+"""
+_GOAL_TOLERANCE = radians(3.0)
+"""Largest distance of a joint from home, rad and m, after homing.
+
+From SAW mtsIntuitiveResearchKit{PSM,ECM}.cpp.
+"""
+_HOMING_TIMEOUT = 2.0
+"""s after the end of the homing trajectory in which the arm must be at home.
+
+From SAW mtsIntuitiveResearchKitArm.cpp, RunHoming.
+"""
 
 _DESIRED = {"enable": Desired.ENABLED, "disable": Desired.DISABLED, "home": Desired.HOMED}
-"""What commands ask for; a pause leaves it to be resumed."""
+"""What commands request; after a pause the arm goes on with it."""
 _FULL = np.ones(2)
 """Shares of velocity and acceleration with which an arm homes."""
+
+
+class LifecycleState(Record):
+    """The operating state of one arm, and its progress to the next."""
+
+    state = choice(State.DISABLED)
+    homed = flag()
+    powering = number()
+    """s until the arm is ENABLED; 0: it is not powering."""
+    homing = flag()
+    late = number()
+    """s since the end of the homing trajectory."""
+    desired = choice(Desired.DISABLED)
 
 
 class Lifecycle:
@@ -27,20 +60,22 @@ class Lifecycle:
     def __init__(
         self, drives: Drives, messages: Messages, home: Vector, power_time: float, *, homed: bool
     ) -> None:
-        """Take the drives, where to tell what happens, home, shape (n,), the time (s) to power, and whether
-        to start homed.
+        """Start DISABLED, or ENABLED and homed.
+
+        Args:
+            drives: what changes with the state.
+            messages: where changes are reported.
+            home: joint positions, shape (n,).
+            power_time: from `enable` to ENABLED, s.
+            homed: whether to start ENABLED and homed.
         """
         self._drives, self._messages = drives, messages
         self._home, self._power_time = home, power_time
         n = len(home)
-        self._tolerance = np.array([*TRACKING_TOLERANCE, *TRACKING_TOLERANCE[-1:] * n][:n])
-        self.flags = np.zeros(6)
-        self._state, self._homed, self._powering, self._homing, self._late, self._desired = np.split(
-            self.flags, 6
-        )
+        self._tolerance = np.array([*_TRACKING_TOLERANCE, *_TRACKING_TOLERANCE[-1:] * n][:n])
+        self._now = LifecycleState()
         self._repeats = Repeats()
-        self.arrays = (self.flags, self._repeats.state)
-        """All that changes."""
+        self.records = (self._now, self._repeats.state)
         self._commands = {
             "enable": self._enable,
             "disable": self._disable,
@@ -50,54 +85,51 @@ class Lifecycle:
             "resume": self._resume,
         }
         if homed:
-            self._state[0], self._homed[0], self._desired[0] = State.ENABLED, 1.0, Desired.HOMED
+            self._now.state, self._now.homed, self._now.desired = State.ENABLED, True, Desired.HOMED
             drives.power(on=True)
 
     @property
     def state(self) -> State:
         """The operating state."""
-        return State(int(self._state[0]))
+        return self._now.state
 
     @property
     def is_homed(self) -> bool:
         """Whether the arm knows where it is and may move."""
-        return bool(self._homed[0])
+        return self._now.homed
 
     @property
     def is_busy(self) -> bool:
         """Whether the arm powers, homes or moves."""
         return (
-            bool(self._powering[0] or (self._homing[0] and self.state is not State.PAUSED))
+            self._now.powering > 0.0
+            or (self._now.homing and self.state is not State.PAUSED)
             or self._drives.is_moving
         )
 
     @property
     def desired_state(self) -> str:
-        """Where the arm was told to go: CRTK's `desired_state`."""
-        return (
-            self.state.name
-            if self.state in (State.PAUSED, State.FAULT)
-            else Desired(int(self._desired[0])).name
-        )
+        """The state that was commanded: CRTK's `desired_state`."""
+        return self.state.name if self.state in (State.PAUSED, State.FAULT) else self._now.desired.name
 
     def not_ready(self) -> str:
-        """Return why the arm takes no motion commands; empty if it does."""
+        """Return why the arm refuses motion commands; empty if it does not."""
         if self.state is not State.ENABLED:
             return (
-                f"the arm is {self.state.name}{' and powering' if self._powering[0] else ''}, allowed in"
+                f"the arm is {self.state.name}{' and powering' if self._now.powering else ''}, allowed in"
                 " ENABLED and homed"
             )
-        if self._homing[0]:
+        if self._now.homing:
             return "the arm is homing, allowed when it is homed"
-        return "" if self._homed[0] else "the arm is not homed, send state_command home first"
+        return "" if self._now.homed else "the arm is not homed, send state_command home first"
 
     def command(self, message: StringStamped) -> bool:
-        """Heed a `state_command`; return whether the state takes it."""
+        """Execute a `state_command`; return whether it was accepted."""
         if reason := refusal(self.state, message.string) or self._repeats.refusal(message):
             self._messages.warning(reason)
             return False
         if message.string in _DESIRED:
-            self._desired[0] = _DESIRED[message.string]
+            self._now.desired = _DESIRED[message.string]
         self._commands[message.string]()
         if message.string != "unhome":
             self._messages.desired_state(self.desired_state)
@@ -105,33 +137,33 @@ class Lifecycle:
         return True
 
     def watch(self, h: float) -> None:
-        """Notice what has ended or gone wrong in the last step, of `h` seconds."""
+        """Check what has ended or gone wrong in the last step, of `h` seconds."""
         if self._drives.joints.mode is Mode.POSITION and (reason := self._lost()):
             self._fault(reason)
-        self._drives.tell_arrivals(silent=bool(self._homing[0]))
-        if self._homing[0] and self.state is State.ENABLED and not self._drives.joints.is_moving:
+        self._drives.report_arrivals(silent=self._now.homing)
+        if self._now.homing and self.state is State.ENABLED and not self._drives.joints.is_moving:
             self._check_home(h)
 
     def step(self, h: float) -> None:
-        """Go on with powering, for `h` seconds."""
-        if not self._powering[0]:
+        """Continue powering, for `h` seconds."""
+        if not self._now.powering:
             return
-        self._powering[0] = max(self._powering[0] - h, 0.0)
-        if self._powering[0] < 0.5 * h:  # whole steps, whatever rounding leaves
+        self._now.powering = max(self._now.powering - h, 0.0)
+        if self._now.powering < 0.5 * h:  # whole steps, in spite of rounding
             self._finish_powering()
 
     def _enable(self) -> None:
-        if self.state is State.DISABLED and not self._powering[0]:
-            self._powering[0] = self._power_time
+        if self.state is State.DISABLED and not self._now.powering:
+            self._now.powering = self._power_time
             if not self._power_time:
                 self._finish_powering()
 
     def _go_home(self) -> None:
-        """Home unless that is done or under way, powering first if need be."""
-        if self._homed[0] or self._homing[0]:
+        """Home the arm unless it is homed or homing; power it first if it is DISABLED."""
+        if self._now.homed or self._now.homing:
             self._enable()
             return
-        self._homing[0], self._late[0] = 1.0, 0.0
+        self._now.homing, self._now.late = True, 0.0
         if self.state is State.ENABLED:
             self._drives.move(self._drives.joints, self._home, _FULL)
         else:
@@ -143,27 +175,27 @@ class Lifecycle:
     def _unhome(self) -> None:
         if self.state is State.ENABLED:
             self._drives.rest()
-        self._homed[0] = self._homing[0] = 0.0
+        self._now.homed = self._now.homing = False
 
     def _pause(self) -> None:
         self._drives.rest()
-        self._state[0] = State.PAUSED
+        self._now.state = State.PAUSED
 
     def _resume(self) -> None:
-        self._state[0] = State.ENABLED
-        if self._homing[0]:
+        self._now.state = State.ENABLED
+        if self._now.homing:
             self._drives.move(self._drives.joints, self._home, _FULL)
 
     def _finish_powering(self) -> None:
-        self._powering[0], self._state[0] = 0.0, State.ENABLED
+        self._now.powering, self._now.state = 0.0, State.ENABLED
         self._drives.power(on=True)
         self._messages.status("enabled")
-        if self._homing[0]:
+        if self._now.homing:
             self._drives.move(self._drives.joints, self._home, _FULL)
 
     def _switch_off(self, state: State) -> None:
-        self._powering[0] = self._homing[0] = 0.0
-        self._state[0] = state
+        self._now.powering, self._now.homing = 0.0, False
+        self._now.state = state
         self._drives.power(on=False)
 
     def _fault(self, reason: str) -> None:
@@ -172,7 +204,7 @@ class Lifecycle:
         self._messages.desired_state(self.desired_state)
 
     def _lost(self) -> str:
-        """Return which joints are further from their setpoint than they may be; empty if none is."""
+        """Return which joints are too far from their setpoint; empty if all are near enough."""
         joints = self._drives.joints
         away = np.abs(joints.setpoint.position - joints.position)
         if not (away > self._tolerance).any():
@@ -186,13 +218,13 @@ class Lifecycle:
 
     def _check_home(self, h: float) -> None:
         away = float(np.abs(self._home - self._drives.joints.position).max())
-        if away <= GOAL_TOLERANCE:
-            self._homing[0], self._homed[0] = 0.0, 1.0
+        if away <= _GOAL_TOLERANCE:
+            self._now.homing, self._now.homed = False, True
             self._messages.status("homed")
             return
-        self._late[0] += h
-        if self._late[0] > HOMING_TIMEOUT:
+        self._now.late += h
+        if self._now.late > _HOMING_TIMEOUT:
             self._fault(
-                f"home not reached {HOMING_TIMEOUT:g} s after its trajectory, {away:.3g} (rad, m) away,"
-                f" allowed are {GOAL_TOLERANCE:.3g}"
+                f"home not reached {_HOMING_TIMEOUT:g} s after its trajectory, {away:.3g} (rad, m) away,"
+                f" allowed are {_GOAL_TOLERANCE:.3g}"
             )

@@ -1,4 +1,4 @@
-"""What an arm says in events: its operating state, whether goals were reached, errors, warnings and news."""
+"""The events of one arm: its operating state, whether goals were reached, errors, warnings, status."""
 
 from __future__ import annotations
 
@@ -8,55 +8,42 @@ from zlib import crc32
 import numpy as np
 
 from controllers.motion.operating_state import State
+from robots.dvrk import crtk
 from schemas.crtk import OperatingState
 from schemas.message import Message
 from schemas.ros import BoolMessage, Header, StringMessage, Time
 
 __all__ = ["Messages"]
 
-_STREAMS = (
-    *(
-        "servo_jp",
-        "servo_jr",
-        "servo_cp",
-        "servo_cr",
-        "servo_cs",
-        "servo_ci",
-        "servo_jf",
-        "body/servo_cf",
-        "spatial/servo_cf",
-    ),
-    *("jaw/servo_jp", "jaw/servo_jf", "hand/servo_jp", "hand/servo_jf"),
+_STREAMS = tuple(filter(crtk.is_stream, crtk.COMMANDS)) + tuple(
+    f"{gripper}/{command}"
+    for gripper in ("jaw", "hand")
+    for command in filter(crtk.is_stream, crtk.GRIPPER_COMMANDS)
 )
-_REPEAT = 2.0
-"""s before a refusal of the same words is repeated to a stream (jhu-dvrk/sawIntuitiveResearchKit,
-mtsIntuitiveResearchKitArm.cpp, ArmIsReady).
-"""
 
 
 class Messages:
     """The event outputs of one arm in the present step."""
 
     def __init__(self, arm: str, events: Iterable[str]) -> None:
-        """Take the arm's name and those of its event ports."""
+        """Take the arm's name and those of its event outputs."""
         self._arm = arm
         self._ports = {name: f"{arm}/{name}" for name in events}
         self.outputs: dict[str, tuple[Message, ...]] = dict.fromkeys(self._ports.values(), ())
         self._quiet = True
         self._now_ns = 0
         self.state = np.zeros((len(_STREAMS), 3))
-        """Per stream: checksum of the last refusal's words, when it was told, how often it came since then.
-        """
+        """Per stream: checksum of the last refusal, when it was reported (s), how often it recurred since."""
 
     def begin(self, now_ns: int) -> None:
-        """Forget what was said; the step that begins ends at `now_ns`."""
+        """Clear the events of the last step; the new one ends at `now_ns`."""
         self._now_ns = now_ns
         if not self._quiet:
             self.outputs.update(dict.fromkeys(self._ports.values(), ()))
             self._quiet = True
 
     def operating_state(self, state: State, *, homed: bool, busy: bool) -> None:
-        """Tell the operating state."""
+        """Publish the operating state."""
         stamp = Time.from_ns(self._now_ns)
         self._put(
             "operating_state",
@@ -64,55 +51,52 @@ class Messages:
         )
 
     def desired_state(self, state: str) -> None:
-        """Tell where the arm was told to go."""
+        """Publish the state that was commanded."""
         self._put("desired_state", StringMessage(data=state))
 
     def equipment(self, event: str, name: str) -> None:
-        """Tell on `tool_type` or `endoscope_type` what the arm holds."""
+        """Publish what the arm holds: `event` is `tool_type` or `endoscope_type`."""
         self._put(event, StringMessage(data=name))
 
     def goal_reached(self, *, reached: bool) -> None:
-        """Tell whether a move has arrived."""
+        """Publish whether a move has arrived."""
         self._put("goal_reached", BoolMessage(data=reached))
 
     def error(self, text: str) -> None:
-        """Tell what cannot be done."""
+        """Publish what cannot be done."""
         self._put("error", StringMessage(data=f"{self._arm}: {text}"))
 
     def warning(self, text: str) -> None:
-        """Tell what is not done now."""
+        """Publish what is refused at present."""
         self._put("warning", StringMessage(data=f"{self._arm}: {text}"))
 
     def status(self, text: str) -> None:
-        """Tell what happens."""
+        """Publish what happens."""
         self._put("status", StringMessage(data=f"{self._arm}: {text}"))
 
     def refuse(self, command: str, reason: str, *, ready: bool) -> None:
-        """Say why `command` is not heeded: an error if it cannot be, a warning if it came while the arm was
-        not `ready`.
+        """Report why `command` is refused: an error if the arm is `ready` for commands, else a warning.
 
-        A stream is told the same only once in two seconds, with how often it came.
+        For a stream the same refusal is reported once in two seconds, with the number of commands.
         """
         count = self._repeats(command, reason) if command in _STREAMS else 1
         if count:
             text = f"{command} refused: {reason}" + (f" ({count} times)" if count > 1 else "")
             (self.error if ready else self.warning)(text)
 
-    def heeded(self, command: str) -> None:
-        """Note that a command was heeded, so that the next refusal is news."""
+    def executed(self, command: str) -> None:
+        """Note that a command was executed, so that its next refusal is reported at once."""
         if command in _STREAMS:
             self.state[_STREAMS.index(command)] = 0.0
 
     def _repeats(self, command: str, reason: str) -> int:
-        """Return how often the same refusal has come since it was last told; 0 while it is too early to tell
-        it again.
-        """
+        """Return how often the same refusal occurred since its last report; 0 while that is too recent."""
         row, words, now = (
             self.state[_STREAMS.index(command)],
             float(crc32(reason.encode())),
             self._now_ns * 1e-9,
         )
-        if row[0] == words and now - row[1] < _REPEAT:
+        if row[0] == words and now - row[1] < crtk.REPEAT_NS * 1e-9:
             row[2] += 1.0
             return 0
         count = int(row[2]) + 1 if row[0] == words else 1

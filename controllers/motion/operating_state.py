@@ -1,8 +1,8 @@
-"""CRTK's operating states, and which command each of them takes.
+"""CRTK's operating states, and which commands each of them accepts.
 
-As on the dVRK (jhu-cisst/cisst, prmOperatingState): what is not listed is refused with a warning. Two
-accidents of that code are not followed: there `pause` is let through in DISABLED, and so is `home`, which
-then powers the arm first; the second is kept, as clients use it.
+As on the dVRK (jhu-cisst/cisst, prmOperatingState): what is not listed is refused with a warning. Of two
+accidents of that code one is not followed: there DISABLED accepts `pause`. The other is kept, as clients use
+it: DISABLED accepts `home`, which then powers the arm first.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from zlib import crc32
 
 import numpy as np
 
+from robots.dvrk.crtk import REMEMBERED_COMMANDS
 from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 
@@ -28,7 +29,7 @@ class State(IntEnum):
 
 
 class Desired(IntEnum):
-    """Where an arm is told to go; what `desired_state` says unless the arm is paused or in fault."""
+    """The state that was commanded; `desired_state` publishes it unless the arm is paused or in fault."""
 
     DISABLED = 0
     ENABLED = 1
@@ -44,34 +45,32 @@ _COMMANDS = {
 
 
 def refusal(state: State, command: str) -> str | None:
-    """Return why `state` does not take `command`; None if it does."""
+    """Return why `state` refuses `command`; None if it accepts it."""
     known = {name for commands in _COMMANDS.values() for name in commands}
     if command not in known:
         return f"state_command '{command}' is unknown.{did_you_mean(command, known)}"
     if command not in _COMMANDS[state]:
         return (
-            f"state_command '{command}' is refused in state {state.name}, which takes"
+            f"state_command '{command}' is refused in state {state.name}, which accepts"
             f" {', '.join(_COMMANDS[state])}"
         )
     return None
 
 
 class Repeats:
-    """Finds state commands that come a second time: latched, they do so whenever a client's connection is
-    made anew.
+    """Finds state commands that are delivered twice.
+
+    They are latched, so a client that connects again delivers its last one again.
     """
 
-    _KEPT = 8
-    """How many commands are remembered; more clients than that do not command one arm."""
-
     def __init__(self) -> None:
-        """Remember none."""
-        self.state = np.zeros((self._KEPT, 3))
-        """Stamps (s, ns) and checksums of the commands heeded last, the newest first."""
+        self.state = np.zeros((REMEMBERED_COMMANDS, 3))
+        """Stamps (s, ns) and checksums of the last commands that were executed, the newest first."""
 
     def refusal(self, message: StringStamped) -> str | None:
-        """Return why a command that was heeded before is not heeded again, else None, and remember it; one
-        without a stamp is always new.
+        """Return why a command is refused that was executed before; otherwise remember it and return None.
+
+        A command without a stamp is always new.
         """
         stamp = message.header.stamp
         if not (stamp.sec or stamp.nanosec):
@@ -80,7 +79,7 @@ class Repeats:
         if (self.state == mark).all(axis=1).any():
             return (
                 f"state_command '{message.string}' of time {stamp.sec}.{stamp.nanosec:09d} s is refused: it"
-                " was heeded before; a new one has a new stamp"
+                " was executed before; a new one has a new stamp"
             )
         self.state[1:] = self.state[:-1].copy()
         self.state[0] = mark

@@ -1,4 +1,4 @@
-"""What a scenario may say about the motion controller. SI units, radians, quaternions (x, y, z, w)."""
+"""Parameters of the motion controller. SI units, radians, quaternions (x, y, z, w)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from controllers.motion.equipment import endoscope_type, tool_type
 from hub.participant import Params
 from robots.dvrk import ecm, psm
+from robots.dvrk.crtk import Mounting, Reference
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
@@ -35,7 +36,7 @@ class PsmParams(MountedPsm):
 
     @property
     def gripper(self) -> Gripper | None:
-        """What the instrument grasps with, if anything."""
+        """What the instrument grasps with; None: it does not grasp."""
         tool = self.tool
         if tool.jaw is not None:
             return Gripper("jaw", tool.jaw_joints, (self.jaw, 0.0)[: len(tool.jaw_joints)])
@@ -43,12 +44,12 @@ class PsmParams(MountedPsm):
 
     @property
     def home(self) -> tuple[float, ...]:
-        """Where the arm goes to be homed."""
+        """Joint positions to which the arm homes."""
         return psm.home(self.tool)
 
     @property
     def equipment(self) -> tuple[Literal["tool_type"], str]:
-        """What the arm holds: the event that tells it, and its name there."""
+        """What the arm holds: the event that publishes it, and its name there."""
         return "tool_type", tool_type(self.tool)
 
 
@@ -62,12 +63,12 @@ class EcmParams(MountedEcm):
 
     @property
     def home(self) -> tuple[float, ...]:
-        """Where the arm goes to be homed."""
+        """Joint positions to which the arm homes."""
         return ecm.HOME
 
     @property
     def equipment(self) -> tuple[Literal["endoscope_type"], str]:
-        """What the arm holds: the event that tells it, and its name there."""
+        """What the arm holds: the event that publishes it, and its name there."""
         return "endoscope_type", endoscope_type(self.endoscope)
 
 
@@ -98,7 +99,7 @@ class Arms(Params):
 
 
 class SetupJoints(Params):
-    """Where the braked setup joints are set: the lift (m), then five angles; None: the simulated positions."""
+    """Positions of the braked setup joints: the lift (m), then five angles; None: the simulated ones."""
 
     PSM1: Annotated[SetupPositions, settable("PSM1")] | None = None
     PSM2: Annotated[SetupPositions, settable("PSM2")] | None = None
@@ -107,23 +108,23 @@ class SetupJoints(Params):
 
 
 class MotionParams(Params):
-    """Which arms are driven, and in which frame the world outside speaks of them."""
+    """Which arms are driven, and to which frame their Cartesian ports refer."""
 
     arms: Arms
-    mounting: Literal["free", "cart"] = Field(
+    mounting: Mounting = Field(
         default="free",
         description=(
-            "each arm where its position and orientation say, or on the setup joints of the cart, whose frame"
-            " is the world then"
+            "each arm at its position and orientation, or on the setup joints of the cart, whose frame is"
+            " then the world"
         ),
     )
     setup_joints: SetupJoints = SetupJoints()
-    reference: Literal["camera", "base", "world"] = Field(
+    reference: Reference = Field(
         default="camera",
         description=(
             "frame of measured_cp and of Cartesian commands: the camera view, as on the real system (the ECM"
             " itself: the cart; without an ECM: base), each arm's own base, or the world, where"
-            " set_base_frame says anew where a free arm's base is taken to stand"
+            " set_base_frame changes where a free arm's base stands"
         ),
     )
     initial_state: Literal["disabled", "homed"] = Field(

@@ -1,11 +1,10 @@
-"""The setpoint of n joints: it goes where it is told to, and neither its position nor its velocity ever
-jumps.
+"""The setpoint of n joints: it goes where it is commanded, without jumps in position or velocity.
 
 Two sets of limits. A *move* is a time-optimal trajectory within velocity, acceleration and jerk (Ruckig:
 Berscheid and Kroeger, "Jerk-limited Real-time Trajectory Generation with Arbitrary Target States", RSS 2021),
 all joints arriving together. *Following* a stream of goals, and *braking*, keep to the velocity and to
 `FOLLOWING_ACCELERATION` times the acceleration: trajectory limits are set for comfort, and a hand or a visual
-servo that is followed no faster would be followed too late.
+servo would be followed too late with them.
 """
 
 from __future__ import annotations
@@ -15,26 +14,34 @@ from enum import IntEnum
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from controllers.motion.limits import FOLLOWING_ACCELERATION, STREAM_GAP
+from hub.participant import Record, array, choice, flag, number
 from robots.serial_chain import Joint
 from schemas.vectors import Vector
 
-__all__ = ["Activity", "Setpoint"]
+__all__ = ["FOLLOWING_ACCELERATION", "STREAM_GAP", "Activity", "Setpoint"]
 
+FOLLOWING_ACCELERATION = 10.0
+"""How many times the acceleration of a trajectory `servo_*` may take, and `hold` to brake.
+
+It makes 15.7 rad/s^2 of the PSM's yaw, about what its drive can do: 3.316 N m against 0.2076 kg m^2 are 16.0
+rad/s^2 (docs/decisions/0011).
+"""
+STREAM_GAP = 0.1
+"""s; `servo_*` commands further apart than this are no stream: ten periods of the dVRK's own 100 Hz."""
 _LOOKS = 200
-"""Points at which a trajectory is compared with the ranges: with 2 s a point each 10 ms, between which 1.57
-rad/s^2 add 20 urad at most.
+"""Points at which a trajectory is compared with the ranges.
+
+With 2 s these are 10 ms apart, between which 1.57 rad/s^2 add 20 urad at most.
 """
 _PASSING = 1e-9
-"""rad and m by which rounding may carry a trajectory past a joint's range. What hides between two looks is
-clipped as it comes.
+"""rad and m by which rounding may carry a trajectory past a joint's range.
+
+What lies between two points of comparison is clipped in the step in which it is reached.
 """
-_ROWS = 8
-_SCALARS = 8
 
 
 class Activity(IntEnum):
-    """What the setpoint is about."""
+    """What the setpoint does."""
 
     HOLD = 0
     FOLLOW = 1
@@ -43,37 +50,57 @@ class Activity(IntEnum):
     DRIFT = 4
 
 
+class SetpointState(Record):
+    """All of the setpoint of n joints that changes."""
+
+    position = array("n")
+    velocity = array("n")
+    acceleration = array("n")
+    goal = array("n")
+    arrival = array("n")
+    """Velocity at the goal of a stream, or that of a drift."""
+    origin = array(3, "n")
+    """Position, velocity and acceleration where the trajectory starts."""
+    activity = choice(Activity.HOLD)
+    elapsed = number()
+    """s since the start of the trajectory."""
+    since = number()
+    """s since the last command of a stream."""
+    waiting = number()
+    """s until the next command of a stream is due."""
+    pending = flag()
+    """Whether a move starts once the setpoint is at rest."""
+    stated = flag()
+    """Whether the sender states the velocity at the goal."""
+    ratio = array(2)
+    """Shares of velocity, and of acceleration and jerk, that the trajectory may use."""
+
+
 class Setpoint:
-    """Positions and velocities of n joints, advanced step by step. All that changes is in `state`."""
+    """Positions and velocities of n joints, advanced step by step."""
 
     def __init__(self, joints: tuple[Joint, ...]) -> None:
-        """Take the joints, whose range, velocity, acceleration and jerk are kept to."""
+        """Start at zero, with HOLD; range, velocity, acceleration and jerk of the joints are kept to."""
         n = len(joints)
         self._n = n
         self._lower, self._upper, self._velocity, self._acceleration, self._jerk = np.array(
             [(joint.lower, joint.upper, joint.velocity, joint.acceleration, joint.jerk) for joint in joints]
         ).T.copy()
         self._most = FOLLOWING_ACCELERATION * self._acceleration
-        self.state = np.zeros(_ROWS * n + _SCALARS)
-        rows = self.state[: _ROWS * n].reshape(_ROWS, n)
-        self.position, self.velocity, self._acceleration_now, self.goal, self._arrival = rows[:5]
-        self._origin = rows[5:]  # position, velocity and acceleration where the trajectory starts
-        scalars = self.state[_ROWS * n :]
-        self._activity, self._elapsed, self._since, self._waiting, self._pending, self._stated = (
-            scalars[i : i + 1] for i in range(6)
-        )
-        self._ratio = scalars[6:]  # of velocity, and of acceleration and jerk
+        self.state = SetpointState(n=n)
+        self.position, self.velocity, self.goal = self.state.position, self.state.velocity, self.state.goal
+        self._arrival, self._origin = self.state.arrival, self.state.origin
         self._ruckig, self._trajectory = Ruckig(n), Trajectory(n)
 
     @property
     def activity(self) -> Activity:
-        """What the setpoint is about now."""
-        return Activity(int(self._activity[0]))
+        """What the setpoint does now."""
+        return self.state.activity
 
     @property
     def is_moving(self) -> bool:
         """Whether a move is under way, or waits for the setpoint to come to rest."""
-        return self.activity is Activity.MOVE or bool(self._pending[0])
+        return self.state.activity is Activity.MOVE or self.state.pending
 
     def reset(self, position: Vector) -> None:
         """Stand at `position`, shape (n,), or as near to it as the ranges allow."""
@@ -82,30 +109,36 @@ class Setpoint:
         self._rest()
 
     def follow(self, goal: Vector, h: float, velocity: Vector | None = None) -> None:
-        """Go to `goal`, shape (n,), inside the ranges, the newest of a stream or a single one; `h` is the
-        step (s).
+        """Go to a goal inside the ranges, the newest of a stream or a single one.
 
         Of a stream the setpoint reaches each goal when the next is due, in a straight line from the last one,
         so it neither lags by more than that nor stops in between. Where the sender states the velocity at the
-        goal, shape (n,), it gets there in a cubic.
+        goal, it gets there in a cubic.
+
+        Args:
+            goal: positions, shape (n,).
+            h: the step, s.
+            velocity: at the goal, shape (n,), if the sender states it.
         """
-        streaming = self.activity is Activity.FOLLOW and self._since[0] <= STREAM_GAP
-        interval = max(float(self._since[0]), h) if streaming else h
-        self._stated[0] = velocity is not None
+        state = self.state
+        streaming = state.activity is Activity.FOLLOW and state.since <= STREAM_GAP
+        interval = max(state.since, h) if streaming else h
+        state.stated = velocity is not None
         if velocity is None and streaming:
             velocity = (goal - self.goal) / interval
         self._arrival[:] = 0.0 if velocity is None else _clip(velocity, -self._velocity, self._velocity)
         self.goal[:] = goal
-        self._waiting[0], self._since[0], self._pending[0] = interval, 0.0, 0.0
-        self._activity[0] = Activity.FOLLOW
+        state.waiting, state.since, state.pending = interval, 0.0, False
+        state.activity = Activity.FOLLOW
 
     def drift(self, velocity: Vector) -> None:
-        """Go on with `velocity`, shape (n,), for as long as it is told again within `STREAM_GAP`; else, and
-        at a range's end, come to rest.
+        """Move with `velocity`, shape (n,), for as long as it is sent again within `STREAM_GAP`.
+
+        Afterwards, and at a range's end, the setpoint comes to rest.
         """
         self._arrival[:] = _clip(velocity, -self._velocity, self._velocity)
-        self._since[0], self._pending[0] = 0.0, 0.0
-        self._activity[0] = Activity.DRIFT
+        self.state.since, self.state.pending = 0.0, False
+        self.state.activity = Activity.DRIFT
 
     def move(self, goal: Vector, ratio: Vector) -> None:
         """Start a trajectory from the present state to rest at `goal`, shape (n,), inside the ranges.
@@ -114,23 +147,21 @@ class Setpoint:
         fast to stay inside the ranges on the way, it brakes first.
         """
         self.goal[:] = goal
-        self._ratio[:] = ratio
-        self._origin[:] = self.position, self.velocity, self._acceleration_now
+        self.state.ratio[:] = ratio
+        self._origin[:] = self.position, self.velocity, self.state.acceleration
         if self._plan():
-            self._activity[0], self._elapsed[0], self._pending[0] = Activity.MOVE, 0.0, 0.0
+            self.state.activity, self.state.elapsed, self.state.pending = Activity.MOVE, 0.0, False
         else:
-            self._activity[0], self._pending[0] = Activity.BRAKE, 1.0
+            self.state.activity, self.state.pending = Activity.BRAKE, True
 
     def brake(self) -> None:
         """Come to rest as quickly as following allows, and stay there."""
-        self._activity[0], self._pending[0] = Activity.BRAKE, 0.0
-        self._acceleration_now[:] = 0.0
+        self.state.activity, self.state.pending = Activity.BRAKE, False
+        self.state.acceleration[:] = 0.0
 
     def step(self, h: float) -> bool:
-        """Advance by `h` seconds; return whether a move has arrived, or braking has come to rest, in this
-        step.
-        """
-        activity = self.activity
+        """Advance by `h` seconds; return whether a move or braking has ended in this step."""
+        activity = self.state.activity
         if activity is Activity.HOLD:
             return False
         if activity is Activity.MOVE:
@@ -138,7 +169,7 @@ class Setpoint:
         if activity is Activity.FOLLOW:
             self._follow(h)
             return False
-        if activity is Activity.DRIFT and self._since[0] <= STREAM_GAP:
+        if activity is Activity.DRIFT and self.state.since <= STREAM_GAP:
             most_down, most_up = self._fastest(
                 np.array([self.position - self._lower, self._upper - self.position]), h
             )
@@ -147,19 +178,17 @@ class Setpoint:
         return self._slow_down(h)
 
     def restored(self) -> None:
-        """Bring what is not in `state` up to it."""
-        if self.activity is Activity.MOVE:
+        """Compute what follows from `state` after it was restored."""
+        if self.state.activity is Activity.MOVE:
             self._plan()
 
     def _rest(self) -> None:
-        self.velocity[:] = self._acceleration_now[:] = 0.0
-        self._activity[0], self._pending[0] = Activity.HOLD, 0.0
+        self.velocity[:] = self.state.acceleration[:] = 0.0
+        self.state.activity, self.state.pending = Activity.HOLD, False
 
     def _plan(self) -> bool:
-        """Compute the trajectory from `_origin` to `goal`; return whether there is one that stays inside the
-        ranges.
-        """
-        request, (faster, harder) = InputParameter(self._n), self._ratio.tolist()
+        """Compute the trajectory from the origin to the goal; return whether one stays inside the ranges."""
+        request, (faster, harder) = InputParameter(self._n), self.state.ratio.tolist()
         request.current_position, request.current_velocity, request.current_acceleration = self._origin
         request.target_position = self.goal
         request.max_velocity, request.max_acceleration, request.max_jerk = (
@@ -176,8 +205,9 @@ class Setpoint:
         return result in (Result.Working, Result.Finished) and self._stays_inside()
 
     def _stays_inside(self) -> bool:
-        """Look along the trajectory, unless it starts from rest: Ruckig's `position_extrema` leaves out its
-        braking at the start.
+        """Compare the trajectory with the ranges, unless it starts from rest.
+
+        Ruckig's `position_extrema` leaves out the braking at its start.
         """
         if not self._origin[1:].any():
             return True
@@ -186,55 +216,54 @@ class Setpoint:
         return bool((way >= self._lower - _PASSING).all() and (way <= self._upper + _PASSING).all())
 
     def _go_on(self, h: float) -> bool:
-        self._elapsed[0] += h
-        elapsed = float(self._elapsed[0])
+        elapsed = self.state.elapsed = self.state.elapsed + h
         if elapsed >= self._trajectory.duration:
             self.position[:] = self.goal
             self._rest()
             return True
-        position, self.velocity[:], self._acceleration_now[:] = self._trajectory.at_time(elapsed)
+        position, self.velocity[:], self.state.acceleration[:] = self._trajectory.at_time(elapsed)
         self.position[:] = _clip(np.array(position), self._lower, self._upper)
         return False
 
     def _follow(self, h: float) -> None:
-        wait = max(float(self._waiting[0]), h)
+        state = self.state
+        wait = max(state.waiting, h)
         # from where a setpoint that is in time would be now
         away = self.goal - self.position - wait * self._arrival
         most, most_down, most_up = self._fastest(
             np.array([np.abs(away), self.position - self._lower, self._upper - self.position]), h
         )
-        faster = self._bend(wait, h) if self._stated[0] else away / wait
+        faster = self._bend(wait, h) if state.stated else away / wait
         self._steer(self._arrival + _clip(faster, -most, most), most_down, most_up, h)
-        self._waiting[0] = max(wait - h, 0.0)
-        if not self._waiting[0]:
-            self._arrival[:] = self._stated[0] = 0.0
+        state.waiting = max(wait - h, 0.0)
+        if not state.waiting:
+            self._arrival[:] = 0.0
+            state.stated = False
 
     def _bend(self, wait: float, h: float) -> Vector:
-        """Return by how much the next step's velocity, shape (n,), is over that of arrival, on the cubic that
-        arrives after `wait` seconds.
-        """
+        """Return the next step's velocity less that of arrival, shape (n,), on a cubic of `wait` seconds."""
         mean = (self.goal - self.position) / wait
         now, then = self.velocity - mean, self._arrival - mean  # the cubic less the straight line
         share = h / wait
         return mean + now - share * (2.0 * now + then) + share * share * (now + then) - self._arrival
 
-    def _steer(self, wanted: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
-        """Take a step with the velocity nearest to `wanted`, shape (n,), that the limits and the way left to
-        either side allow.
+    def _steer(self, target: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
+        """Take a step with the allowed velocity nearest to `target`, shape (n,).
+
+        Allowed is what the limits and the way left to either side permit.
         """
         room = h * self._most
-        wanted = _clip(
-            _clip(wanted, -self._velocity, self._velocity), self.velocity - room, self.velocity + room
+        target = _clip(
+            _clip(target, -self._velocity, self._velocity), self.velocity - room, self.velocity + room
         )
-        self.velocity[:] = _clip(wanted, -most_down, most_up)
+        self.velocity[:] = _clip(target, -most_down, most_up)
         self.position += h * self.velocity
         self.position[:] = _clip(self.position, self._lower, self._upper)
-        self._acceleration_now[:] = 0.0
-        self._since[0] += h
+        self.state.acceleration[:] = 0.0
+        self.state.since += h
 
     def _fastest(self, distance: Vector, h: float) -> Vector:
-        """Return the largest velocity, shape (..., n), from which steps of `h` come to rest within
-        `distance`, shape (..., n).
+        """Return the largest velocity from which steps of `h` come to rest within `distance`, both (..., n).
 
         With the velocity falling by A h a step from n A h, m = floor(n) + 1 steps go A h^2 (m n - m (m - 1) /
         2) far; solved for n.
@@ -251,9 +280,9 @@ class Setpoint:
         self.position[:] = _clip(self.position, self._lower, self._upper)
         if self.velocity.any():
             return False
-        if self._pending[0]:
-            self._acceleration_now[:] = 0.0
-            self.move(self.goal.copy(), self._ratio.copy())
+        if self.state.pending:
+            self.state.acceleration[:] = 0.0
+            self.move(self.goal.copy(), self.state.ratio.copy())
             return False
         self.goal[:] = self.position
         self._rest()

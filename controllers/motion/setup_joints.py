@@ -1,5 +1,4 @@
-"""The setup joints of the cart as clients see them: where they are, and an operating state. They are braked:
-nothing moves them.
+"""The setup joints of the cart as clients see them: braked, with positions and an operating state.
 
 On the real system (jhu-dvrk/sawIntuitiveResearchKit, mtsIntuitiveResearchKitSUJ.cpp) one controller drives
 the brakes of all of them, so that they share their operating state, and its potentiometers know the positions
@@ -10,44 +9,50 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-import numpy as np
-
 from controllers.motion.frames import pose, setup_positions
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import Repeats, State, refusal
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import SETUP_JOINT_COMMANDS, SETUP_JOINT_EVENTS
-from hub.participant import Inputs
-from robots.dvrk import setup_joints
+from controllers.motion.ports import setup_joint_event_names
+from hub.participant import Inputs, Record, choice, flag, number
+from robots.dvrk import crtk, setup_joints
 from schemas.crtk import StringStamped
+from schemas.vectors import Vector
 
-__all__ = ["SetupJoints", "joint_names"]
+__all__ = ["SetupJoints"]
 
-_BRAKED = "the setup joints are braked; `setup_joints` of the scenario says where they are"
+_BRAKED = "the setup joints are braked; `setup_joints` of the scenario sets their positions"
 
 
-def joint_names(arm: str) -> tuple[str, ...]:
-    """Return the names of the setup joints that carry `arm`, as the real system has them."""
-    return tuple(f"SUJ_{arm}_J{index}" for index in range(len(setup_joints.JOINT_NAMES)))
+class SetupJointState(Record):
+    """The operating state that all setup joints share."""
+
+    state = choice(State.DISABLED)
+    homed = flag(start=True)
+    powering = number()
+    """s until they are ENABLED; 0: they are not powering."""
+    published = flag()
+    """Whether clients know the state."""
 
 
 class SetupJoints:
-    """The setup joints of all driven arms."""
+    """The setup joints of all driven arms; without a cart there are none."""
 
     def __init__(self, params: MotionParams) -> None:
-        """Take what the scenario says; without a cart there are none."""
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
-        self._said = {arm: Messages(f"SUJ/{arm}", SETUP_JOINT_EVENTS) for arm in arms}
-        self._flags = np.array(
-            [State.ENABLED if params.initial_state == "homed" else State.DISABLED, 1.0, 0.0, 0.0]
-        )
-        self._state, self._homed, self._powering, self._told = np.split(self._flags, 4)
+        self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names()) for arm in arms}
+        self._now = SetupJointState()
+        if params.initial_state == "homed":
+            self._now.state = State.ENABLED
         self._repeats = Repeats()
-        self.state = (
-            (self._flags, self._repeats.state, *(said.state for said in self._said.values())) if arms else ()
-        )
-        """All that changes."""
+        self.state: tuple[Record | Vector, ...] = ()
+        if arms:
+            self.state = (
+                self._now,
+                self._repeats.state,
+                *(messages.state for messages in self._messages.values()),
+            )
         self.outputs: dict[str, Any] = {}
         for arm in arms:
             positions = setup_positions(arm, params)
@@ -55,52 +60,52 @@ class SetupJoints:
                 f"SUJ/{arm}/measured_js": positions,
                 f"SUJ/{arm}/local/measured_cp": pose(setup_joints.base_pose(arm, positions)),
             }
-            self.outputs |= self._said[arm].outputs
+            self.outputs |= self._messages[arm].outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:
-        """Heed what has arrived, from `t` to `t + h` (ns)."""
-        news = not self._told[0]
-        for arm, said in self._said.items():
-            said.begin(t + h)
+        """Execute the commands that have arrived, from `t` to `t + h` (ns)."""
+        news = not self._now.published
+        for arm, messages in self._messages.items():
+            messages.begin(t + h)
             if inputs.quiet:
                 continue
             for message in inputs.events(f"SUJ/{arm}/state_command"):
-                news |= self._command(said, cast("StringStamped", message))
-            for name in SETUP_JOINT_COMMANDS:
+                news |= self._command(messages, cast("StringStamped", message))
+            for name in crtk.SETUP_JOINT_COMMANDS:
                 if name != "state_command" and inputs.events(f"SUJ/{arm}/{name}"):
-                    said.refuse(name, _BRAKED, ready=False)
+                    messages.refuse(name, _BRAKED, ready=False)
         if news | self._power(h * 1e-9):
-            self._told[0] = 1.0
-            for said in self._said.values():
-                said.operating_state(
-                    State(int(self._state[0])), homed=bool(self._homed[0]), busy=bool(self._powering[0])
+            self._now.published = True
+            for messages in self._messages.values():
+                messages.operating_state(
+                    self._now.state, homed=self._now.homed, busy=self._now.powering > 0.0
                 )
-        for said in self._said.values():
-            self.outputs |= said.outputs
+        for messages in self._messages.values():
+            self.outputs |= messages.outputs
 
-    def _command(self, said: Messages, message: StringStamped) -> bool:
-        """Heed a `state_command`; return whether it was."""
-        state, command = State(int(self._state[0])), message.string
+    def _command(self, messages: Messages, message: StringStamped) -> bool:
+        """Execute a `state_command`; return whether it was accepted."""
+        state, command = self._now.state, message.string
         reason = refusal(state, command) or (
             "the setup joints do not pause" if command == "pause" else self._repeats.refusal(message)
         )
         if reason:
-            said.warning(reason)
+            messages.warning(reason)
             return False
-        if command in ("enable", "home") and state is State.DISABLED and not self._powering[0]:
-            self._powering[0] = max(self._power_time, 1e-9)
+        if command in ("enable", "home") and state is State.DISABLED and not self._now.powering:
+            self._now.powering = max(self._power_time, 1e-9)
         elif command == "disable":
-            self._state[0], self._powering[0] = State.DISABLED, 0.0
+            self._now.state, self._now.powering = State.DISABLED, 0.0
         if command in ("home", "unhome"):
-            self._homed[0] = command == "home"
-        said.status(f"state_command {command}")
+            self._now.homed = command == "home"
+        messages.status(f"state_command {command}")
         return True
 
     def _power(self, h: float) -> bool:
-        """Go on with powering, for `h` seconds; return whether it is done."""
-        if not self._powering[0]:
+        """Continue powering, for `h` seconds; return whether it is done."""
+        if not self._now.powering:
             return False
-        self._powering[0] = max(self._powering[0] - h, 0.0)
-        if self._powering[0] < 0.5 * h:  # whole steps, whatever rounding leaves
-            self._state[0], self._powering[0] = State.ENABLED, 0.0
-        return not self._powering[0]
+        self._now.powering = max(self._now.powering - h, 0.0)
+        if self._now.powering < 0.5 * h:  # whole steps, in spite of rounding
+            self._now.state, self._now.powering = State.ENABLED, 0.0
+        return not self._now.powering

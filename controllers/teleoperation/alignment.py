@@ -1,9 +1,9 @@
-"""The alignment gate: the arm follows once the hand is turned as the tip is, and is seen to be held.
+"""The alignment gate: the arm follows once the master is turned as the tip is, and a hand holds it.
 
-For masters that cannot be turned by motors; after what mtsTeleOperationPSM.cpp of
-jhu-dvrk/sawIntuitiveResearchKit asks of one that can (RunAligningMTM, defaults in mtsIntuitiveResearchKit.h).
-The hand is seen to be held when its gripper or its roll has moved enough since it was first to be aligned; a
-clutch does not make it prove that again, but demands a closer match.
+For masters that motors cannot turn; after what mtsTeleOperationPSM.cpp of jhu-dvrk/sawIntuitiveResearchKit
+requires of one with motors (RunAligningMTM, defaults in mtsIntuitiveResearchKit.h). A master counts as held
+when its gripper or its roll has moved enough since alignment began. After a clutch that need not be shown
+again, but the orientations must match more closely.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from math import atan2, degrees, pi, radians
 
 import numpy as np
 
+from hub.participant import Record, array, flag, number
 from robots import rotation
 from schemas.vectors import Vector
 
@@ -27,78 +28,95 @@ _PATIENCE = 2.0
 """s, from one warning to the next."""
 
 
+class AlignmentState(Record):
+    """All of the gate that lasts from step to step; angles in rad."""
+
+    held = flag()
+    """Whether a hand holds the master."""
+    passed = flag()
+    """Whether the gate was open before."""
+    watching = flag()
+    """Whether the extremes below are those of the present alignment."""
+    waited = number()
+    """s since alignment began, or since the last warning."""
+    first = array(4)
+    """Orientation of the master when alignment began, quaternion (x, y, z, w)."""
+    roll_least = number()
+    roll_most = number()
+    gripper_least = number()
+    gripper_most = number()
+    angle = number()
+    """Between master and tip."""
+
+
 class AlignmentGate:
-    """Whether the hand may take over. All that changes is in `state`."""
+    """Whether the hand may take over."""
 
     def __init__(self) -> None:
         """Start closed."""
-        self.state = np.zeros(13)
-        (
-            self._held,
-            self._passed,
-            self._watching,
-            self._waited,
-            self._first,
-            self._roll,
-            self._gripper,
-            self._angle,
-        ) = np.split(self.state, [1, 2, 3, 4, 8, 10, 12])
+        self.state = AlignmentState()
 
     def reset(self) -> None:
-        """Forget the hand: it must be seen to be held again."""
-        self.state[:] = 0.0
+        """Close the gate; it must be shown again that a hand holds the master."""
+        self.state.values[:] = 0.0
 
     def clutch(self) -> None:
-        """Close the gate, not forgetting that the hand was seen to be held."""
-        self._watching[0] = self._waited[0] = 0.0
+        """Close the gate; the master still counts as held."""
+        self.state.watching, self.state.waited = False, 0.0
 
     def check(self, hand: Vector, tip: Vector, gripper: float, h: float) -> bool:
         """Return whether the hand may take over.
 
         Args:
-            hand: orientation of the hand in the arm's base frame, quaternion (x, y, z, w).
+            hand: orientation of the master in the arm's base frame, quaternion (x, y, z, w).
             tip: orientation of the tip, likewise.
-            gripper: of the hand, 0 closed .. 1 open; negative without one.
-            h: time since the last look, s.
+            gripper: of the master, 0 closed .. 1 open; negative without one.
+            h: time since the last check, s.
         """
         self._watch(hand, _GRIPPER_OPEN * max(gripper, 0.0))
-        self._waited[0] += h
-        self._angle[0] = np.linalg.norm(rotation.log(rotation.product(rotation.conjugate(tip), hand)))
-        if self._held[0] and self._angle[0] <= self._tolerance:
-            self._passed[0] = 1.0
+        state = self.state
+        state.waited += h
+        state.angle = float(np.linalg.norm(rotation.log(rotation.product(rotation.conjugate(tip), hand))))
+        if state.held and state.angle <= self._tolerance:
+            state.passed = True
             self.clutch()
             return True
         return False
 
-    def complaint(self) -> str:
-        """Return what the user is to do, every two seconds that the gate stays closed; else nothing."""
-        if self._waited[0] < _PATIENCE:
+    def warning(self) -> str:
+        """Return what the user must do, every two seconds that the gate stays closed; else an empty text."""
+        state = self.state
+        if state.waited < _PATIENCE:
             return ""
-        self._waited[0] = 0.0
-        if self._angle[0] > self._tolerance:
-            away, allowed = degrees(self._angle[0]), degrees(self._tolerance)
+        state.waited = 0.0
+        if state.angle > self._tolerance:
+            away, allowed = degrees(state.angle), degrees(self._tolerance)
             return (
-                f"the hand is turned {away:.1f} deg away from the instrument, allowed are {allowed:g}; turn"
+                f"the master is turned {away:.1f} deg away from the instrument, allowed are {allowed:g}; turn"
                 " it as the instrument is"
             )
         return (
-            f"nobody seems to hold the master; roll it by {degrees(_ROLL):g} deg, or move its gripper by"
+            f"no hand seems to hold the master; roll it by {degrees(_ROLL):g} deg, or move its gripper by"
             f" {degrees(_GRIPPER):g}"
         )
 
     @property
     def _tolerance(self) -> float:
-        return _TOLERANCE_AFTER_CLUTCH if self._passed[0] else _TOLERANCE
+        return _TOLERANCE_AFTER_CLUTCH if self.state.passed else _TOLERANCE
 
     def _watch(self, hand: Vector, gripper: float) -> None:
-        """Take how far roll (about the hand's own z) and gripper have moved, rad."""
-        if not self._watching[0]:
-            self._watching[0] = 1.0
-            self._first[:], self._roll[:], self._gripper[:] = hand, 0.0, gripper
-        turned = rotation.product(rotation.conjugate(self._first), hand)
+        """Record how far roll (about the master's own z) and gripper have moved, rad."""
+        state = self.state
+        if not state.watching:
+            state.watching = True
+            state.first[:] = hand
+            state.roll_least = state.roll_most = 0.0
+            state.gripper_least = state.gripper_most = gripper
+        turned = rotation.product(rotation.conjugate(state.first), hand)
         roll = (2.0 * atan2(turned[2], turned[3]) + pi) % (2.0 * pi) - pi
-        self._roll[:] = min(self._roll[0], roll), max(self._roll[1], roll)
-        self._gripper[:] = min(self._gripper[0], gripper), max(self._gripper[1], gripper)
-        rolled, moved = self._roll[1] - self._roll[0], self._gripper[1] - self._gripper[0]
+        state.roll_least, state.roll_most = min(state.roll_least, roll), max(state.roll_most, roll)
+        state.gripper_least = min(state.gripper_least, gripper)
+        state.gripper_most = max(state.gripper_most, gripper)
+        rolled, moved = state.roll_most - state.roll_least, state.gripper_most - state.gripper_least
         if moved >= _GRIPPER or rolled >= _ROLL or moved + rolled > _TOGETHER * (_GRIPPER + _ROLL):
-            self._held[0] = 1.0
+            state.held = True

@@ -13,13 +13,16 @@ from math import copysign, exp
 
 import numpy as np
 
+from hub.participant import Record, array, flag, number
 from schemas.vectors import Vector
 
 __all__ = ["ContactEstimate"]
 
 _TOUCH = 0.05
-"""N; less is no contact: below what a hand feels (0.06 N at a finger), above what an instrument's coupling to
-tissue needs to speed it up in free air.
+"""N; less is no contact.
+
+It is below what a hand feels (0.06 N at a finger), and above what an instrument's coupling to tissue needs to
+accelerate it in free air.
 """
 _CONE = 0.5
 """Slope of the friction cone: a force in it may be a push along the normal with friction across.
@@ -31,104 +34,89 @@ _STIFFEST = 5e3
 _MEAN = 0.02
 """s; time constant of the means of force and tip. As both lag alike, they belong to each other."""
 _RISE, _FALL = 0.1, 0.02
-"""s; time constants of stiffness and friction: slow where the hand gets more force, quick where it gets less.
-"""
+"""s; time constants of stiffness and friction: slow where the force grows, quick where it decreases."""
 _REACH = 0.05
 """m of the hand; a surface is forgotten this far from where it was last touched."""
 
 
-class ContactEstimate:
-    """One surface near the tip, in the arm's base frame. Its numbers live in a part of its owner's state."""
+class ContactEstimate(Record):
+    """One surface near the tip, in the arm's base frame."""
 
-    SIZE = 17
-
-    def __init__(self, state: Vector) -> None:
-        """Remember in `state`, shape (SIZE,); zeros know of nothing."""
-        parts = np.split(state, [3, 6, 9, 12, 13, 14, 15, 16])
-        (
-            self._normal,
-            self._tip,
-            self._force,
-            self._touched,
-            self._depth,
-            self._stiffness,
-            self._friction,
-            self._known,
-            self._started,
-        ) = parts
-
-    @property
-    def known(self) -> bool:
-        """Whether there is a surface."""
-        return bool(self._known[0])
-
-    @property
-    def normal(self) -> Vector:
-        """Out of the surface, shape (3,)."""
-        return self._normal
-
-    @property
-    def stiffness(self) -> float:
-        """N/m."""
-        return float(self._stiffness[0])
-
-    @property
-    def friction(self) -> float:
-        """Coulomb's coefficient."""
-        return float(self._friction[0])
+    normal = array(3)
+    """Out of the surface."""
+    tip = array(3)
+    """Mean position of the tip, m."""
+    force = array(3)
+    """Mean force on the tip, N."""
+    touched = array(3)
+    """Where the surface was touched last, m."""
+    tip_depth = number()
+    """Of the mean tip below the surface, m."""
+    stiffness = number()
+    """N/m."""
+    friction = number()
+    """Coulomb's coefficient."""
+    known = flag()
+    """Whether there is a surface."""
+    started = flag()
 
     def depth(self, tip: Vector) -> float:
         """Return how far a tip at this position (3,), m, is below the surface, m."""
-        return float(self._depth[0] + self._normal @ (self._tip - tip))
+        return float(self.tip_depth + self.normal @ (self.tip - tip))
 
     def update(self, tip: Vector, force: Vector, scale: float, elapsed: float) -> None:
-        """Take the position (3,) of the tip, m, the force (3,) on it, N, the metres of the tip per metre of
-        the hand, and the time since the last call, s.
+        """Update the surface by one sample.
+
+        Args:
+            tip: position of the tip, m, shape (3,).
+            force: on the tip, N, shape (3,).
+            scale: metres of the tip per metre of the hand.
+            elapsed: time since the last call, s.
         """
-        if not self._started[0]:
-            self._tip[:], self._started[0] = tip, 1.0
+        if not self.started:
+            self.tip[:], self.started = tip, True
         share = 1.0 - exp(-elapsed / _MEAN)
-        move = share * (tip - self._tip)
-        self._tip += move
-        self._force += share * (force - self._force)
+        move = share * (tip - self.tip)
+        self.tip += move
+        self.force += share * (force - self.force)
         if self.known:
             self._follow(move)
-        size = float(np.linalg.norm(self._force))
+        size = float(np.linalg.norm(self.force))
         if size < _TOUCH:
-            self._depth[0] = min(self._depth[0], 0.0)
-            if np.linalg.norm(self._tip - self._touched) > _REACH * scale:
-                self._known[0] = self._stiffness[0] = self._friction[0] = 0.0
+            self.tip_depth = min(self.tip_depth, 0.0)
+            if np.linalg.norm(self.tip - self.touched) > _REACH * scale:
+                self.known, self.stiffness, self.friction = False, 0.0, 0.0
             return
-        self._turn(self._force / size)
-        self._touched[:], self._known[0] = self._tip, 1.0
-        push = float(self._normal @ self._force)
-        depth = self._depth[0] = max(self._depth[0], push / _STIFFEST)
-        across = float(np.linalg.norm(self._force - push * self._normal))
-        _approach(self._stiffness, push / depth, elapsed)
-        _approach(self._friction, across / push, elapsed)
+        self._turn(self.force / size)
+        self.touched[:], self.known = self.tip, True
+        push = float(self.normal @ self.force)
+        depth = self.tip_depth = max(self.tip_depth, push / _STIFFEST)
+        across = float(np.linalg.norm(self.force - push * self.normal))
+        self.stiffness += _approach(self.stiffness, push / depth, elapsed)
+        self.friction += _approach(self.friction, across / push, elapsed)
 
     def _follow(self, move: Vector) -> None:
-        """Take the tip's motion `move` (3,) into the depth, less what sliding may seem to add where friction
-        has tilted the normal.
+        """Add the tip's motion `move` (3,) to the depth.
+
+        Less what sliding may seem to add where friction has tilted the normal.
         """
-        along = float(self._normal @ move)
-        across = float(np.linalg.norm(move - along * self._normal))
-        self._depth[0] -= copysign(max(0.0, abs(along) - _CONE * across), along)
+        along = float(self.normal @ move)
+        across = float(np.linalg.norm(move - along * self.normal))
+        self.tip_depth -= copysign(max(0.0, abs(along) - _CONE * across), along)
 
     def _turn(self, direction: Vector) -> None:
-        """Turn the normal as little as brings `direction` (3,) into the friction cone about it; the depth
-        stays.
-        """
-        along = float(self._normal @ direction)
-        aside = self._normal - along * direction
+        """Turn the normal just enough to have `direction` (3,) in the friction cone; keep the depth."""
+        along = float(self.normal @ direction)
+        aside = self.normal - along * direction
         size = float(np.linalg.norm(aside))
         if not self.known or not size:
-            self._normal[:] = direction
+            self.normal[:] = direction
         elif size > _CONE * along:
             turned = direction + _CONE / size * aside
-            self._normal[:] = turned / np.linalg.norm(turned)
+            self.normal[:] = turned / np.linalg.norm(turned)
 
 
-def _approach(value: Vector, target: float, elapsed: float) -> None:
-    time = _RISE if target > value[0] else _FALL
-    value[0] += (1.0 - exp(-elapsed / time)) * (target - value[0])
+def _approach(value: float, target: float, elapsed: float) -> float:
+    """Return by how much `value` goes towards `target` in `elapsed` seconds."""
+    time = _RISE if target > value else _FALL
+    return (1.0 - exp(-elapsed / time)) * (target - value)

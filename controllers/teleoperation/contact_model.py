@@ -36,8 +36,9 @@ def _direction(value: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 class PlaneParams(Params):
-    """A surface that only the hand feels, in the arm's base frame: it pushes the tip to where normal . tip is
-    `distance`.
+    """A surface that only the hand feels, in the arm's base frame.
+
+    It pushes the tip to where normal . tip is `distance`.
     """
 
     normal: Annotated[tuple[float, float, float], AfterValidator(_direction)] = Field(
@@ -59,7 +60,7 @@ PlanesParams = Annotated[
 
 
 class ForceParams(Params):
-    """What of the force at the tip the hand gets."""
+    """Which share of the force at the tip the hand feels."""
 
     scale: float = Field(
         default=1.0,
@@ -78,23 +79,16 @@ class ForceParams(Params):
 
 
 class ContactModelBuilder:
-    """Makes the contact model of one hand and one arm: a plane per surface of the scenario, one for tissue
-    and one for rigid things.
+    """Makes the contact model of one hand and one arm.
+
+    It has a plane for each surface of the scenario, one for tissue and one for rigid things.
     """
 
     def __init__(self, force: ForceParams, planes: Sequence[PlaneParams]) -> None:
-        """Take what the scenario says."""
         self._force, self._planes = force, planes
         self._normals: list[Vector] = [np.array(plane.normal) for plane in planes]
-        self._state = np.zeros(2 * ContactEstimate.SIZE)
-        self._tissue, self._rigid = (ContactEstimate(part) for part in np.split(self._state, 2))
-
-    @property
-    def state(self) -> Vector:
-        """All that is remembered; the same array at every call, so that a caller may save, hash and overwrite
-        it.
-        """
-        return self._state
+        self._tissue, self._rigid = ContactEstimate(), ContactEstimate()
+        self.state = (self._tissue, self._rigid)
 
     def planes(
         self,
@@ -108,20 +102,21 @@ class ContactModelBuilder:
         rigid_wrench: Vector,
         elapsed: float,
     ) -> list[ContactPlane]:
-        """Return at most four planes in the device's base frame and metres of the hand; none while the arm
-        does not follow.
+        """Return at most four planes in the device's base frame, in metres of the hand.
+
+        There are none while the arm does not follow.
 
         Args:
             hand: position (3,) of the hand in the device's base frame, m: the sample that the command was
-            made from.
+                made from.
             tip: position (3,) of the tip at the command in the arm's base frame, m.
             to_base: rotation (3, 3) from the device's base frame to the arm's.
             scale: metres of the tip per metre of the hand.
             following: whether the tip follows the hand.
             tip_wrench: force and moment (6,) of tissue on the instrument in the arm's base frame, N and N m.
             rigid_wrench: the same of rigid things.
-            elapsed: simulated time since the last call, s. Call whether or not the arm follows: what was
-            touched is remembered.
+            elapsed: simulated time since the last call, s. Call also while the arm does not follow: what was
+                touched is remembered.
         """
         self._tissue.update(tip, tip_wrench[:3], scale, elapsed)
         self._rigid.update(tip, rigid_wrench[:3], scale, elapsed)
@@ -156,9 +151,7 @@ class ContactModelBuilder:
     def _plane(
         self, hand: Vector, normal: Vector, depth: float, stiffness: float, damping: float, friction: float
     ) -> ContactPlane:
-        """Return the plane with this `normal` (3,) at which the hand is `depth` below it, both as the hand
-        has them.
-        """
+        """Return the plane with this `normal` (3,) and the hand `depth` below it, in the hand's frame."""
         x, y, z = normal.tolist()
         return ContactPlane(
             normal=Vector3(x=x, y=y, z=z),

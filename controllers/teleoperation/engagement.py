@@ -1,19 +1,18 @@
-"""Who leads: from buttons, the arm's operating state and the age of the hand's pose to whether the arm
-follows.
+"""Whether the arm follows the hand: by buttons, the arm's operating state and the age of the hand's pose.
 
 After the states of mtsTeleOperationPSM.cpp (jhu-dvrk/sawIntuitiveResearchKit): the arm must be ENABLED and
-homed and the hand be heard, then be aligned, then the arm follows; a clutch frees the hand, which is aligned
-anew when it takes over again. Whatever has gone, the arm holds.
+homed and the hand's pose be fresh; then the hand is aligned, then the arm follows. A clutch frees the hand,
+which is aligned again when it takes over. If any of these conditions ends, the arm holds.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
 
-import numpy as np
-
 from controllers.teleoperation.alignment import AlignmentGate
 from controllers.teleoperation.params import TeleoperationParams
+from hub.participant import Record, choice, flag
+from robots.dvrk.crtk import is_ready
 from schemas.crtk import OperatingState
 from schemas.ros import Joy
 from schemas.vectors import Vector
@@ -25,7 +24,7 @@ class Phase(IntEnum):
     """What the arm does."""
 
     DISABLED = 0
-    """It holds: it is not ready, or the hand is not heard."""
+    """It holds: it is not ready, or the hand's pose is not fresh."""
     CLUTCHED = 1
     """It holds: the hand is free."""
     ALIGNING = 2
@@ -34,17 +33,29 @@ class Phase(IntEnum):
     """It follows."""
 
 
+class EngagementState(Record):
+    """All that decides whether the arm follows, except the alignment gate."""
+
+    phase = choice(Phase.DISABLED)
+    pressed = flag()
+    """The clutch button."""
+    interrupted = flag()
+    """Whether the hand was free in this step."""
+    not_ready = flag()
+    """Whether the arm has published that it is not ENABLED and homed."""
+    lost = flag()
+    """Whether the hand's pose was not fresh in the last step."""
+
+
 class Engagement:
-    """Whether the arm follows. All that changes is in `state`."""
+    """Whether the arm follows."""
 
     def __init__(self, params: TeleoperationParams) -> None:
-        """Take which button is the clutch, and what is asked of the hand."""
         self._arm, self._max_age = params.arm, params.max_age
         self._clutch, self._must_hold = params.buttons.clutch, params.engage == "held"
         self._gate = AlignmentGate() if params.align == "gate" else None
-        self._memory = np.zeros(5)
-        self._phase, self._pressed, self._interrupted, self._not_ready, self._lost = np.split(self._memory, 5)
-        self.state = (self._memory,) if self._gate is None else (self._memory, self._gate.state)
+        self._now = EngagementState()
+        self.state = (self._now,) if self._gate is None else (self._now, self._gate.state)
         self.takes_over = False
         """Whether the arm begins to follow in this step, so that a reference must be taken."""
         self.warnings: list[str] = []
@@ -53,42 +64,43 @@ class Engagement:
     @property
     def phase(self) -> Phase:
         """What the arm does in this step."""
-        return Phase(int(self._phase[0]))
+        return self._now.phase
 
     @property
     def arm_is_ready(self) -> bool:
-        """Whether the arm is ENABLED and homed, as far as anybody has told."""
-        return not self._not_ready[0]
+        """Whether the arm is ENABLED and homed, as far as it has published it."""
+        return not self._now.not_ready
 
-    def hear_arm(self, message: OperatingState) -> None:
-        """Take what the arm says of itself."""
-        self._not_ready[0] = message.state != "ENABLED" or not message.is_homed
+    def receive_state(self, message: OperatingState) -> None:
+        """Read the operating state of the arm."""
+        self._now.not_ready = not is_ready(message)
 
-    def hear_buttons(self, joy: Joy) -> None:
-        """Take the clutch.
+    def receive_buttons(self, joy: Joy) -> None:
+        """Read the clutch.
 
-        Pressed and released inside one step it still frees the hand; a Joy without its button says nothing.
+        Pressed and released inside one step it still frees the hand; a Joy without its button changes
+        nothing.
         """
         if joy.buttons.size > self._clutch:
-            self._pressed[0] = joy.buttons[self._clutch] != 0
+            self._now.pressed = bool(joy.buttons[self._clutch] != 0)
             if self._is_free:
-                self._interrupted[0] = 1.0
+                self._now.interrupted = True
 
     @property
     def _is_free(self) -> bool:
-        return bool(self._pressed[0]) is not self._must_hold
+        return self._now.pressed is not self._must_hold
 
-    def step(self, hand: Vector, tip: Vector, gripper: float, h: float, *, heard: bool) -> None:
-        """Decide on this step, of `h` seconds; `heard`: the hand's pose is fresh.
+    def step(self, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool) -> None:
+        """Decide on this step, of `h` seconds; `fresh`: the hand's pose is.
 
         The other arguments are those of `AlignmentGate.check`.
         """
         self.warnings = []
         before = self.phase
-        if self._must_hold and not heard and not self._lost[0]:
-            self._pressed[0] = 0.0  # nobody knows what the hand does now, until it is told again
-        self._lost[0] = not heard
-        self._phase[0] = self._decide(hand, tip, gripper, h, heard=heard)
+        if self._must_hold and not fresh and not self._now.lost:
+            self._now.pressed = False  # until the button is received again
+        self._now.lost = not fresh
+        self._now.phase = self._decide(hand, tip, gripper, h, fresh=fresh)
         if self.phase is Phase.DISABLED and before is not Phase.DISABLED:
             reason = (
                 f"its master has been silent for more than {self._max_age / 1e6:g} ms"
@@ -97,26 +109,26 @@ class Engagement:
             )
             self.warnings.append(f"{self._arm} holds: {reason}")
         self.takes_over = self.phase is Phase.ENABLED and (
-            before is not Phase.ENABLED or bool(self._interrupted[0])
+            before is not Phase.ENABLED or self._now.interrupted
         )
-        self._interrupted[0] = 0.0
+        self._now.interrupted = False
 
-    def _decide(self, hand: Vector, tip: Vector, gripper: float, h: float, *, heard: bool) -> Phase:
+    def _decide(self, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool) -> Phase:
         gate = self._gate
-        if not (heard and self.arm_is_ready):
+        if not (fresh and self.arm_is_ready):
             if gate is not None:
                 gate.reset()
             return Phase.DISABLED
-        if gate is not None and self._interrupted[0]:
+        if gate is not None and self._now.interrupted:
             gate.clutch()
         if self._is_free:
             return Phase.CLUTCHED
         if (
             gate is None
-            or (self.phase is Phase.ENABLED and not self._interrupted[0])
+            or (self.phase is Phase.ENABLED and not self._now.interrupted)
             or gate.check(hand, tip, gripper, h)
         ):
             return Phase.ENABLED
-        if complaint := gate.complaint():
-            self.warnings.append(f"{self._arm} waits: {complaint}")
+        if warning := gate.warning():
+            self.warnings.append(f"{self._arm} waits: {warning}")
         return Phase.ALIGNING

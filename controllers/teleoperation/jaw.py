@@ -1,16 +1,16 @@
-"""The jaw, led by a gripper or a button through a ghost that keeps it from snapping.
+"""The jaw, led by a gripper or a button through a ghost: an angle that limits how fast it opens and closes.
 
-After jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp: the ghost starts where the jaw is and goes
-after the gripper, slowly until it has caught up once, quickly from then on; so a gripper that is closed when
-it takes over an open jaw drops nothing, and pinches nobody.
+After jhu-dvrk/sawIntuitiveResearchKit, mtsTeleOperationPSM.cpp: the ghost starts where the jaw is and follows
+the gripper, slowly until it has caught up once, then quickly. So a hand that takes over with its gripper
+closed does not snap an open jaw shut, and one with its gripper open does not drop what the jaw holds.
 """
 
 from __future__ import annotations
 
+from enum import IntEnum
 from math import radians
 
-import numpy as np
-
+from hub.participant import Record, choice, flag, number
 from robots.dvrk.instruments import Jaw
 
 __all__ = ["JawGhost"]
@@ -22,50 +22,64 @@ _CAUGHT_UP = radians(2.0)
 _OPEN = radians(45.0)
 """Opening while the button is up (mtsTeleOperationPSM.cpp: of the jaw where the master has no gripper)."""
 
-_UNTOUCHED = -1.0
+
+class Button(IntEnum):
+    """What is known of the button."""
+
+    UNTOUCHED = -1
+    RELEASED = 0
+    PRESSED = 1
+
+
+class JawState(Record):
+    """All of the ghost that changes."""
+
+    angle = number()
+    """rad."""
+    caught_up = flag()
+    button = choice(Button.UNTOUCHED)
 
 
 class JawGhost:
-    """The angle that the jaw is told. All that changes is in `state`."""
+    """The angle that is commanded to the jaw."""
 
     def __init__(self, jaw: Jaw) -> None:
-        """Take the jaw's range."""
         self._lower, self._upper = jaw.lower, jaw.upper
-        self.state = np.zeros(3)
-        self.angle = self.state[:1]
-        """rad, shape (1,)."""
-        self._caught_up, self._pressed = self.state[1:2], self.state[2:]
-        self._pressed[0] = _UNTOUCHED
+        self.state = JawState()
+
+    @property
+    def angle(self) -> float:
+        """Of the jaw, rad."""
+        return self.state.angle
 
     def stand_at(self, angle: float) -> None:
         """Start from `angle` (rad), or as near to it as the jaw's range allows."""
-        self.angle[0] = min(max(angle, self._lower), self._upper)
-        self._caught_up[0] = 0.0
+        self.state.angle = min(max(angle, self._lower), self._upper)
+        self.state.caught_up = False
 
     def press(self, *, pressed: bool) -> None:
-        """Note whether the button is down. Until it was pressed once nobody has meant the jaw."""
-        if pressed or self._pressed[0] != _UNTOUCHED:
-            self._pressed[0] = pressed
+        """Note whether the button is down; until it was pressed once, it does not command the jaw."""
+        if pressed or self.state.button is not Button.UNTOUCHED:
+            self.state.button = Button(pressed)
 
     def release(self) -> None:
-        """Stay, and go slowly at first when the hand is back."""
-        self._caught_up[0] = 0.0
+        """Stay, and go slowly at first when the hand takes over again."""
+        self.state.caught_up = False
 
     def follow(self, gripper: float, h: float) -> None:
-        """Go after the hand for `h` seconds: after the gripper, 0 closed .. 1 open, or the button if that is
-        negative.
+        """Follow the gripper, 0 closed .. 1 open, for `h` seconds, or the button if that is negative.
 
         Closed is the lower end of the jaw's range, where the fingers press on what is between them. Until the
         button is pressed the jaw stays.
         """
         if gripper >= 0.0:
             goal = self._lower + min(gripper, 1.0) * (self._upper - self._lower)
-        elif self._pressed[0] == _UNTOUCHED:
+        elif self.state.button is Button.UNTOUCHED:
             return
         else:
-            goal = self._lower if self._pressed[0] else min(_OPEN, self._upper)
-        most = h * (_RATE if self._caught_up[0] else _RATE_UNTIL_CAUGHT_UP)
-        angle = float(self.angle[0])
-        self.angle[0] = angle + min(max(goal - angle, -most), most)
-        if abs(goal - self.angle[0]) < _CAUGHT_UP:
-            self._caught_up[0] = 1.0
+            goal = self._lower if self.state.button is Button.PRESSED else min(_OPEN, self._upper)
+        most = h * (_RATE if self.state.caught_up else _RATE_UNTIL_CAUGHT_UP)
+        angle = self.state.angle
+        self.state.angle = angle + min(max(goal - angle, -most), most)
+        if abs(goal - self.state.angle) < _CAUGHT_UP:
+            self.state.caught_up = True

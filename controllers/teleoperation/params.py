@@ -1,8 +1,7 @@
-"""What a scenario may say about a hand that leads an instrument. SI units, radians, quaternions (x, y, z, w)."""
+"""Parameters of a teleoperation. SI units, radians, quaternions (x, y, z, w)."""
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -10,22 +9,11 @@ from pydantic import Field, model_validator
 from controllers.teleoperation.contact_model import ForceParams, PlanesParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
-from robots.dvrk.instruments import Instrument, instrument
-from robots.dvrk.parameters import (
-    ArmName,
-    InstrumentName,
-    MountedPositions,
-    UnitQuaternion,
-    check_start,
-    home,
-)
-from robots.serial_chain import SerialChain
+from robots.dvrk.mounted import PsmTool
+from robots.dvrk.parameters import ArmName, MountedPositions, UnitQuaternion, home
 from schemas.quantity import Angle, Duration
 
 __all__ = ["Buttons", "TeleoperationParams"]
-
-_FOLDED = (0.0,) * 6
-"""The fingers of a hand, if the arm holds one, which no teleoperation moves."""
 
 
 def _orientation(data: dict[str, Any]) -> str:
@@ -48,13 +36,10 @@ class Buttons(Params):
     )
 
 
-class TeleoperationParams(Params):
-    """How a hand leads an arm."""
+class TeleoperationParams(PsmTool, Params):
+    """How a hand leads an arm; the fingers of a hand that it may hold stay folded."""
 
     arm: ArmName = "PSM1"
-    instrument: InstrumentName = Field(
-        default="palpation-probe", description="what the arm holds: name or number, such as 400006"
-    )
     start: MountedPositions = Field(
         default_factory=home,
         description=f"the command until measured_js is there: {', '.join(psm.JOINT_NAMES)}",
@@ -63,8 +48,8 @@ class TeleoperationParams(Params):
     law: Literal["pose", "velocity"] = Field(
         default="pose",
         description=(
-            "the tip goes the way of the hand, scaled; or the hand's twist in its own frame is the tip's in"
-            " its own"
+            "the tip moves as the hand does, scaled; or the hand's twist in its own frame is the tip's in its"
+            " own"
         ),
     )
     scale: float = Field(
@@ -86,8 +71,8 @@ class TeleoperationParams(Params):
         description=(
             "what the hand's frame is registered to: the arm's base frame; the picture of the camera in whose"
             " frame `base_in_view` is, so that right, up and away on the desk (x away, y left, z up) are"
-            " right, up and away in the picture; or the display, whose axes stand for those of the camera's"
-            " frame, as the masters of a dVRK tell their poses"
+            " right, up and away in the picture; or the display, whose axes correspond to those of the"
+            " camera's frame, for masters of a dVRK"
         ),
     )
     registration: UnitQuaternion = Field(
@@ -113,8 +98,8 @@ class TeleoperationParams(Params):
     align: Literal["relative", "gate"] = Field(
         default="relative",
         description=(
-            "the tip turns from where it is, or follows only once the hand is turned as the tip is and is"
-            " seen to be held"
+            "the tip turns from where it is, or follows only once the master is turned as the tip is and a"
+            " hand holds it"
         ),
     )
     force: ForceParams = Field(default=ForceParams(), description="what the hand feels, by `contact`")
@@ -126,19 +111,8 @@ class TeleoperationParams(Params):
         default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer"
     )
 
-    @cached_property
-    def tool(self) -> Instrument:
-        """The instrument's numbers."""
-        return instrument(self.instrument)
-
-    @cached_property
-    def chain(self) -> SerialChain:
-        """The arm's kinematics, from `<arm>_base` to the tip."""
-        return psm.chain(self.tool)
-
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        check_start(self.chain, self.start, self.tool, self.jaw, _FOLDED)
         if self.law == "velocity" and self.orientation == "hold":
             raise ValueError(
                 "'law: velocity' turns the tip with the hand; leave out 'orientation: hold', or take 'law:"

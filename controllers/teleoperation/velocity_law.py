@@ -43,17 +43,14 @@ def twist_in_tip(hand: Vector, twist: Vector, scale: float) -> Vector:
 
 
 def joint_velocities(jacobian: Vector, twist: Vector) -> Vector:
-    """Return dq/dt, shape (n,), for the twist (6,) of the tip in its own frame, from the Jacobian (6, n) in
-    that frame.
-    """
+    """Return dq/dt, shape (n,), for the twist (6,) of the tip, from the Jacobian (6, n), in its own frame."""
     u, sigma, vt = np.linalg.svd(_WEIGHTS[:, None] * jacobian, full_matrices=False)
     damping = max(0.0, 1.0 - (float(sigma[-1]) / _EPSILON) ** 2) * _LARGEST_DAMPING**2
     return vt.T @ (sigma / (sigma**2 + damping) * (u.T @ (_WEIGHTS * twist)))
 
 
 def advance(chain: SerialChain, q: Vector, twist: Vector, h: float) -> Vector:
-    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its own
-    frame.
+    """Return the joint positions, shape (n,), after `h` seconds with the twist (6,) of the tip in its frame.
 
     Joints that would leave their range go to its end, and the others do what they can without them; all slow
     down together so that none is faster than it may be. What is cut is not made up for later.

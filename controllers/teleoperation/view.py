@@ -1,15 +1,15 @@
 """The hand's frame in the arm's: what right, up and away on the desk are for the instrument.
 
-Three frames: the *desk*, in which a device tells where the hand is (REP 103 as the user sits before it: x
-away, y left, z up); the *camera*, the ECM's tip frame, in which `base_in_view` is told; and the *view*, the
+Three frames: the *desk*, in which a device measures the hand (REP 103 as the user sits before it: x away, y
+left, z up); the *camera*, the ECM's tip frame, in which `base_in_view` is; and the *view*, the
 frame of the picture as the surgeon sees it: x left, y up, z ahead (docs/decisions/0013). With `view: camera`
 
     R_base<-hand = R_camera<-base^T  R_camera<-view  R_view<-desk  R_desk<-hand,
 
 so that a motion to the right on the desk is one to the right in the picture; on the real system both
 consoles' and arms' base frames are set to the same effect (jhu-dvrk/sawIntuitiveResearchKit,
-mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are told in the camera's frame). Its masters tell their poses
-in the display's frame, whose axes stand for those of the camera's: with `view: display`
+mtsIntuitiveResearchKitSUJ.cpp: PSM base frames are in the camera's frame). Its masters publish their poses in
+the display's frame, whose axes correspond to those of the camera's: with `view: display`
 
     R_base<-hand = R_camera<-base^T  R_display<-hand.
 """
@@ -33,7 +33,6 @@ class View:
     """Turns the hand's frame into the arm's base frame."""
 
     def __init__(self, params: TeleoperationParams) -> None:
-        """Take what the hand's frame is registered to."""
         self._registration = np.array(params.registration)
         self._hand_in_camera: Vector | None = self._registration if params.view == "display" else None
         if params.view == "camera":
@@ -47,8 +46,8 @@ class View:
         """Return the orientation of the hand's frame in the arm's base frame, quaternion (x, y, z, w).
 
         Args:
-            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; not looked
-            at with `view: base`.
+            base_in_view: pose (x, y, z, qx, qy, qz, qw) of the arm's base in the camera's frame; ignored with
+                `view: base`.
         """
         if self._hand_in_camera is None:
             return self._registration

@@ -2,13 +2,15 @@
 
 from hub.participant.base import Outputs, Params, Participant, Value
 from hub.participant.bond import ForceSide, MotionSide
+from hub.participant.controller import Controller
 from hub.participant.device import Device, Sample
 from hub.participant.inputs import Inputs
-from hub.participant.state import restore_arrays, state_hash
+from hub.participant.state import Record, array, choice, flag, integer, number, restore_arrays, state_hash
 from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
 
 __all__ = [
     "BondPlan",
+    "Controller",
     "Correction",
     "Device",
     "ForceSide",
@@ -17,10 +19,16 @@ __all__ = [
     "Outputs",
     "Params",
     "Participant",
+    "Record",
     "Sample",
     "Setup",
     "Stepped",
     "Value",
+    "array",
+    "choice",
+    "flag",
+    "integer",
+    "number",
     "restore_arrays",
     "state_hash",
 ]

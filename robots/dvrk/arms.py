@@ -30,7 +30,7 @@ def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
             endoscope of the ECM (straight unless given); nothing for the others.
 
     Raises:
-        MotionError: no such arm or tool; the message says which there are.
+        MotionError: no such arm or tool; the message lists which there are.
     """
     if arm in ("PSM1", "PSM2", "PSM3"):
         return psm.chain(tool if isinstance(tool, Instrument) else instrument(tool or DEFAULT_INSTRUMENT))
@@ -50,5 +50,5 @@ def chain(arm: str, tool: str | Instrument | None = None) -> SerialChain:
 
 
 def base_frame(arm: str) -> str:
-    """Return the name of the frame in which `chain(arm)` stands: the arm's own, the cart's for a setup joint."""
+    """Return the name of the base frame of `chain(arm)`: the arm's own, the cart's for a setup joint."""
     return "cart" if arm.startswith("SUJ/") else f"{arm}_base"

@@ -1,5 +1,6 @@
-"""How far an instrument or endoscope must be in before its tip may be commanded: past its cannula, and away
-from the remote centre (RCM).
+"""How deep an instrument or endoscope must be before its tip may be commanded.
+
+It must be past its cannula, and away from the remote centre (RCM).
 
 Near the RCM a small motion of the tip asks for a large one of the joints, and in the cannula there is no room
 for it. Source: SAW = jhu-dvrk/sawIntuitiveResearchKit. For a PSM it is about the distance of the end of its
@@ -67,8 +68,9 @@ class Cannula:
         )
 
     def check(self, goal: Vector, q: Vector) -> None:
-        """Raise MotionError if `goal`, shape (n,), is nearer to the remote centre than is safe and than `q`,
-        where the arm is.
+        """Raise MotionError if `goal` is too near to the remote centre.
+
+        It is not if it is further away than `q`, where the arm is; both have shape (n,).
         """
         depth = self.depth(goal)
         if depth < self.safe and depth < self.depth(q) - _ROUNDING:

@@ -1,5 +1,4 @@
-"""Frames of a whole patient cart: what the real system calls the base frame of an arm, and the view of its
-endoscope.
+"""Frames of a whole patient cart: the base frames of the arms, and the view of the endoscope.
 
 An arm's `local/measured_cp` is the pose of its tip in its own base frame `<arm>_base`. With setup joints and
 an endoscope, `ECM/measured_cp` is the camera in the cart's frame, `SUJ/<arm>/local/measured_cp` an arm's base
@@ -34,7 +33,8 @@ def camera_pose(endoscope_tip: Vector, setup_positions: Vector) -> Vector:
 
 
 def base_in_view(arm: CartArm, setup_positions: Vector, camera: Vector) -> Vector:
-    """Return the pose of `<arm>_base` in the camera's frame, shape (4, 4), from setup joint positions (6,)
-    and `camera_pose`.
+    """Return the pose of `<arm>_base` in the camera's frame, shape (4, 4).
+
+    It takes setup joint positions, shape (6,), and `camera_pose`.
     """
     return inverse_pose(camera) @ base_pose(arm, setup_positions)

@@ -1,5 +1,6 @@
-"""The spheres by which an instrument touches tissue: fixed on its links, each the motion side of a contact
-point.
+"""The spheres with which an instrument touches tissue.
+
+They are fixed on its links; each is the motion side of a contact point.
 """
 
 from __future__ import annotations

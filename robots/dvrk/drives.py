@@ -1,5 +1,6 @@
-"""What drives the joints: servo, friction, elasticity, rotor inertia and limits of every joint of PSM and
-ECM, and what makes up for the losses.
+"""The drives of PSM and ECM: servo, friction, elasticity, rotor inertia and limits of every joint.
+
+It also has what compensates for the losses.
 
 Sources: SAW = jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68), share/pid/sawControllersPID-{PSM,ECM}.json;
 FONT = gafontanelli/DVRK-dynamicModel (commit 51c55d75), PSM_robot.cpp with PSM1_param.txt. SI units, radians.
@@ -74,7 +75,7 @@ _ARM = {
 _DISC_STIFFNESS, _DISC_DAMPING = 6.0, 0.09
 """N m/rad, N m s/rad of all four discs (SAW)."""
 _DISC_INERTIA = _DISC_DAMPING**2 / (4.0 * _DISC_STIFFNESS)
-"""kg m^2: neither published identification tells a rotor inertia of the discs (FONT has none,
+"""kg m^2: neither published identification states a rotor inertia of the discs (FONT has none,
 WPI-AIM/dvrk_dynamics_identification finds negative ones); this is the one that the gains damp critically, d =
 2 sqrt(p I).
 """
@@ -93,9 +94,7 @@ _ECM_GAINS = {
 
 
 def psm(tool: Instrument) -> Mapping[str, Drive]:
-    """Return the drives of a PSM with `tool` by joint, the fingers of its jaw or hand and the roller
-    included.
-    """
+    """Return the drives of a PSM with `tool` by joint, including those of its jaw or hand and the roller."""
     chain = psm_arm.chain(tool)
     drives = {
         joint.name: Drive(*_ARM[joint.name], 0.0, joint.effort, joint.velocity) for joint in chain.joints[:3]
@@ -144,8 +143,9 @@ def _motors(hand: Hand) -> Iterator[Drive]:
 
 
 def discs(tool: Instrument) -> tuple[Disc, ...]:
-    """Return the discs that turn roll, wrist and jaw of `tool`; the inverse of SAW's matrix from discs to
-    joints says by how much.
+    """Return the discs that turn roll, wrist and jaw of `tool`.
+
+    The inverse of SAW's matrix from discs to joints determines by how much.
     """
     shares = np.linalg.inv(tool.actuator_to_joint)  # (disc, joint)
     names = _moved(tool)
@@ -166,8 +166,11 @@ def _moved(tool: Instrument) -> tuple[str, ...]:
 
 
 def _column(name: str) -> int:
-    """Of the joint or finger in SAW's matrix: roll, wrist pitch, wrist yaw, jaw; the two pitch joints of a
-    snake add up to its pitch.
+    """Return the column of a joint or finger in SAW's matrix: roll, wrist pitch, wrist yaw, jaw.
+
+    The two pitch joints of a snake add up to its pitch.
+
+    The two pitch joints of a snake add up to its pitch.
     """
     return next(
         i for i, kind in enumerate(("roll", "wrist_pitch", "wrist_yaw", "jaw")) if name.startswith(kind)
@@ -175,8 +178,12 @@ def _column(name: str) -> int:
 
 
 def _of_ecm() -> Mapping[str, Drive]:
-    """No friction of an ECM is published: it is taken to be the same part of the largest effort as in the
-    PSM's joint of that name.
+    """Return the drives of an ECM by joint.
+
+    No friction of it is published: it is taken to be the same share of the largest effort as in the PSM's
+    joint of that name.
+
+    It is taken to be the same share of the largest effort as in the PSM's joint of that name.
     """
     # of disc 1 at the joint of a needle driver 400006
     friction_of_roll = np.array(_DISC_FRICTION[0]) * [0.6397**2, 0.6397]
@@ -200,8 +207,7 @@ ECM = _of_ecm()
 def friction(
     drives: Mapping[str, Drive], dq: Mapping[str, float], wrist: Sequence[Disc] = ()
 ) -> dict[str, float]:
-    """Return the friction (N m, N) by joint at the velocities `dq`, as FONT has it: smooth through
-    standstill.
+    """Return the friction (N m, N) by joint at the velocities `dq`, as FONT has it: smooth around zero.
 
     Args:
         drives: by joint.

@@ -1,5 +1,6 @@
-"""Joint-space dynamics of an arm: inertia matrix and gravity, from its kinematics, its linkage and the masses
-of its bodies.
+"""Joint-space dynamics of an arm: inertia matrix and gravity.
+
+They follow from its kinematics, its linkage and the masses of its bodies.
 
 Every body moves as a rigid displacement D(q) from where it is with every joint at 0. With the pseudo-inertia
 J of the body (integral of r r^T over its mass, r homogeneous, in the base frame there) the inertia matrix is
@@ -29,8 +30,9 @@ STANDARD_GRAVITY = 9.81
 
 
 class _Motion(NamedTuple):
-    """How a body moves against its parent: `ratio` times joint `joint` along `twist`, shape (4, 4), in the
-    base frame at q = 0.
+    """How a body moves against its parent.
+
+    It moves by `ratio` times joint `joint` along `twist`, shape (4, 4), in the base frame at q = 0.
     """
 
     parent: int
@@ -65,8 +67,9 @@ class Dynamics:
         self._pseudo = np.array([body.pseudo_inertia for body in bodies.values()])  # (bodies, 4, 4)
 
     def displacements(self, q: Vector) -> Vector:
-        """Return the derivatives by the joints of the bodies' displacements, shape (bodies, n, 4, 4), bodies
-        in the order they were given.
+        """Return the derivatives of the bodies' displacements by the joints, shape (bodies, n, 4, 4).
+
+        The bodies are in the order in which they were given.
 
         Raises MotionError if `q` is not n finite numbers.
         """
@@ -132,8 +135,9 @@ def _twist(axis: Vector, point: Vector, is_revolute: bool) -> Vector:
 
 
 def _exponential(twist: Vector, q: float, is_revolute: bool) -> Vector:
-    """Return exp(q twist): for a rotation 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q
-    T.
+    """Return exp(q twist).
+
+    For a rotation it is 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q T.
     """
     if not is_revolute:
         return np.eye(4) + q * twist

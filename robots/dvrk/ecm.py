@@ -11,8 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from robots.dvrk.limits import jerk
-from robots.serial_chain import Joint, SerialChain
+from robots.serial_chain import Joint, SerialChain, jerk_limit
 from schemas.vectors import Vector
 
 __all__ = ["ENDOSCOPE_PITCH", "HOME", "JOINTS", "JOINT_NAMES", "Endoscope", "TipFrame", "chain", "tip"]
@@ -26,8 +25,8 @@ v_max).
 """
 _TURN_ACCELERATION, _SLIDE_ACCELERATION = radians(90.0), 0.060
 """rad/s^2 and m/s^2 (same file, a_max)."""
-_TURNING = (_TURN_ACCELERATION, jerk(_TURN_ACCELERATION))
-_SLIDING = (_SLIDE_ACCELERATION, jerk(_SLIDE_ACCELERATION))
+_TURNING = (_TURN_ACCELERATION, jerk_limit(_TURN_ACCELERATION))
+_SLIDING = (_SLIDE_ACCELERATION, jerk_limit(_SLIDE_ACCELERATION))
 
 JOINTS = (
     Joint("yaw", "revolute", pi / 2, 0.0, 0.0, pi / 2, -1.5708, 1.5708, _TURN, 26.93208, *_TURNING),

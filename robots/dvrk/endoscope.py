@@ -1,5 +1,4 @@
-"""The stereo endoscope: the numbers of its cameras, and where they look from the end of the endoscope camera
-manipulator.
+"""The stereo endoscope: numbers of its cameras, and their frames on the endoscope camera manipulator.
 
 Pictures are described in the optical frame of REP 103: z ahead, x to the right, y down; pixel (0, 0) is the
 middle of the upper left pixel, so the middle of the picture is at ((width - 1) / 2, (height - 1) / 2).
@@ -66,16 +65,13 @@ class StereoCamera:
         return np.array([[f, 0.0, (self.width - 1) / 2], [0.0, f, (self.height - 1) / 2], [0.0, 0.0, 1.0]])
 
     def projection(self, eye: Eye) -> Vector:
-        """Return the matrix P that takes points in the left camera's optical frame to pixels of `eye`, shape
-        (3, 4).
-        """
+        """Return the matrix P, shape (3, 4), from the left camera's optical frame to pixels of `eye`."""
         shift = -self.focal_length * self.baseline if eye == "right" else 0.0
         return np.column_stack([self.intrinsics(), [shift, 0.0, 0.0]])
 
 
 def optical_in_roll(endoscope: Endoscope) -> Vector:
-    """Return the optical frame midway between the two cameras, in the frame of the ECM's roll link, shape (4,
-    4).
+    """Return the optical frame midway between both cameras, in the ECM's roll link, shape (4, 4).
 
     The left camera's frame is half the baseline along -x of it, the right one's half along x.
     """

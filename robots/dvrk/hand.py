@@ -36,7 +36,10 @@ _CARRIER = "roll"
 
 @dataclass(frozen=True)
 class Phalanx:
-    """One phalanx, its joint, and what closes and opens it; the same in all fingers. Positive angles close."""
+    """One phalanx, its joint, and what closes and opens it; the same in all fingers.
+
+    Positive angles close.
+    """
 
     name: str
     length: float
@@ -59,8 +62,9 @@ class Phalanx:
 
 @dataclass(frozen=True)
 class HandLink:
-    """A phalanx of one finger, as a body: its frame has z along the joint's axis, x along the phalanx, y to
-    the side that closes.
+    """A phalanx of one finger, as a body.
+
+    Its frame has z along the joint's axis, x along the phalanx, y to the side that closes.
     """
 
     name: str
@@ -72,8 +76,9 @@ class HandLink:
 
 @dataclass(frozen=True)
 class Mode:
-    """An actuation pattern: the commands (rad) of the hand, between which one number from 0 (open) to 1
-    (closed) goes straight.
+    """An actuation pattern: the commands (rad) of the hand when it is open and when it is closed.
+
+    A number from 0 (open) to 1 (closed) interpolates between them.
     """
 
     open: tuple[float, ...]
@@ -195,8 +200,9 @@ class Hand:
         return start + closing * (end - start)
 
     def unloaded(self, command: Vector) -> Vector:
-        """Return the joint positions (rad), shape (fingers, phalanges), of fingers that touch nothing, at a
-        command, shape (2 fingers,).
+        """Return the joint positions (rad), shape (fingers, phalanges), of fingers that touch nothing.
+
+        The command has shape (2 fingers,).
         """
         closings, spreads = command.reshape(2, -1).tolist()
         return np.array(
@@ -223,8 +229,9 @@ class Hand:
         return float(positions @ self._pulleys / self._pulleys[0])
 
     def contacts(self, positions: Vector) -> Vector:
-        """Return the centres of the contact spheres in the hand's frame (m), shape (..., fingers, phalanges,
-        3).
+        """Return the centres of the contact spheres in the hand's frame (m).
+
+        They have shape (..., fingers, phalanges, 3).
 
         Args:
             positions: of the joints, rad, shape (..., fingers, phalanges).
@@ -248,8 +255,9 @@ class Hand:
         return [first.rest + spread, *(phalanx.rest for phalanx in others)]
 
     def _positions(self, tension: float, spread: float) -> Vector:
-        """Return the unloaded joint positions of a finger, shape (phalanges,), at a tension (N) and a spread
-        (rad).
+        """Return the unloaded joint positions of a finger, shape (phalanges,).
+
+        It is at a tension (N) and a spread (rad).
         """
         slope, lower, upper = np.array([(p.pulley / p.stiffness, p.lower, p.upper) for p in self.phalanges]).T
         return np.clip(self._rest(spread) + slope * tension, lower, upper)

@@ -1,5 +1,6 @@
-"""Kinematics of a curved needle between the pads of a rolling needle driver: the arm's six joints and the
-roll of the needle.
+"""Kinematics of a curved needle between the pads of a rolling needle driver.
+
+Its joints are the arm's six and the roll of the needle.
 
 The needle is held with its tangent along the wrist yaw axis, its tip to the side of the tip frame's +x. With
 the roller at 0 its arc goes out ahead of the jaw; at -90 degrees its plane is across the jaw, so that a turn
@@ -45,8 +46,9 @@ class Needle:
 
 
 def chain(tool: Instrument, needle: Needle, held: float) -> SerialChain:
-    """Return the kinematics from `<arm>_base` to the frame of `needle`, held at the angle `held` (rad) behind
-    its tip, along seven joints.
+    """Return the kinematics from `<arm>_base` to the frame of `needle`, along seven joints.
+
+    The needle is held at the angle `held` (rad) behind its tip.
 
     Raises MotionError if `tool` has no roller or the needle does not reach so far.
     """
@@ -77,8 +79,9 @@ def rolls(seven: SerialChain) -> Vector:
 
 
 def solutions(tool: Instrument, seven: SerialChain, pose: Vector, roll: Vector) -> Vector:
-    """Return the arm's joint positions, shape (4, ..., m, 6), at which the needle has `pose`, shape (..., 4,
-    4), with each `roll`, shape (m,).
+    """Return the arm's joint positions, shape (4, ..., m, 6), at which the needle has `pose`.
+
+    The pose has shape (..., 4, 4); there is one solution for each `roll`, shape (m,).
 
     In range or not, one set for each branch of `robots.dvrk.inverse.branches`.
     """
@@ -96,8 +99,9 @@ def solutions(tool: Instrument, seven: SerialChain, pose: Vector, roll: Vector) 
 
 
 def inverse(tool: Instrument, seven: SerialChain, pose: Vector) -> Vector:
-    """Return joint positions, shape (..., 7), in range, at which the needle has `pose`, shape (..., 4, 4), by
-    the criterion of this module.
+    """Return joint positions, shape (..., 7), in range, at which the needle has `pose`, shape (..., 4, 4).
+
+    Of several solutions the criterion of this module selects one.
 
     Raises MotionError if a pose is not reachable with any roll.
     """

@@ -1,10 +1,11 @@
-"""The identified dynamics of the PSM in combined terms: what the masses of `robots.dvrk.inertia` are fitted
-to and tested against.
+"""The identified dynamics of the PSM in combined terms.
+
+The masses of `robots.dvrk.inertia` are fitted to them and tested against them.
 
 Source: FONT = gafontanelli/DVRK-dynamicModel (commit 51c55d75), dvrk_dynamics/src/PSM_robot.cpp with its
 parameters PSM1_param.txt; Fontanelli, Ficuciello, Villani, Siciliano, "Modelling and identification of the da
 Vinci Research Kit robotic arms", IROS 2017. Its single masses are not physical (3000 kg): only sums of them
-can be told from measurements. Here the sums stand, one for each function of q that the model holds. It was
+can be identified from measurements. Here the sums stand, one for each function of q in the model. It was
 identified with the base upright, an instrument mounted and a force sensor of 0.0917 kg on the carriage, all
 part of the moving masses. SI units, radians; q = yaw, pitch, insertion.
 """
@@ -29,9 +30,10 @@ _SLIDING = INSERTION_MASS + COUNTERWEIGHT_MASS
 _SLIDING_MOMENT = -0.01381624
 """kg m: 2 mpz5 - 0.0312 mass5 + 0.4 mass9, growth of yaw and pitch inertia with the insertion."""
 _YAW = (-0.0545271, 0.238137804, 0.02397645171, 0.04963771668, 0.033)
-"""kg m^2: yaw inertia at insertion 0 as sum over 1, cos q2, cos^2 q2, sin 2 q2; kg m: q3 sin 2 q2 (Ixx3 + Iyy1 +
-Ixx2 + Izz4 + Izz5 + Izz9;
--0.4 mpy3; the rest of the terms in cos^2; -Ixz4 - Ixz5 - 0.2 mpx4 - 0.0156 mpx5; mpx5).
+"""kg m^2: yaw inertia at insertion 0 as sum over 1, cos q2, cos^2 q2, sin 2 q2; kg m: q3 sin 2 q2.
+
+They are Ixx3 + Iyy1 + Ixx2 + Izz4 + Izz5 + Izz9; -0.4 mpy3; the rest of the terms in cos^2; -Ixz4 - Ixz5 -
+0.2 mpx4 - 0.0156 mpx5; mpx5.
 """
 _PITCH = 0.1970255324
 """kg m^2: pitch inertia at insertion 0."""
@@ -56,8 +58,9 @@ _ELASTIC = ((0.135144709, 0.00726440463), (0.35571592, 0.0758960511), (0.0, 0.0)
 
 
 def inertia_matrix(q: Vector) -> Vector:
-    """Return the inertia matrix of yaw, pitch and insertion, shape (3, 3), kg m^2, kg m, kg; the model gives
-    the wrist none.
+    """Return the inertia matrix of yaw, pitch and insertion, shape (3, 3), kg m^2, kg m, kg.
+
+    In the model the wrist has no inertia.
     """
     s, c, s2 = np.sin(q[1]), np.cos(q[1]), np.sin(2.0 * q[1])
     sliding = _SLIDING * q[2] ** 2 + _SLIDING_MOMENT * q[2]
@@ -74,8 +77,9 @@ def inertia_matrix(q: Vector) -> Vector:
 
 
 def gravity(q: Vector) -> Vector:
-    """Return the effort (N m, N m, N) that gravity asks of yaw, pitch and insertion with the base upright,
-    shape (3,).
+    """Return the effort of gravity on yaw, pitch and insertion (N m, N m, N), shape (3,).
+
+    The base is upright.
     """
     s1, c1, s2, c2 = np.sin(q[0]), np.cos(q[0]), np.sin(q[1]), np.cos(q[1])
     along, across = _PITCH_MOMENT[0] + (INSERTION_MASS - COUNTERWEIGHT_MASS) * q[2], _PITCH_MOMENT[1]
@@ -86,8 +90,9 @@ def gravity(q: Vector) -> Vector:
 
 
 def elastic_torque(q: Vector) -> Vector:
-    """Return the torque (N m) that cables and covers ask of yaw, pitch, insertion (none) and roll, shape
-    (4,), at `q`, shape (4,).
+    """Return the torque (N m) of cables and covers on yaw, pitch, insertion (none) and roll, shape (4,).
+
+    Positions `q` have shape (4,).
     """
     stiffness, offset = np.array(_ELASTIC).T
     return stiffness * q[:4] + offset

@@ -34,7 +34,7 @@ __all__ = ["ENDOSCOPE_MASS", "PROBE_RADIUS", "SHAFT_MASS", "Inertia", "ecm", "in
 
 @dataclass(frozen=True)
 class Inertia:
-    """Mass (kg), centre of mass (m), shape (3,), and inertia tensor about the centre (kg m^2), shape (3, 3)."""
+    """Mass (kg), centre of mass (m), shape (3,), inertia tensor about the centre (kg m^2), shape (3, 3)."""
 
     mass: float
     centre: Vector
@@ -47,8 +47,9 @@ class Inertia:
 
     @classmethod
     def of_rod(cls, mass: float, start: Vector, end: Vector, radius: float) -> Inertia:
-        """Return that of a thin tube from `start` to `end` (m), shape (3,); of a ring without direction where
-        these are one point.
+        """Return that of a thin tube from `start` to `end` (m), shape (3,).
+
+        Where these are one point it is that of a ring without direction.
         """
         along = np.outer(end - start, end - start)
         length_squared = np.trace(along)
@@ -58,8 +59,9 @@ class Inertia:
 
     @property
     def pseudo_inertia(self) -> Vector:
-        """Integral of r r^T over the mass, r = (x, y, z, 1), shape (4, 4): positive definite if and only if a
-        body can have this inertia.
+        """Integral of r r^T over the mass, r = (x, y, z, 1), shape (4, 4).
+
+        It is positive definite if and only if a body can have this inertia.
         """
         result = np.empty((4, 4))
         result[:3, :3] = (
@@ -82,7 +84,7 @@ _FINGER_MASS = 3.90696e-5
 """kg of one finger (same file)."""
 
 PROBE_RADIUS = 5e-3
-"""m, of the sphere of a palpation probe unless a scene says otherwise."""
+"""m, of the sphere of a palpation probe unless the scene states another one."""
 
 ENDOSCOPE_MASS: Mapping[str, float] = MappingProxyType(
     {"Classic_SD": 1.5, "Classic_HD": 2.5, "Si_HD": 1.8, "Custom": 0.8, "none": 0.1}
@@ -97,7 +99,7 @@ _ENDOSCOPE_LENGTH, _ENDOSCOPE_RADIUS = 0.603, 0.035
 
 
 def psm(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[str, Inertia]:
-    """Return the bodies of a PSM with `tool` by link; the housing of the instrument is part of the insertion."""
+    """Return the bodies of a PSM with `tool` by link; the instrument's housing is part of the insertion."""
     return {**_arm_of_psm(), **instrument(tool, probe_radius)}
 
 
@@ -111,8 +113,9 @@ def _arm_of_psm() -> Mapping[str, Inertia]:
 
 
 def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[str, Inertia]:
-    """Return the moving bodies of an instrument by link: shaft, wrist, and fingers (closed) or probe; or
-    shaft and phalanges (straight).
+    """Return the moving bodies of an instrument by link.
+
+    They are shaft, wrist, and fingers (closed) or probe; or shaft and phalanges (straight).
     """
     chain = psm_chain(tool)
     frames = chain.frames(np.zeros(len(chain.joints)))
@@ -137,8 +140,9 @@ def instrument(tool: Instrument, probe_radius: float = PROBE_RADIUS) -> Mapping[
 
 
 def _pads(tool: Instrument, end: Vector, ahead: Vector, axis: Vector) -> Mapping[str, Inertia]:
-    """Return the pads of a roller, of steel; the wrist yaw axis passes `end` along `axis`, which like `ahead`
-    is one of the base frame's, shape (3,).
+    """Return the pads of a roller, of steel.
+
+    The wrist yaw axis passes `end` along `axis`, which like `ahead` is one of the base frame's, shape (3,).
     """
     if tool.roller is None:
         return {}

@@ -20,11 +20,10 @@ import numpy as np
 
 from robots.dvrk.contact_spheres import ContactSphere, on_jaw
 from robots.dvrk.hand import Hand
-from robots.dvrk.limits import jerk
 from robots.dvrk.musha import HAND
 from robots.dvrk.rolling_needle_driver import NAME as ROLLING
 from robots.dvrk.rolling_needle_driver import Roller, roller
-from robots.serial_chain import Joint
+from robots.serial_chain import Joint, jerk_limit
 from schemas.errors import MotionError, did_you_mean
 from schemas.vectors import Vector
 
@@ -53,7 +52,7 @@ _JAW_LENGTHS = {
     "205": 0.021,
     "309": 0.0155,
 }
-"""From the wrist yaw axis to the end of the jaws (m), by the last digits of the number, which tell the type
+"""From the wrist yaw axis to the end of the jaws (m), by the last digits of the number, which name its type
 (jhu-dvrk/dvrk_model, urdf/common/instruments/tip; the fenestrated bipolar forceps, 205, taken as long as the
 Maryland ones, 172).
 """
@@ -81,7 +80,7 @@ class Jaw:
     """From the wrist yaw axis to the end of the fingers, m."""
     velocity: float = _WRIST_VELOCITY
     acceleration: float = _WRIST_ACCELERATION
-    jerk: float = jerk(_WRIST_ACCELERATION)
+    jerk: float = jerk_limit(_WRIST_ACCELERATION)
 
     @property
     def joint(self) -> Joint:
@@ -135,15 +134,14 @@ class Instrument:
 
     @property
     def has_snake_wrist(self) -> bool:
-        """Whether the wrist is that of a 5 mm instrument: four bending joints in place of wrist pitch and
-        wrist yaw.
-        """
+        """Whether it is a 5 mm instrument, with four bending joints instead of wrist pitch and yaw."""
         return len(self.joints) > 3
 
     @property
     def jaw_joints(self) -> tuple[Joint, ...]:
-        """What is commanded of the jaw: its angle and, where it has a roller, that of the needle; empty where
-        there is no jaw.
+        """Joints that are commanded of the jaw: its angle and, with a roller, the needle's.
+
+        They are empty without a jaw.
         """
         return (
             ()
@@ -155,9 +153,7 @@ class Instrument:
 
     @cached_property
     def spheres(self) -> tuple[ContactSphere, ...]:
-        """What touches tissue; empty for a palpation probe, which is a sphere itself, and for what has no
-        jaw.
-        """
+        """What touches tissue; empty without a jaw, and for a palpation probe, which is a sphere itself."""
         if self.hand is not None:
             return self.hand.spheres
         return () if self.jaw is None else on_jaw(self.jaw.length, self.tip[:3, 2])
@@ -198,8 +194,9 @@ def instruments() -> Mapping[str, Instrument]:
 
 
 def _with_hand(name: str, hand: Hand, shaft: Instrument) -> Instrument:
-    """Return an instrument that has `hand` on the shaft of another; its tip is the end of the straight
-    fingers, at home turned as that of the other one.
+    """Return an instrument that has `hand` on the shaft of another one.
+
+    Its tip is the end of the straight fingers, and has at home the orientation of the other one's.
     """
     tip = np.diag([-1.0, -1.0, 1.0, 1.0])
     tip[2, 3] = hand.reach
@@ -241,5 +238,5 @@ def _from_data(name: str, row: dict[str, Any], data: dict[str, Any]) -> Instrume
 def _joint(
     name: str, alpha: float, a: float, d: float, theta: float, lower: float, upper: float, effort: float
 ) -> Joint:
-    limits = (_WRIST_VELOCITY, effort, _WRIST_ACCELERATION, jerk(_WRIST_ACCELERATION))
+    limits = (_WRIST_VELOCITY, effort, _WRIST_ACCELERATION, jerk_limit(_WRIST_ACCELERATION))
     return Joint(name, "revolute", radians(alpha), a, d, radians(theta), lower, upper, *limits)

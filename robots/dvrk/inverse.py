@@ -39,7 +39,7 @@ ORIENTATION_TOLERANCE = radians(20.0)
 
 The real controller (jhu-dvrk/sawIntuitiveResearchKit, robManipulatorECM.cpp) has no bound. Below the 30
 degrees by which endoscopes differ, so that a goal meant for another one is refused; above the 11 degrees that
-20 mm sideways at a depth of 100 mm need, a step for which nobody should have to work out the orientation.
+20 mm sideways at a depth of 100 mm need, a step for which no orientation should have to be computed.
 """
 
 _SLACK = 1e-9
@@ -129,8 +129,9 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
 
 
 def branches(chain: SerialChain, pose: Vector) -> Vector:
-    """Return the joint positions of all four branches, shape (4, ..., 6), in range or not, revolute ones
-    within half a turn of 0.
+    """Return the joint positions of all four branches, shape (4, ..., 6), in range or not.
+
+    Revolute ones are within half a turn of 0.
 
     Where a singular pose leaves a joint free, it is at 0.
 
@@ -164,8 +165,9 @@ def _require(chain: SerialChain, wrist: tuple[Joint, ...]) -> None:
 
 
 def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vector) -> Vector:
-    """Return the joint positions, shape (2, N, 4), at which the tip, on the axis of the last link, is at
-    `position`, shape (N, 3).
+    """Return the joint positions, shape (2, N, 4), with the tip at `position`, shape (N, 3).
+
+    The tip is on the axis of the last link.
 
     `rotation`, shape (N, 3, 3), is the one asked for of the last link.
     """
@@ -189,8 +191,8 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
     distance = np.linalg.norm(across, axis=-1, keepdims=True)
     angle = near[:, 5:] + yaw.theta
     kept = np.cos(angle) * x6 - np.sin(angle) * y6  # x5 at the wrist yaw of `near`
-    # (4, N, 3)
-    x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept) * _BRANCH_SIGNS[0]
+    x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept)
+    x5 = x5 * _BRANCH_SIGNS[0]  # (4, N, 3)
     z5 = _cross(x5, yaw_axis)
     wrist = centre - yaw.a * x5
     shaft = _shaft(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
@@ -203,8 +205,9 @@ def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
 
 
 def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vector) -> Vector:
-    """Return the direction of the shaft, shape (4, N, 3), perpendicular to the wrist pitch axis z5, that
-    passes RCM and wrist.
+    """Return the direction of the shaft, shape (4, N, 3), which passes through RCM and wrist.
+
+    It is perpendicular to the wrist pitch axis z5.
     """
     distance = np.linalg.norm(wrist, axis=-1, keepdims=True)
     yaw, pitch = near[:, 0], near[:, 1]
@@ -218,8 +221,9 @@ def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vect
 
 
 def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -> tuple[Vector, Vector]:
-    """Write yaw, pitch and insertion into `q` and return the axes x3 and y3 of the insertion link, each shape
-    (branches, N, 3).
+    """Write yaw, pitch and insertion into `q`; return the axes x3 and y3 of the insertion link.
+
+    Each has shape (branches, N, 3).
 
     The shaft's direction is (cos q2 sin q1, -sin q2, -cos q2 cos q1).
     """
@@ -243,8 +247,9 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 
 def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
-    """Return revolute positions as many whole turns away as is nearest to `near`, or to the middle of the
-    range if that is outside.
+    """Return revolute positions, by whole turns nearest to `near`.
+
+    If that is out of range, nearest to the middle of the range.
     """
     revolute = [i for i, joint in enumerate(chain.joints) if joint.kind == "revolute"]
     q, lower, upper = branches[..., revolute], chain.lower[revolute], chain.upper[revolute]
@@ -258,9 +263,7 @@ def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
 
 
 def _unreachable(chain: SerialChain, branches: Vector, index: np.intp, count: int) -> MotionError:
-    """Say of the branch that needs least beyond the joint ranges, shape (branches, n), which joints stand
-    against it.
-    """
+    """Return which joints prevent the branch that is least beyond the joint ranges, shape (branches, n)."""
     beyond = np.maximum(np.maximum(chain.lower - branches, branches - chain.upper), 0.0) / (
         chain.upper - chain.lower
     )

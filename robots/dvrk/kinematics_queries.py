@@ -1,5 +1,6 @@
-"""The kinematics of one arm as CRTK's services ask for them (crtk_msgs, QueryForwardKinematics and
-QueryInverseKinematics).
+"""The kinematics of one arm for CRTK's services.
+
+These are QueryForwardKinematics and QueryInverseKinematics of crtk_msgs.
 
 Rules and words are the real controller's (jhu-dvrk/sawIntuitiveResearchKit,
 core/components/code/mtsIntuitiveResearchKitArm.cpp; jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp): of
@@ -51,7 +52,7 @@ class KinematicsQueries:
         Args:
             jp: of the first m joints.
             base: pose of the arm's base frame in its reference, (x, y, z, qx, qy, qz, qw), as
-            `SUJ/<arm>/measured_cp` tells it;
+            `SUJ/<arm>/measured_cp` publishes it;
                 None for `local/forward_kinematics`.
         """
         nowhere, n = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), len(self._chain.joints)
@@ -69,8 +70,9 @@ class KinematicsQueries:
         return Answer(np.concatenate([frame[:3, 3], rotation.from_matrix(frame)]), True, "")
 
     def inverse(self, cp: Vector, jp: Vector) -> Answer:
-        """Return the joint positions, shape (n,), inside the ranges, nearest to `jp`, shape (n,), with the
-        tip at `cp`.
+        """Return the joint positions, shape (n,), inside the ranges, with the tip at `cp`.
+
+        They are those nearest to `jp`, shape (n,).
 
         `cp` is (x, y, z, qx, qy, qz, qw) in the arm's base frame. Where there is no answer the value is `jp`.
         """

@@ -1,5 +1,4 @@
-"""The parallelogram linkages that carry the pitch from the yaw link to the instrument column, and the
-counterweight.
+"""The parallelogram linkages that transmit the pitch to the instrument column, and the counterweight.
 
 The real arm has no joint in its remote centre of motion (RCM): a double parallelogram turns the column about
 that point. In the model the column (body `pitch`) has its joint in the RCM, so that the kinematics are exact,

@@ -1,5 +1,6 @@
-"""The arms of a patient cart as a scenario states them to any participant: where each stands, what it holds,
-where it starts. SI units, radians.
+"""The arms of a patient cart as a scenario states them: where each stands, what it holds, where it starts.
+
+SI units, radians.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from robots.dvrk import ecm, psm
 from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.parameters import (
+    FOLDED,
     EcmPositions,
     HandPositions,
     InstrumentName,
@@ -23,11 +25,11 @@ from robots.dvrk.parameters import (
 from robots.serial_chain import SerialChain
 from schemas.quantity import Angle, Length
 
-__all__ = ["MountedArm", "MountedEcm", "MountedPsm"]
+__all__ = ["MountedArm", "MountedEcm", "MountedPsm", "PsmTool"]
 
 
 class MountedArm(BaseModel):
-    """One arm: where it stands if it hangs on no setup joint."""
+    """One arm: where it stands unless setup joints carry it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -40,21 +42,24 @@ class MountedArm(BaseModel):
     )
 
 
-class MountedPsm(MountedArm):
-    """A patient-side manipulator: what it holds and where it starts."""
+class PsmTool(BaseModel):
+    """What a patient-side manipulator holds, and where both start."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     instrument: InstrumentName = Field(
-        default="palpation-probe", description="name or number, such as 400006"
+        default="palpation-probe", description="what the arm holds: name or number, such as 400006"
     )
     start: MountedPositions = Field(
         default_factory=home,
         description=f"joint positions at time 0: {', '.join(psm.JOINT_NAMES)}, or as many as there are",
     )
     jaw: Angle = Field(default=0.0, description="opening of the jaw at time 0")
-    hand: HandPositions = Field(
-        default=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        description="closings, then spreads, of a hand's fingers at time 0; default: folded",
-    )
+
+    @property
+    def fingers(self) -> HandPositions:
+        """Closings, then spreads, of a hand's fingers at time 0: folded."""
+        return FOLDED
 
     @cached_property
     def tool(self) -> Instrument:
@@ -68,8 +73,22 @@ class MountedPsm(MountedArm):
 
     @model_validator(mode="after")
     def _starts_in_range(self) -> Self:
-        check_start(self.chain, self.start, self.tool, self.jaw, self.hand)
+        check_start(self.chain, self.start, self.tool, self.jaw, self.fingers)
         return self
+
+
+class MountedPsm(PsmTool, MountedArm):
+    """A patient-side manipulator: where it stands, what it holds and where it starts."""
+
+    hand: HandPositions = Field(
+        default=FOLDED,
+        description="closings, then spreads, of a hand's fingers at time 0; default: folded",
+    )
+
+    @property
+    def fingers(self) -> HandPositions:
+        """Closings, then spreads, of a hand's fingers at time 0."""
+        return self.hand
 
 
 class MountedEcm(MountedArm):

@@ -12,8 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from robots.dvrk.limits import jerk
-from robots.serial_chain import Joint, SerialChain
+from robots.serial_chain import Joint, SerialChain, jerk_limit
 from schemas.vectors import Vector
 
 __all__ = ["ACTUATOR_TO_JOINT", "BASE", "MtmName", "chain"]
@@ -23,7 +22,7 @@ MtmName = Literal["MTML", "MTMR"]
 _TURN, _TURN_ACCELERATION = radians(90.0), radians(45.0)
 _ROLL = radians(360.0)
 """rad/s, and rad/s^2 of the acceleration."""
-_TURNING = (_TURN_ACCELERATION, jerk(_TURN_ACCELERATION))
+_TURNING = (_TURN_ACCELERATION, jerk_limit(_TURN_ACCELERATION))
 
 _RANGES = {
     "MTML": ((-0.698132, 1.13446), (-0.261799, 1.13446), (-3.5779, 1.6580)),
@@ -108,7 +107,7 @@ def _joints(arm: MtmName) -> tuple[Joint, ...]:
             _ROLL,
             0.02287592,
             _ROLL,
-            jerk(_ROLL),
+            jerk_limit(_ROLL),
         ),
     )
 

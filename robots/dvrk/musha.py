@@ -1,5 +1,6 @@
-"""The MUSHA hand: three under-actuated fingers of three phalanges on the shaft of a PSM, in place of wrist
-and jaw.
+"""The MUSHA hand: three under-actuated fingers of three phalanges on the shaft of a PSM.
+
+It replaces wrist and jaw.
 
 Published are three fingers of three phalanges, under-actuation, the modes retractor, grasp and caliper
 (palpation), and that the hand folds into a cylinder of 12 mm (Liu et al., "The MUSHA Hand II", IEEE/ASME
@@ -14,7 +15,7 @@ from math import pi, radians
 from types import MappingProxyType
 
 from robots.dvrk.hand import Hand, Mode, Phalanx
-from robots.dvrk.limits import jerk
+from robots.serial_chain import jerk_limit
 
 __all__ = ["HAND", "TROCAR_RADIUS"]
 
@@ -47,8 +48,9 @@ _OUT = radians(-85.0)
 
 
 def _bent(spread: float, bend: float) -> tuple[float, float]:
-    """Return closing and spread of a finger whose first joint is at `spread` and whose others are both at
-    `bend` > 0 (rad).
+    """Return closing and spread of a bent finger.
+
+    Its first joint is at `spread`, and the others are both at `bend` > 0 (rad).
     """
     first, middle, distal = _PHALANGES
     tension = middle.stiffness * (bend - middle.rest) / middle.pulley
@@ -92,10 +94,10 @@ HAND = Hand(
     effort=0.16,
     velocity=_VELOCITY,
     acceleration=_ACCELERATION,
-    jerk=jerk(_ACCELERATION),
+    jerk=jerk_limit(_ACCELERATION),
     modes=MappingProxyType(_MODES),
 )
-"""Two fingers stand opposed, as the caliper wants it, the third one at right angles.
+"""Two fingers stand opposed, as the caliper requires, the third one at right angles.
 
 Effort: that of the jaw of a needle driver. Density: of steel 1.4301, as of the palpation probe.
 """

@@ -20,7 +20,6 @@ __all__ = [
     "HandPositions",
     "InstrumentName",
     "MountedPositions",
-    "PsmPositions",
     "SetupPositions",
     "UnitQuaternion",
     "check_start",
@@ -68,9 +67,6 @@ InstrumentName = Annotated[
 ]
 """Name or number of an instrument that can be mounted on a PSM; the name, once it is validated."""
 
-PsmPositions = tuple[Angle, Angle, Length, Angle, Angle, Angle]
-"""Positions of a PSM's six joints (rad, m)."""
-
 EcmPositions = tuple[Angle, Angle, Length, Angle]
 """Positions of the ECM's four joints (rad, m)."""
 
@@ -85,16 +81,15 @@ UnitQuaternion = Annotated[tuple[float, float, float, float], AfterValidator(_un
 
 HandPositions = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 """Closings, then spreads, of three fingers."""
+FOLDED: HandPositions = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def home(arm: dict[str, Any]) -> MountedPositions:
-    """Return `psm.home` for the `instrument` of an arm whose fields are being validated; any where that is
-    none.
-    """
+    """Return `psm.home` for the `instrument` of an arm whose fields are being validated."""
     try:
         return cast("MountedPositions", psm.home(instrument(arm.get("instrument", ""))))
     except MotionError:
-        return psm.HOME  # not looked at: the instrument has been refused
+        return psm.HOME  # unused: the instrument is refused
 
 
 def check_start(
@@ -104,8 +99,14 @@ def check_start(
     jaw: float = 0.0,
     hand: Sequence[float] = (),
 ) -> None:
-    """Raise ValueError, as pydantic's validators do, if `start`, or how far `jaw` or `hand` (rad) of the tool
-    are open, is not inside its range.
+    """Raise ValueError, as pydantic's validators do, for what is outside its range.
+
+    Args:
+        chain: the arm's kinematics.
+        start: its joint positions, shape (n,).
+        tool: what it holds.
+        jaw: opening of the tool's jaw, rad.
+        hand: closings, then spreads, of the tool's fingers, rad.
     """
     try:
         chain.check(np.array(start, np.float64))
@@ -127,7 +128,7 @@ def check_start(
 
 
 def settable(arm: setup_joints.CartArm) -> AfterValidator:
-    """Return what refuses `SetupPositions` that the setup joint which carries `arm` does not reach."""
+    """Return a validator of `SetupPositions` that the setup joint of `arm` can reach."""
 
     def check(positions: tuple[float, ...]) -> tuple[float, ...]:
         try:

@@ -9,8 +9,7 @@ from __future__ import annotations
 from math import pi, radians
 
 from robots.dvrk.instruments import Instrument
-from robots.dvrk.limits import jerk
-from robots.serial_chain import Joint, SerialChain
+from robots.serial_chain import Joint, SerialChain, jerk_limit
 
 __all__ = ["ARM_JOINTS", "HOME", "JOINT_NAMES", "chain", "home"]
 
@@ -25,7 +24,9 @@ rad/s^2; m/s and m/s^2.
 """
 
 ARM_JOINTS = (
-    Joint("yaw", "revolute", pi / 2, 0.0, 0.0, pi / 2, -1.588, 1.588, _TURN, 3.316101, _TURN, jerk(_TURN)),
+    Joint(
+        "yaw", "revolute", pi / 2, 0.0, 0.0, pi / 2, -1.588, 1.588, _TURN, 3.316101, _TURN, jerk_limit(_TURN)
+    ),
     Joint(
         "pitch",
         "revolute",
@@ -38,7 +39,7 @@ ARM_JOINTS = (
         _TURN,
         3.316101,
         _TURN,
-        jerk(_TURN),
+        jerk_limit(_TURN),
     ),
     Joint(
         "insertion",
@@ -52,7 +53,7 @@ ARM_JOINTS = (
         _SLIDE,
         9.877926,
         _SLIDE,
-        jerk(_SLIDE),
+        jerk_limit(_SLIDE),
     ),
 )
 """The joints of the arm itself: modified DH, range and effort limit from SAW share/kinematic/PSM.json (1.5708
@@ -75,7 +76,5 @@ def home(instrument: Instrument) -> tuple[float, ...]:
 
 
 def chain(instrument: Instrument) -> SerialChain:
-    """Return the kinematics of the arm with `instrument`, from the RCM frame `<arm>_base` to the instrument's
-    tip.
-    """
+    """Return the kinematics of the arm with `instrument`, from the RCM frame `<arm>_base` to its tip."""
     return SerialChain(ARM_JOINTS + instrument.joints, instrument.tip)

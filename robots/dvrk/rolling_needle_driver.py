@@ -1,5 +1,4 @@
-"""The rolling needle driver: a large needle driver whose pads slide against each other and so roll the needle
-between them.
+"""The rolling needle driver: a large needle driver whose pads slide to roll the needle between them.
 
 Published is a needle driver with one degree of freedom more, which turns the needle between its jaws
 (Fontanelli et al., "A New Laparoscopic Tool With In-Hand Rolling Capabilities for Needle Reorientation", IEEE
@@ -12,8 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import radians
 
-from robots.dvrk.limits import jerk
-from robots.serial_chain import Joint
+from robots.serial_chain import Joint, jerk_limit
 
 __all__ = ["NAME", "PADS", "ROLLER", "Roller", "roller"]
 
@@ -43,9 +41,7 @@ _VELOCITY, _ACCELERATION = radians(180.0), radians(720.0)
 
 @dataclass(frozen=True)
 class Roller:
-    """Two pads that roll a round wire: each goes `wire_radius` times the angle, so that the wire turns in
-    place.
-    """
+    """Two pads that roll a round wire in place: each moves by `wire_radius` times the angle."""
 
     joint: Joint
     wire_radius: float
@@ -82,6 +78,6 @@ def roller(jaw_effort: float) -> Roller:
         _VELOCITY,
         effort,
         _ACCELERATION,
-        jerk(_ACCELERATION),
+        jerk_limit(_ACCELERATION),
     )
     return Roller(joint, _WIRE_RADIUS, _DISTANCE, (0.0036, 0.0006, 0.0003), 0.001)

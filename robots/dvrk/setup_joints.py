@@ -17,7 +17,7 @@ from typing import Literal
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["JOINT_NAMES", "SIMULATED", "CartArm", "base_pose", "chain"]
+__all__ = ["JOINT_NAMES", "SIMULATED", "CartArm", "base_pose", "chain", "joint_names"]
 
 CartArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
 """The arms that the cart carries."""
@@ -83,9 +83,7 @@ def _joints(arm: CartArm) -> tuple[Joint, ...]:
 
 @cache
 def chain(arm: CartArm) -> SerialChain:
-    """Return the kinematics of the setup joint that carries `arm`, from the cart's frame to the arm's RCM
-    frame `<arm>_base`.
-    """
+    """Return the kinematics of the setup joint that carries `arm`, from the cart to `<arm>_base`, its RCM."""
     x, y, z, turn = _COLUMN[arm]
     base = Joint("", "revolute", 0.0, 0.0, 0.0, turn, 0.0, 0.0).transform(0.0)
     base[:3, 3] = x, y, z
@@ -96,7 +94,13 @@ def chain(arm: CartArm) -> SerialChain:
 
 
 def base_pose(arm: CartArm, q: Vector) -> Vector:
-    """Return the pose of the RCM frame `<arm>_base` in the cart's frame, shape (..., 4, 4), at setup joint
-    positions (..., 6).
+    """Return the pose of the RCM frame `<arm>_base` in the cart's frame, shape (..., 4, 4).
+
+    Setup joint positions have shape (..., 6).
     """
     return chain(arm).forward(q)
+
+
+def joint_names(arm: CartArm) -> tuple[str, ...]:
+    """Return the names of the setup joints that carry `arm` as the real system has them: `SUJ_PSM1_J0`."""
+    return tuple(f"SUJ_{arm}_J{index}" for index in range(len(JOINT_NAMES)))

@@ -68,7 +68,7 @@ def lattice() -> tuple[Stitch, ...]:
 
 
 def tissue(tilt: float) -> Vector:
-    """Return the pose, shape (4, 4), of the tissue in the arm's base frame: z outwards, origin in its middle."""
+    """Return the pose, shape (4, 4), of the tissue in the base frame: z outwards, origin in its middle."""
     pose = np.eye(4)
     pose[0, 0] = pose[2, 2] = cos(tilt)
     pose[0, 2] = sin(tilt)
@@ -78,8 +78,9 @@ def tissue(tilt: float) -> Vector:
 
 
 def path(stitch: Stitch, needle: Needle) -> Vector:
-    """Return the poses of the needle, shape (n, 4, 4), in the arm's base frame, from the tip's touching the
-    tissue until it has come out.
+    """Return the poses of the needle, shape (n, 4, 4), in the arm's base frame.
+
+    They begin when the tip touches the tissue, and end when it has emerged.
     """
     way = 2.0 * stitch.entry + EMERGE
     tip = np.linspace(pi / 2.0 - stitch.entry, pi / 2.0 - stitch.entry + way, ceil(way / _STEP - 1e-9) + 1)

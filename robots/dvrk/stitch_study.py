@@ -33,7 +33,7 @@ DRIVE = radians(30.0)
 
 _JUMP = radians(45.0)
 """Most that a joint may turn between two points of a path, which are at most 5 degrees of the needle apart:
-beyond, nobody knows what is in between.
+beyond, what is in between is unknown.
 """
 
 Mask = NDArray[np.bool_]
@@ -59,16 +59,15 @@ class Study:
 
     @property
     def without(self) -> Mask:
-        """By stitch, shape (n,): with the standard needle driver, the needle in the one grasp that serves
-        most stitches.
+        """Whether the standard needle driver can make each stitch, shape (n,), with one grasp for all.
+
+        It is the grasp that serves most stitches.
         """
         return self.constant[:, self.best]
 
     @property
     def regrasped(self) -> Mask:
-        """By stitch, shape (n,): with the standard needle driver, the needle grasped anew for each stitch as
-        suits it.
-        """
+        """Whether the standard needle driver can make each stitch, shape (n,), with a grasp chosen for it."""
         return _any(self.constant, 1)
 
     def shares(self, of: Mask | None = None) -> dict[str, float]:
@@ -105,8 +104,9 @@ def study(stitches: tuple[Stitch, ...] | None = None, needle: Needle | None = No
 
 
 def _feasible(tool: Instrument, needle: Needle, alike: Sequence[Stitch], rolls: Vector) -> tuple[Mask, Mask]:
-    """Return which of k stitches of one tilt, entry and hold are feasible, by roll without rolling, shape (k,
-    m), and with rolling, shape (k,).
+    """Return which of k stitches of one tilt, entry and hold are feasible.
+
+    First by roll without rolling, shape (k, m); then with rolling, shape (k,).
     """
     one = alike[0]
     paths = np.stack([stitch.path(each, needle) for each in alike])  # (k, points, 4, 4)
@@ -140,8 +140,9 @@ def _reach(seven: SerialChain, seconds: float) -> Vector:
 
 
 def _allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
-    """Say at which `q`, shape (..., 6), all joints but the shaft's roll are in range and the instrument is
-    outside the tissue; shape (...).
+    """Say, shape (...), which `q`, shape (..., 6), are allowed.
+
+    All joints but the shaft's roll are in range and the instrument is outside the tissue.
 
     Jaw, wrist yaw and wrist pitch are each a ball as thick as they are.
     """
@@ -162,8 +163,9 @@ def _allowed(tool: Instrument, q: Vector, surface: Vector) -> Mask:
 
 
 def _wound(tool: Instrument, q: Vector, allowed: Mask) -> tuple[Vector, Mask]:
-    """Return positions with the shaft's roll also a turn less and a turn more, shape (3, ..., 6), and which
-    of them may be, shape (3, ...).
+    """Return positions with the shaft's roll also a turn less and a turn more, shape (3, ..., 6).
+
+    The second value states which of them are allowed, shape (3, ...).
     """
     roll = psm.chain(tool).joints[3]
     wound = np.stack([q] * 3)
@@ -172,8 +174,9 @@ def _wound(tool: Instrument, q: Vector, allowed: Mask) -> tuple[Vector, Mask]:
 
 
 def _ways(q: Vector, valid: Mask, reach: Vector, turns: int) -> Mask:
-    """Return by stitch and roll at the end, shape (k, m), whether a way leads there that rolls by at most
-    `turns` of the lattice from point to point.
+    """Return by stitch and roll at the end, shape (k, m), whether a path leads there.
+
+    From point to point it rolls by at most `turns` of the lattice.
 
     Args:
         q: arm joints, shape (windings, branches, k, points, m, 6).

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.vrep import Paper, PaperParams
+from controllers.vrep import VrepScene, VrepSceneParams
 from devices.ros.params import GatewayParams
 from devices.ros.topics.vrep import paper_face
 from hub.participant import Inputs, Setup
@@ -21,7 +21,7 @@ DRIVEN = ("PSM1", "PSM2", "ECM", "PSM1/jaw", "PSM2/jaw")
 
 class Rig:
     def __init__(self):
-        self.paper = Paper("paper", PaperParams.model_validate({"arms": ARMS}))
+        self.paper = VrepScene("paper", VrepSceneParams.model_validate({"arms": ARMS}))
         self.outputs = dict(self.paper.configure(Setup(H, Path())))
         self.values = {
             p.name: np.array(p.start)
@@ -128,6 +128,6 @@ def test_positions_out_of_range_are_cut_and_what_is_none_is_dropped():
 
 
 def test_it_is_a_participant_whose_state_can_be_saved():
-    check_engine(lambda: Paper("paper", PaperParams.model_validate({"arms": ARMS})), period_ns=H)
+    check_engine(lambda: VrepScene("paper", VrepSceneParams.model_validate({"arms": ARMS})), period_ns=H)
     with pytest.raises(StateError, match="participant 'paper': a saved state of 1 bytes"):
         Rig().paper.restore(b"0")

@@ -100,7 +100,7 @@ def test_elasticity_is_that_of_the_identified_model():
 @settings(max_examples=25, deadline=None)
 @given(POSITIONS, st.integers(0, 5), st.tuples(*[st.floats(-9.81, 9.81)] * 3).map(np.array))
 def test_gravity_is_the_slope_of_one_potential(q, i, pull):
-    """The derivative of gravity by q is symmetric: it comes from a potential, for a base however it stands."""
+    """The derivative of gravity by q is symmetric, as it has a potential, for a base of any orientation."""
     step, slope = 1e-6, np.empty((6, 6))
     for j in range(6):
         ahead, behind = q.copy(), q.copy()

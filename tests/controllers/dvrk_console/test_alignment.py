@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controllers.dvrk_console.controller import Console
-from controllers.dvrk_console.params import ConsoleParams
+from controllers.dvrk_console.controller import DvrkConsole
+from controllers.dvrk_console.params import DvrkConsoleParams
 from controllers.teleoperation.controller import Teleoperation
 from controllers.teleoperation.params import TeleoperationParams
 from hub.participant import Params, Stepped
@@ -105,9 +105,9 @@ def play(*, motors):
     master.motors = motors
     participants = {
         "master": master,
-        "console": Console(
+        "console": DvrkConsole(
             "console",
-            ConsoleParams.model_validate({"arms": ["PSM1", "ECM"], "teleoperations": ["MTMR_PSM1"]}),
+            DvrkConsoleParams.model_validate({"arms": ["PSM1", "ECM"], "teleoperations": ["MTMR_PSM1"]}),
         ),
         "right": Teleoperation("right", TeleoperationParams.model_validate(hand)),
         "motion": controller,

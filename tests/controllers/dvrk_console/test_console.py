@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.dvrk_console.controller import Console
-from controllers.dvrk_console.params import ConsoleParams
+from controllers.dvrk_console.controller import DvrkConsole
+from controllers.dvrk_console.params import DvrkConsoleParams
 from devices.ros.params import GatewayParams
 from devices.ros.topics.face import face
 from hub.participant import Inputs, Setup
@@ -27,9 +27,9 @@ DOWN, UP, TAP = (Joy(buttons=np.array([button], np.int32)) for button in (1, 0, 
 
 class Rig:
     def __init__(self, **params):
-        self.console = Console(
+        self.console = DvrkConsole(
             "console",
-            ConsoleParams.model_validate(
+            DvrkConsoleParams.model_validate(
                 {"arms": ["PSM1", "PSM2", "PSM3", "ECM"], "teleoperations": PAIRS, **params}
             ),
         )
@@ -246,7 +246,7 @@ def test_scale_and_locks_reach_those_who_lead():
     )
     assert (rig.outputs["teleop/MTML_PSM2/scale"][0], rig.outputs["teleop/MTMR_PSM1/scale"][0]) == (0.1, 0.5)
     assert rig.said("MTMR_PSM1/warning") == [
-        "MTMR_PSM1: scale 2 is refused, allowed are over 0 to 1; it stays 0.5"
+        "MTMR_PSM1: scale 2 is refused, allowed is above 0 and up to 1; it stays 0.5"
     ]
     rig.step(
         {
@@ -272,7 +272,11 @@ def test_a_gripper_opens_the_jaw(degrees, gripper):
     ("port", "message", "words"),
     [
         ("console/emulate_clutch", Joy(), "clutch: a Joy without a button is refused"),
-        ("console/teleop/set_scale", Float64Message(data=0.0), "scale 0 is refused, allowed are over 0 to 1"),
+        (
+            "console/teleop/set_scale",
+            Float64Message(data=0.0),
+            "scale 0 is refused, allowed is above 0 and up to 1",
+        ),
         ("system/set_volume", Float64Message(data=2.0), "volume 2 is refused, allowed are 0 to 1"),
     ],
 )
@@ -282,14 +286,14 @@ def test_what_makes_no_sense_is_refused_in_words(port, message, words):
 
 def test_a_teleoperation_of_an_arm_that_is_not_there_is_refused():
     with pytest.raises(ValueError, match="'MTMR_PSM1' leads PSM1, which is not among the arms: PSM2"):
-        ConsoleParams.model_validate({"arms": ["PSM2"], "teleoperations": ["MTMR_PSM1"]})
+        DvrkConsoleParams.model_validate({"arms": ["PSM2"], "teleoperations": ["MTMR_PSM1"]})
 
 
 def test_it_is_a_participant_whose_state_can_be_saved():
     check_engine(
-        lambda: Console(
+        lambda: DvrkConsole(
             "console",
-            ConsoleParams.model_validate(
+            DvrkConsoleParams.model_validate(
                 {"arms": ["PSM1"], "teleoperations": ["MTMR_PSM1"], "enabled": True}
             ),
         ),

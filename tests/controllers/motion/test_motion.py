@@ -136,12 +136,12 @@ def test_each_state_takes_its_commands(way, command, after):
     rig = Rig().step()
     for earlier in way:
         rig.command(earlier)
-    saved = rig.motion._arms["PSM1"]._lifecycle.flags.copy()
+    saved = rig.motion._arms["PSM1"]._lifecycle.records[0].values.copy()
     rig.command(command)
     if after is None:
         assert len(rig.said("warning")) == 1
         assert command in rig.said("warning")[0]
-        assert (rig.motion._arms["PSM1"]._lifecycle.flags == saved).all()
+        assert (rig.motion._arms["PSM1"]._lifecycle.records[0].values == saved).all()
         assert not rig.states()
     else:
         assert rig.states()[-1][0] == after
@@ -293,7 +293,7 @@ BAD = [
     ("jaw__move_jp", jp(3.0), "joint jaw at 3 rad, allowed are -0.698132 .. 1.39626"),
     ("jaw__servo_jp", jp(-1.0), "allowed are"),
     ("jaw__servo_jf", jf(1.0), "allowed are -0.16 .. 0.16"),
-    ("trajectory_j__set_ratio", ratio(0.0), "allowed are over 0 to 1"),
+    ("trajectory_j__set_ratio", ratio(0.0), "allowed is above 0 and up to 1"),
     ("move_jp", construct("position", [np.nan] * 6), "every number must be finite"),
     ("servo_jf", construct("effort", [np.inf] * 6), "every number must be finite"),
 ]
@@ -422,7 +422,7 @@ EVERY = [
         (
             f"trajectory_j__set_ratio{which}",
             Float64Message.model_construct(data=bad),
-            "allowed are over 0 to 1",
+            "allowed is above 0 and up to 1",
         )
         for bad in (NAN, -1.0, 1.1, np.inf)
         for which in ("", "_v", "_a")
@@ -446,7 +446,7 @@ def test_bad_input_is_refused_with_the_reason_and_changes_nothing(command, bad, 
     for mine, others in zip(
         rig.motion._arms["PSM1"]._drives.state, twin.motion._arms["PSM1"]._drives.state, strict=True
     ):
-        assert (mine == others).all()
+        assert (mine.values == others.values).all()
 
 
 def test_a_bad_goal_does_not_disturb_a_move_under_way():
@@ -570,7 +570,7 @@ def test_home_that_is_not_reached_is_a_fault():
     assert rig.states()[-1] == ("FAULT", False, False)
     assert "home not reached" in rig.said("error")[0]
     rig.command("enable")
-    assert "takes disable, unhome" in rig.said("warning")[0]
+    assert "accepts disable, unhome" in rig.said("warning")[0]
     assert rig.command("disable").states() == [("DISABLED", False, False)]
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.motion.limits import STREAM_GAP
+from controllers.motion.setpoint import STREAM_GAP
 from robots import rotation
 from robots.dvrk import arms
 from schemas.ros import BoolMessage, Float64Message
@@ -264,8 +264,8 @@ class TestSetBaseFrame:
     @pytest.mark.parametrize(
         ("arms", "params", "named", "reason"),
         [
-            (CART, {}, "", "the setup joints say where the arm stands"),
-            (CART, {"reference": "world"}, "", "the setup joints say where the arm stands"),
+            (CART, {}, "", "the setup joints determine where the arm stands"),
+            (CART, {"reference": "world"}, "", "the setup joints determine where the arm stands"),
             (
                 PSM1,
                 {"mounting": "free"},

@@ -20,7 +20,7 @@ HERE = arms.chain("PSM1").forward(HOME)
 
 
 class Client:
-    """Waits as crtk_python_client does: for busy, then for not busy, each told with a stamp after the order."""
+    """Waits as crtk_python_client does: for busy, then for not busy, each stamped after the command."""
 
     def __init__(self, rig):
         self.rig, self.newest = rig, -1
@@ -114,7 +114,7 @@ class TestLatchedCommands:
         rig.step(1, state_command=command("disable", 1_700_000_050_000_000_000))
         rig.step(200, state_command=home)
         assert rig.said("warning") == [
-            "PSM1: state_command 'home' of time 1700000000.123456789 s is refused: it was heeded before; a"
+            "PSM1: state_command 'home' of time 1700000000.123456789 s is refused: it was executed before; a"
             " new one has a new stamp"
         ]
         assert not rig.states()
@@ -143,7 +143,7 @@ class TestLatchedCommands:
         other.motion.restore(rig.motion.save())
         other.t = rig.t
         other.step(1, state_command=command("resume", 20)).step(1, state_command=command("pause", 10))
-        assert "heeded before" in other.said("warning")[0]
+        assert "executed before" in other.said("warning")[0]
 
     def test_one_that_the_state_refused_may_come_again(self):
         rig = Rig().step().step(1, state_command=command("resume", 10))
@@ -189,8 +189,8 @@ def test_what_an_arm_holds_is_told_once_at_time_0():
             "'CADIERE_FORCEPS:400049[..]', the arm holds LARGE_NEEDLE_DRIVER:400006[..]",
         ),
         ({"emulate_tool_present": BoolMessage(data=True)}, None),
-        ({"emulate_tool_present": BoolMessage(data=False)}, "nobody is there to take it off"),
-        ({"emulate_adapter_present": BoolMessage(data=False)}, "nobody is there to take it off"),
+        ({"emulate_tool_present": BoolMessage(data=False)}, "which cannot be removed"),
+        ({"emulate_adapter_present": BoolMessage(data=False)}, "which cannot be removed"),
     ],
 )
 def test_what_an_arm_holds_is_not_a_client_s_to_change(order, reason):
@@ -265,12 +265,19 @@ def test_the_kinematics_services_agree_with_what_is_told(arm):
     assert np.allclose(queries.inverse(told["local/measured_cp"], jp_told + 0.01).value, jp_told, atol=1e-9)
 
 
-READ = """operating_state desired_state goal_reached error warning status measured_js setpoint_js measured_cp setpoint_cp measured_cv local/measured_cp
-local/setpoint_cp local/measured_cv body/measured_cf spatial/measured_cf body/jacobian spatial/jacobian gravity_compensation/setpoint_js
-trajectory_j/ratio trajectory_j/ratio_v trajectory_j/ratio_a jaw/measured_js jaw/setpoint_js tool_type"""
-WRITTEN = """state_command hold free servo_jp servo_jr servo_jf servo_cp servo_cr servo_cs servo_ci body/servo_cf spatial/servo_cf move_jp move_jr move_cp
-use_gravity_compensation body/set_cf_orientation_absolute set_base_frame trajectory_j/set_ratio trajectory_j/set_ratio_v trajectory_j/set_ratio_a
-jaw/servo_jp jaw/move_jp jaw/servo_jf set_tool_type emulate_tool_present emulate_adapter_present"""
+READ = """
+operating_state desired_state goal_reached error warning status measured_js setpoint_js measured_cp
+setpoint_cp measured_cv local/measured_cp local/setpoint_cp local/measured_cv body/measured_cf
+spatial/measured_cf body/jacobian spatial/jacobian gravity_compensation/setpoint_js
+trajectory_j/ratio trajectory_j/ratio_v trajectory_j/ratio_a jaw/measured_js jaw/setpoint_js
+tool_type
+"""
+WRITTEN = """
+state_command hold free servo_jp servo_jr servo_jf servo_cp servo_cr servo_cs servo_ci body/servo_cf
+spatial/servo_cf move_jp move_jr move_cp use_gravity_compensation body/set_cf_orientation_absolute
+set_base_frame trajectory_j/set_ratio trajectory_j/set_ratio_v trajectory_j/set_ratio_a jaw/servo_jp
+jaw/move_jp jaw/servo_jf set_tool_type emulate_tool_present emulate_adapter_present
+"""
 
 
 @pytest.mark.parametrize(("names", "causality"), [(READ, "output"), (WRITTEN, "input")])

@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.motion.limits import FOLLOWING_ACCELERATION
-from controllers.motion.setpoint import Activity, Setpoint
+from controllers.motion.setpoint import FOLLOWING_ACCELERATION, Activity, Setpoint
 from robots.dvrk import arms
 
 H = 1e-3
@@ -181,7 +180,7 @@ def test_a_saved_state_goes_on_with_the_same_bits(goal, other, steps, order):
         order
     ]()
     run(made, 20)
-    again.state[:] = made.state
+    again.state.values[:] = made.state.values
     again.restored()
     assert (run(made, 300) == run(again, 300)).all()
 

@@ -87,8 +87,8 @@ def test_they_are_braked(name):
     before = rig.outputs["SUJ/PSM1/measured_js"].copy()
     rig.step(100, **{f"SUJ__PSM1__{name}": jp(*[0.1] * 6)})
     assert [m.data for m in rig.heard["SUJ/PSM1/warning"]] == [
-        f"SUJ/PSM1: {name} refused: the setup joints are braked; `setup_joints` of the scenario says where"
-        " they are"
+        f"SUJ/PSM1: {name} refused: the setup joints are braked; `setup_joints` of the scenario sets"
+        " their positions"
     ]
     assert (rig.outputs["SUJ/PSM1/measured_js"] == before).all()
     assert not rig.heard.get("SUJ/PSM2/warning")

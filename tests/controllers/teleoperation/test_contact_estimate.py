@@ -20,7 +20,7 @@ directions = (
 
 
 def estimate():
-    return ContactEstimate(np.zeros(ContactEstimate.SIZE))
+    return ContactEstimate()
 
 
 def press(surface, stiffness, normal, depths, dt=DT):
@@ -83,7 +83,7 @@ def test_it_claims_no_more_than_was_measured_but_for_what_fades_in_20_ms_and_the
 
 
 def test_what_shakes_about_zero_is_no_contact():
-    """As the coupling to tissue does in free air, where the hand comes in by jerks: 0.1 N each way, for 4 ms."""
+    """As the coupling to tissue does in free air when the hand moves in steps: 0.1 N each way, for 4 ms."""
     surface = estimate()
     for i in range(500):
         surface.update(np.array([0.0, 0.0, -1e-4 * i]), np.array([0.0, 0.0, 0.1 * (-1) ** i]), SCALE, DT)

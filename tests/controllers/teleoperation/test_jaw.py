@@ -21,7 +21,7 @@ def angles(made, gripper, count):
     found = []
     for _ in range(count):
         made.follow(gripper, H)
-        found.append(degrees(made.angle[0]))
+        found.append(degrees(made.angle))
     return np.array(found)
 
 
@@ -42,7 +42,7 @@ def test_it_goes_slowly_until_it_has_caught_up_and_quickly_from_then_on():
 
 def test_it_never_leaves_the_range_of_the_jaw():
     made = ghost(-500.0)
-    assert made.angle[0] == JAW.lower
+    assert made.angle == JAW.lower
     assert np.radians(angles(made, 0.0, 100)).min() == JAW.lower
     assert np.radians(angles(made, 7.0, 10_000)).max() == pytest.approx(JAW.upper)
 

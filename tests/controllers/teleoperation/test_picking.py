@@ -1,4 +1,4 @@
-"""A hand picks a needle up: down to it, jaw closed by the second button, up again; friction alone holds it."""
+"""A hand picks a needle up: down, close the jaw by the second button, up; friction alone holds it."""
 
 import pytest
 
@@ -24,11 +24,17 @@ participants:
           - {at: 0.6 s, buttons: [0, 1]}
           - {at: 1.4 s}
           - {at: 1.8 s, position: [0 mm, 0 mm, 1 mm]}
-  # The arm starts 19.5 mm above the needle, as in the scenario `pick`: the tip at [60, 0, -170] mm of its base, pointing down.
+  # As in the scenario `pick` the arm starts 19.5 mm above the needle: the tip at [60, 0, -170] mm of its
+  # base, pointing down.
   teleop: {kind: teleoperation, engage: held, scale: 0.5, instrument: "400006"}
   robot:
     kind: mujoco
-    arms: {PSM1: {instrument: "400006", position: [-60 mm, 0 mm, 200 mm], jaw: 15 deg, start: [0.3392926, 0, 186.77756 mm, 0, 0, -0.3392926]}}
+    arms:
+      PSM1:
+        instrument: "400006"
+        position: [-60 mm, 0 mm, 200 mm]
+        jaw: 15 deg
+        start: [0.3392926, 0, 186.77756 mm, 0, 0, -0.3392926]
     table: {position: [0 mm, 0 mm, 0 mm], size: [200 mm, 150 mm, 10 mm]}
     objects:
       needle: {kind: needle, position: [11.44 mm, 0 mm, 0.4 mm], orientation: [0, 0, 1, 0]}

@@ -149,7 +149,7 @@ def test_a_scale_that_cannot_be_is_refused_once_and_the_last_one_stays(scale):
     session.step(count=5)
     session.hand[0] += 0.0005
     assert np.allclose(session.step() - start, [0.0001, 0.0, 0.0], atol=1e-12)
-    assert session.warnings == [f"scale {scale:g} is refused, allowed are over 0 to 1; it stays 0.2"]
+    assert session.warnings == [f"scale {scale:g} is refused, allowed is above 0 and up to 1; it stays 0.2"]
 
 
 @pytest.mark.parametrize("orientation", ["hold", "follow"])

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.dvrk_console.controller import Console
-from controllers.dvrk_console.params import ConsoleParams
-from controllers.vrep import Paper, PaperParams
+from controllers.dvrk_console.controller import DvrkConsole
+from controllers.dvrk_console.params import DvrkConsoleParams
+from controllers.vrep import VrepScene, VrepSceneParams
 from devices.ros.params import GatewayParams
 from hub.participant import Stepped
 from hub.testing import run_in_process
@@ -62,8 +62,9 @@ def test_a_program_homes_all_arms_by_the_console_and_reads_what_the_console_says
     None
 ):
     controller = motion(arms=ARMS, mounting="cart")
-    console = Console(
-        "console", ConsoleParams.model_validate({"arms": ["PSM1", "PSM2"], "teleoperations": ["MTMR_PSM1"]})
+    console = DvrkConsole(
+        "console",
+        DvrkConsoleParams.model_validate({"arms": ["PSM1", "PSM2"], "teleoperations": ["MTMR_PSM1"]}),
     )
     gateway = MemoryGateway(
         "ros",
@@ -123,7 +124,7 @@ def test_a_program_for_the_authors_simulator_moves_an_arm() -> None:
 
     joined = ["ros.* -> paper.*", "paper.* -> ros.*", "paper.* -> robot.*", "robot.* -> paper.*"]
     play(
-        {"paper": Paper("paper", PaperParams.model_validate({"arms": ARMS})), "robot": robot},
+        {"paper": VrepScene("paper", VrepSceneParams.model_validate({"arms": ARMS})), "robot": robot},
         gateway,
         joined,
         programs,
