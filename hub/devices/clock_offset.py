@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["ClockOffset", "Exchange"]
+__all__ = ["ClockOffset", "ClockExchange"]
 
 _WINDOW = 16
 _DRIFT = 15e-6
@@ -18,7 +18,7 @@ _DRIFT = 15e-6
 
 
 @dataclass(frozen=True)
-class Exchange:
+class ClockExchange:
     """A question to the hub what time it is, and its answer."""
 
     asked_ns: int
@@ -50,13 +50,13 @@ class ClockOffset:
 
     def __init__(self) -> None:
         """Begin without an exchange."""
-        self._exchanges: tuple[Exchange, ...] = ()
-        self.best: Exchange | None = None
+        self._exchanges: tuple[ClockExchange, ...] = ()
+        self.best: ClockExchange | None = None
         """The exchange whose offset is least wrong, None before the first; it stays so until the next one, as
         all of them go wrong at the same pace.
         """
 
-    def add(self, exchange: Exchange) -> None:
+    def add(self, exchange: ClockExchange) -> None:
         """Take an exchange. One that cannot be true together with those before (a clock stood still or
         jumped) makes them forgotten.
         """

@@ -13,14 +13,14 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.planning.plan import Plan
-from hub.transport.rate_limit import Allowance
-from hub.transport.refusals import Drops
+from hub.transport.rate_limit import RateLimit
+from hub.transport.refusals import Refusals
 from schemas.codec import decode
 from schemas.errors import MessageError
 from schemas.keys import Keys
 from schemas.ros import DiagnosticStatus
 
-__all__ = ["Complaints"]
+__all__ = ["DiagnosticsLog"]
 
 log = logging.getLogger(__name__)
 
@@ -32,12 +32,12 @@ _RATE = 10.0
 """Diagnoses of one device that are looked at in a second."""
 
 
-class Complaints:
+class DiagnosticsLog:
     """Listens to the diagnoses of remote devices, whether or not they are connected to anything."""
 
-    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, drops: Drops) -> None:
-        """`drops` counts what is no diagnosis."""
-        self._drops = drops
+    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
+        """`refusals` counts what is no diagnosis."""
+        self._refusals = refusals
         ports = [
             (planned.name, port.name)
             for planned in plan.participants.values()
@@ -52,15 +52,15 @@ class Complaints:
         ]
 
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
-        allowance = Allowance(_RATE)
+        limit = RateLimit(_RATE)
 
         def hear(sample: zenoh.Sample) -> None:
             try:
-                if not allowance.spend(monotonic_ns()):
+                if not limit.allow(monotonic_ns()):
                     raise MessageError(f"more than {_RATE:g} diagnoses/s")
                 status = decode(DiagnosticStatus, sample.payload.to_bytes())
             except MessageError as error:
-                self._drops.count(sample, error)
+                self._refusals.refuse_sample(sample, error)
                 return
             said = " ".join(status.message.split())[:_LONGEST]  # on one line, whoever it is from
             if self._last.get(source) != (status.level, said):

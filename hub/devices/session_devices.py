@@ -12,25 +12,25 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.devices.diagnostics_log import Complaints
+from hub.devices.device_thread import DeviceThread
+from hub.devices.diagnostics_log import DiagnosticsLog
 from hub.devices.inlets import Inlets
-from hub.devices.loop import DeviceLoop
 from hub.devices.network_link_control import NetworkLinkControl
-from hub.devices.simulated import SimulatedDevices
+from hub.devices.simulated_devices import SimulatedDevices
 from hub.devices.uplink import DeviceUplink, Run
 from hub.observation.observers import Observers
 from hub.participant import Device, Sample
 from hub.planning.plan import Plan
 from hub.transport.envelope import Stamp
-from hub.transport.rate_limit import Allowance
+from hub.transport.rate_limit import RateLimit
 from hub.transport.reader import DeviceInputs
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import decode
 from schemas.errors import LateError, MessageError
 from schemas.keys import Keys
 from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
 
-__all__ = ["Intake"]
+__all__ = ["SessionDevices"]
 
 _SWITCH_S = 5e-4
 """How long a step may compute in Python before a device's sample is taken, instead of 5 ms: it brought the
@@ -41,12 +41,12 @@ _STATUSES = 10.0
 """How often the host of a device may tell of it, in a second; it does so once."""
 
 
-class Intake:
+class SessionDevices:
     """Takes what devices say, wherever they live, and hands it to the clock at each communication point."""
 
-    def __init__(self, plan: Plan, keys: Keys, run: int, drops: Drops, inlets: Inlets) -> None:
-        """`drops` counts what is refused."""
-        self._plan, self._keys, self._run, self._drops, self._inlets = plan, keys, run, drops, inlets
+    def __init__(self, plan: Plan, keys: Keys, run: int, refusals: Refusals, inlets: Inlets) -> None:
+        """`refusals` counts what is refused."""
+        self._plan, self._keys, self._run, self._refusals, self._inlets = plan, keys, run, refusals, inlets
         self._connected = {(inlet.source, inlet.source_port) for inlet in plan.from_devices}
         self._statuses: dict[str, DeviceStatus] = {}
         self._latencies: dict[str, list[Latency]] = {}
@@ -66,23 +66,23 @@ class Intake:
         self._observers = observers
         participants = self._plan.participants
         simulated = {name: device for name, device in devices.items() if participants[name].simulated_time}
-        self.simulated = SimulatedDevices(self._plan, simulated, feeds, self._drops)
+        self.simulated = SimulatedDevices(self._plan, simulated, feeds, self._refusals)
         self._loops = {
-            name: DeviceLoop(name, device, participants[name].read_ns, failed=failed)
+            name: DeviceThread(name, device, participants[name].read_ns, failed=failed)
             for name, device in devices.items()
             if name not in simulated
         }
         run = Run(self._plan, self._keys, self._run)
         self._uplinks = [
-            DeviceUplink(participants[name], run, session, loop, self._drops)
+            DeviceUplink(participants[name], run, session, loop, self._refusals)
             for name, loop in self._loops.items()
         ]
         for uplink, loop in zip(self._uplinks, self._loops.values(), strict=True):
             loop.attach(uplink)
         self.network_links = NetworkLinkControl(self._plan, session, self._keys, self.simulated.links)
-        self._complaints = Complaints(self._plan, self._keys, session, self._drops)
+        self._diagnostics = DiagnosticsLog(self._plan, self._keys, session, self._refusals)
         self._away = [m.name for m in participants.values() if m.role == "device" and m.host != "hub"]
-        self._status_allowance = Allowance(_STATUSES * (1.0 + len(participants)))
+        self._status_limit = RateLimit(_STATUSES * (1.0 + len(participants)))
         wall = [
             planned
             for planned in participants.values()
@@ -139,7 +139,7 @@ class Intake:
         try:
             self._offer(device, sample.port, payload, arrival_ns, stamp)
         except LateError as error:
-            self._drops.refuse(f"{device}.{sample.port}", error)
+            self._refusals.refuse(f"{device}.{sample.port}", error)
 
     def _offer(self, device: str, port: str, payload: bytes, now_ns: int, stamp: Stamp) -> None:
         enters = (device, port) in self._connected
@@ -149,25 +149,25 @@ class Intake:
             self._observers.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
-        allowance = Allowance(self._plan.participants[device].rate_limit)
+        limit = RateLimit(self._plan.participants[device].rate_limit)
 
         def take(sample: zenoh.Sample) -> None:
             now_ns = monotonic_ns()
             try:
-                if not allowance.spend(now_ns):
+                if not limit.allow(now_ns):
                     raise MessageError(
-                        f"device '{device}' sends more than {allowance.rate:g} messages/s on port '{port}'"
+                        f"device '{device}' sends more than {limit.rate:g} messages/s on port '{port}'"
                         " (rate_limit)"
                     )
                 self._offer(device, port, sample.payload.to_bytes(), now_ns, Stamp.of(sample))
             except MessageError as error:
-                self._drops.count(sample, error)
+                self._refusals.refuse_sample(sample, error)
 
         return Callback(take, indirect=False)
 
     def _told(self, sample: zenoh.Sample) -> None:
         try:
-            if not self._status_allowance.spend(monotonic_ns()):
+            if not self._status_limit.allow(monotonic_ns()):
                 raise MessageError("devices tell of themselves more often than they may")
             status = decode(DeviceStatus, sample.payload.to_bytes())
             if (
@@ -176,7 +176,7 @@ class Intake:
             ):
                 raise MessageError(f"tells of '{status.device}', which is no device of this name here")
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
             return
         # a new one: others may be looking through the old one
         self._statuses = {**self._statuses, status.device: status}
@@ -194,4 +194,4 @@ class Intake:
         self.simulated.close()
         for entity in (*self._subscribers, self.network_links):
             entity.undeclare()
-        self._complaints.close()
+        self._diagnostics.close()

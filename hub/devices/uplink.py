@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from zenoh.handlers import Callback
 
 from hub.devices.clock_offset import ClockOffset
-from hub.devices.loop import DeviceLoop
+from hub.devices.device_thread import DeviceThread
 from hub.devices.network_link import Line, NetworkLink, NetworkLinkOrder, in_words
 from hub.observation.latency import Latencies
 from hub.participant import Sample, Value
@@ -26,7 +26,7 @@ from hub.transport.bundle import bundled, unpacked
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Stamp, Tag
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import decode, encode
 from schemas.errors import MessageError
 from schemas.keys import Keys
@@ -61,12 +61,18 @@ class DeviceUplink:
         planned: PlannedParticipant,
         run: Run,
         session: zenoh.Session,
-        loop: DeviceLoop,
-        drops: Drops,
+        loop: DeviceThread,
+        refusals: Refusals,
         offset: ClockOffset | None = None,
     ) -> None:
         """Take the device's loop; `offset` stays away in the hub's own process, whose clock is the hub's."""
-        self._member, self._run, self._loop, self._drops, self._offset = planned, run, loop, drops, offset
+        self._member, self._run, self._loop, self._refusals, self._offset = (
+            planned,
+            run,
+            loop,
+            refusals,
+            offset,
+        )
         self._link = NetworkLink(planned.network_link)
         self._latencies = Latencies()
         self._told_ns = -_STATUS_NS
@@ -112,7 +118,7 @@ class DeviceUplink:
 
     def _inflow(self, outlet: ConnectionToDevice) -> _Inflow:
         inflow = _Inflow(
-            outlet, self._run, self._link, self._loop, self._drops, self._latencies, self._offset
+            outlet, self._run, self._link, self._loop, self._refusals, self._latencies, self._offset
         )
         self._inflows.append(inflow)
         return inflow
@@ -131,7 +137,7 @@ class DeviceUplink:
                 try:
                     feed.take(sample, self._run.number)
                 except MessageError as error:
-                    self._drops.count(sample, error)
+                    self._refusals.refuse_sample(sample, error)
 
     def exchange(self, t: int, samples: list[Sample]) -> bool:
         """Send what the device said at `t` (ns since the loop's start), and hand on what has arrived over the
@@ -178,7 +184,7 @@ class DeviceUplink:
                 NetworkLinkOrder.model_validate_json(decode(StringMessage, sample.payload.to_bytes()).data)
             )
         except (MessageError, ValidationError) as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
 
     def close(self) -> None:
         """Tell the hub a last time how it was, and send and take no more."""
@@ -238,8 +244,8 @@ class _Inflow:
         outlet: ConnectionToDevice,
         run: Run,
         link: NetworkLink,
-        loop: DeviceLoop,
-        drops: Drops,
+        loop: DeviceThread,
+        refusals: Refusals,
         latencies: Latencies,
         offset: ClockOffset | None,
     ) -> None:
@@ -254,10 +260,10 @@ class _Inflow:
             target.name,
             f"{outlet.source}.{outlet.source_port} -> {outlet.target}.{target.name}",
         )
-        self._link, self._loop, self._drops, self._latencies, self._offset = (
+        self._link, self._loop, self._refusals, self._latencies, self._offset = (
             link,
             loop,
-            drops,
+            refusals,
             latencies,
             offset,
         )
@@ -281,7 +287,7 @@ class _Inflow:
     def _write(self, tag: Tag, value: Value) -> None:
         if (tag.step, tag.index) <= self._newest:
             if tag.step > INITIAL:  # the value at time 0 is repeated until every host has it
-                self._drops.refuse(
+                self._refusals.refuse(
                     self._stream,
                     f"the value of step {tag.step} comes late: that of step {self._newest[0]} was here"
                     " before it",
@@ -291,7 +297,7 @@ class _Inflow:
         try:
             self._loop.write(self._port, value)
         except MessageError as error:
-            self._drops.refuse(self._stream, error)
+            self._refusals.refuse(self._stream, error)
             return
         now_ns = monotonic_ns()
         best = None if self._offset is None else self._offset.best

@@ -22,8 +22,8 @@ from time import sleep
 import zenoh
 from zenoh.handlers import Callback, FifoChannel
 
-from hub.devices.clock_watch import ClockWatch
-from hub.devices.loop import DeviceLoop
+from hub.devices.clock_sync import ClockSync
+from hub.devices.device_thread import DeviceThread
 from hub.devices.uplink import DeviceUplink, Run
 from hub.hosting.host import Host
 from hub.hosting.interrupt import Interrupt
@@ -32,10 +32,10 @@ from hub.planning.plan import PlannedParticipant
 from hub.planning.registry import make
 from hub.remote.device_host import DeviceHost
 from hub.remote.hub_connection import reach
-from hub.transport.control_client import ask, present
+from hub.transport.control_client import ask, join_session
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.lane import may_spin
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from hub.transport.wire import Wire
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
@@ -72,7 +72,7 @@ def run_host(
     """
     request = JoinRequest(host=host, pid=os.getpid())
     with reach(endpoint, host.removeprefix("remote/"), certificates, mode="peer") as session:
-        reply = present(session, Keys(session_name), request)
+        reply = join_session(session, Keys(session_name), request)
         keys = Keys(reply.session)
         with _ending_with_hub(session, keys):
             connect = partial(reach, endpoint, host.removeprefix("remote/"), certificates)
@@ -134,12 +134,12 @@ class _JoinedHost:
         refused = session.declare_publisher(
             keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
         )
-        self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
+        self._refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
         self._wire = Wire(
             session,
             keys,
             reply.run,
-            self._drops,
+            self._refusals,
             host,
             spin=may_spin(len(plan.hosts())),
             watched=reply.watched,
@@ -164,17 +164,19 @@ class _JoinedHost:
         for device in devices.values():
             device.learn_hub(connect)
         self._loops = {
-            name: DeviceLoop(name, device, plan.participants[name].read_ns, failed=self._device_failed)
+            name: DeviceThread(name, device, plan.participants[name].read_ns, failed=self._device_failed)
             for name, device in devices.items()
         }
         self._stack = contextlib.ExitStack()
         if devices:
             clock, run = (
-                self._stack.enter_context(ClockWatch(session, keys)),
+                self._stack.enter_context(ClockSync(session, keys)),
                 Run(plan, keys, reply.run, reply.admission),
             )
             for name, loop in self._loops.items():
-                uplink = DeviceUplink(plan.participants[name], run, session, loop, self._drops, clock.offset)
+                uplink = DeviceUplink(
+                    plan.participants[name], run, session, loop, self._refusals, clock.offset
+                )
                 self._stack.callback(uplink.close)
                 loop.attach(uplink)
         self._tokens = [
@@ -251,7 +253,7 @@ class _JoinedHost:
                     f" {self._next_step} is next"
                 )
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
             return None
         self._next_step = grant.horizon_ns // self._step_ns
         return grant

@@ -14,7 +14,7 @@ from time import monotonic, monotonic_ns
 from hub.hosting.blas import pin_blas
 from hub.planning.plan import Plan
 
-__all__ = ["Fleet", "Watchdog"]
+__all__ = ["HostProcesses", "Watchdog"]
 
 log = logging.getLogger(__name__)
 
@@ -25,7 +25,7 @@ _END_S = 3.0
 """How long a process may take to close its participants before it is killed."""
 
 
-class Fleet:
+class HostProcesses:
     """The host processes that this hub has started."""
 
     def __init__(self) -> None:
@@ -92,7 +92,7 @@ class Watchdog:
     def __init__(
         self,
         plan: Plan,
-        fleet: Fleet,
+        processes: HostProcesses,
         answer_limit_ns: int,
         awaited: Callable[[], str | None],
         failed: Callable[[str, str], None],
@@ -101,7 +101,7 @@ class Watchdog:
         name and the cause.
         """
         self._plan = plan
-        self._fleet = fleet
+        self._processes = processes
         self._limit_ns = answer_limit_ns
         self._awaited = awaited
         self._failed = failed
@@ -126,7 +126,7 @@ class Watchdog:
                 return
 
     def _look(self) -> tuple[str, str] | None:
-        for host, how in self._fleet.dead().items():
+        for host, how in self._processes.dead().items():
             names = [name for name in self._plan.participants if self._plan.participants[name].host == host]
             missing = [name for name in self._waiting if name in names] or names
             others = (

@@ -15,14 +15,14 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.devices.clock_watch import ClockWatch
-from hub.devices.loop import DeviceLoop
+from hub.devices.clock_sync import ClockSync
+from hub.devices.device_thread import DeviceThread
 from hub.devices.uplink import DeviceUplink, Run
 from hub.participant import Device
 from hub.planning.registry import make
-from hub.transport.control_client import ask, present
+from hub.transport.control_client import ask, join_session
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import ConnectError, MessageError, ParticipantError
 from schemas.keys import Keys
@@ -60,7 +60,7 @@ class DeviceHost:
             request,
             directory,
         )
-        self._loop: DeviceLoop | None = None
+        self._loop: DeviceThread | None = None
         self._held: tuple[Any, ...] = ()
         self._failure: ParticipantError | None = None
         self._over = threading.Event()
@@ -77,7 +77,7 @@ class DeviceHost:
             while True:
                 try:
                     with self._connect() as session:
-                        reply = present(session, self._keys, self._request)
+                        reply = join_session(session, self._keys, self._request)
                         joined, told = True, ""
                         self._take_part(session, reply)
                     log.warning(
@@ -109,7 +109,7 @@ class DeviceHost:
             refused = session.declare_publisher(
                 keys.refused("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR
             )
-            drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
+            refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
             try:
                 loop = self._device_loop(reply)
             except ParticipantError as error:
@@ -118,8 +118,8 @@ class DeviceHost:
                     self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}),
                 )
                 raise
-            clock = stack.enter_context(ClockWatch(session, keys))
-            uplink = DeviceUplink(planned, run, session, loop, drops, clock.offset)
+            clock = stack.enter_context(ClockSync(session, keys))
+            uplink = DeviceUplink(planned, run, session, loop, refusals, clock.offset)
             stack.callback(uplink.close)
             loop.attach(uplink)
             token = session.liveliness().declare_token(keys.alive("device", self._name))
@@ -137,7 +137,7 @@ class DeviceHost:
                 )
                 raise self._failure
 
-    def _device_loop(self, reply: JoinReply) -> DeviceLoop:
+    def _device_loop(self, reply: JoinReply) -> DeviceThread:
         """Return the loop of the device, which stays open from one run to the next unless the scenario wants
         another one.
         """
@@ -152,7 +152,7 @@ class DeviceHost:
                 raise ParticipantError(self._name, -1, f"'{planned.kind}' is no device here")
             device.learn_hub(self._connect)
             self._loop, self._held = (
-                DeviceLoop(self._name, device, planned.read_ns, failed=self._device_failed),
+                DeviceThread(self._name, device, planned.read_ns, failed=self._device_failed),
                 wanted,
             )
             self._loop.start(directory)

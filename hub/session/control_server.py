@@ -16,7 +16,7 @@ from hub.devices.network_link_control import NetworkLinkControl, NetworkLinkRequ
 from hub.session.run_state import RunState
 from hub.transport.control_messages import ClockReply, Empty, JoinRequest, Refusal, SetRequest, StepRequest
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import decode, encode, message_type
 from schemas.errors import MessageError, TrocarError
 from schemas.keys import Keys
@@ -46,12 +46,12 @@ class ControlServer:
         inlets: Inlets,
         network_links: NetworkLinkControl,
         joins: Joins,
-        drops: Drops,
+        refusals: Refusals,
     ) -> None:
         """Steer `state`, write into `inlets`, change links and let hosts join; what is refused is counted in
-        `drops`.
+        `refusals`.
         """
-        self._drops = drops
+        self._refusals = refusals
         self._inlets = inlets
         self._queryables = [
             self._declare(
@@ -97,7 +97,7 @@ class ControlServer:
                     reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
                     reason = _reason(error)
-                    self._drops.refuse(key, reason)
+                    self._refusals.refuse(key, reason)
                     reply = Refusal(refused=reason)
                 query.reply(
                     at,

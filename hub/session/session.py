@@ -13,11 +13,10 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.devices.inlets import Inlets
-from hub.devices.session_devices import Intake
+from hub.devices.session_devices import SessionDevices
 from hub.hosting.host import Host
-from hub.hosting.host_processes import Fleet, Watchdog
+from hub.hosting.host_processes import HostProcesses, Watchdog
 from hub.hosting.interrupt import Interrupt
-from hub.observation.bookkeeping import Account
 from hub.observation.measures import Measures
 from hub.observation.observers import Observers
 from hub.observation.summary import Progress, Summary
@@ -26,14 +25,15 @@ from hub.planning.bond_check import check_bonds
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
-from hub.session.acks import Acks
+from hub.session.ack_receiver import AckReceiver
+from hub.session.bookkeeping import Bookkeeping
 from hub.session.clock import Clock
 from hub.session.control_server import ControlServer
-from hub.session.membership import Failures, Membership
+from hub.session.joined_hosts import Failures, JoinedHosts
 from hub.session.run_state import RunState
 from hub.transport.endpoints import free_endpoint, require_loopback
 from hub.transport.lane import may_spin
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
 from schemas.codec import decode, encode
@@ -91,9 +91,9 @@ class Session:
         self._keys = Keys(scenario.name)
         steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
         self._clock = Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
-        self._drops = Drops()
+        self._refusals = Refusals()
         self._inlets = Inlets(plan)
-        self._intake = Intake(plan, self._keys, self._run_id, self._drops, self._inlets)
+        self._devices = SessionDevices(plan, self._keys, self._run_id, self._refusals, self._inlets)
         self._away = {name for name in plan.order if plan.participants[name].host != "hub"}
         self._common_period = math.lcm(*(plan.participants[name].period for name in plan.order))
         self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
@@ -118,23 +118,23 @@ class Session:
                 self._observers = Observers(
                     self.plan, self._keys, self._run_id, Measures(self.scenario, self.plan), recorder
                 )
-                self._account = Account(
+                self._bookkeeping = Bookkeeping(
                     self.scenario,
                     self.plan,
                     self._run_id,
                     self._clock,
-                    self._drops,
+                    self._refusals,
                     self._observers,
-                    self._intake,
+                    self._devices,
                 )
                 self._open(session)
                 try:
                     if self._gate is not None:
                         self._gate.open(self.endpoint)
                     self._start_and_step(progress)
-                    self._account.phase = "done"
+                    self._bookkeeping.phase = "done"
                 except SessionError as error:
-                    self._account.detail = str(error)
+                    self._bookkeeping.detail = str(error)
                     # at once: it may take a while until all have closed
                     log.error("ending the session: %s", error)
                     raise
@@ -142,7 +142,7 @@ class Session:
                     self._close()
         finally:
             recorded = recorder.close() if recorder is not None else None
-        return self._account.summary(recorded)
+        return self._bookkeeping.summary(recorded)
 
     def _start_and_step(self, progress: Callable[[Progress], None] | None) -> None:
         """Run, and let nothing interrupt what comes after: one failure brings others, which may be told at
@@ -163,9 +163,9 @@ class Session:
     def _open(self, session: zenoh.Session) -> None:
         """Declare everything on `session`, and lay out what runs in this process."""
         keys = self._keys
-        self._acks = Acks(session, keys, self.plan, self._run_id, self._drops)
+        self._acks = AckReceiver(session, keys, self.plan, self._run_id, self._refusals)
         self._failures = Failures(wake=self._wake)
-        self._membership = Membership(
+        self._joined_hosts = JoinedHosts(
             self.scenario,
             self.plan,
             self._directory,
@@ -196,24 +196,24 @@ class Session:
                 keys,
                 self.state,
                 self._inlets,
-                self._intake.network_links,
-                self._membership,
-                self._drops,
+                self._devices.network_links,
+                self._joined_hosts,
+                self._refusals,
             ),
             session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused_elsewhere)),
             *(session.declare_subscriber(key, watch) for key in self._observers.away),
         ]
         self._token = session.liveliness().declare_token(keys.alive("hub", "hub"))
-        self._fleet = Fleet()
+        self._processes = HostProcesses()
         self._watchdog = Watchdog(
-            self.plan, self._fleet, self.scenario.answer_limit, lambda: self._host.awaited, self._fail
+            self.plan, self._processes, self.scenario.answer_limit, lambda: self._host.awaited, self._fail
         )
 
     def _lay_local(self, session: zenoh.Session) -> None:
         stepped = {name: p for name, p in self._participants.items() if isinstance(p, Stepped)}
         tap = self._observers.value if self._observers.watches_values else None
         wire = Wire(
-            session, self._keys, self._run_id, self._drops, "hub", spin=may_spin(len(self.plan.hosts()))
+            session, self._keys, self._run_id, self._refusals, "hub", spin=may_spin(len(self.plan.hosts()))
         )
         self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
         devices = (
@@ -223,18 +223,18 @@ class Session:
         )
         for device in devices.values():
             device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
-        self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
+        self._devices.lay(session, devices, self._host.feeds, self._observers, self._fail)
 
     def _start(self) -> None:
         """Start the hosts, wait until all participants are configured and every link has carried a value."""
         hosts = [host for host in self.plan.hosts() if host != "hub" and self._is_needed(host)]
         for host in hosts:
             if not host.startswith("remote/"):
-                self._fleet.start(host, self.endpoint, self.scenario.name)
+                self._processes.start(host, self.endpoint, self.scenario.name)
         bonds = self._host.configure(self._directory)
-        self._intake.open(self._directory)
+        self._devices.open(self._directory)
         self._await_hosts(hosts)
-        check_bonds(self.plan, {**bonds, **self._membership.bonds()})
+        check_bonds(self.plan, {**bonds, **self._joined_hosts.bonds()})
         self._await_links()
 
     def _is_needed(self, host: str) -> bool:
@@ -246,7 +246,7 @@ class Session:
         doors = ", ".join((self.endpoint, *(self._gate.endpoints if self._gate is not None else ())))
         deadline = monotonic() + limit_s
         told: list[str] = []
-        while missing := self._membership.missing(hosts):
+        while missing := self._joined_hosts.missing(hosts):
             self._check()
             if self.state.ending:
                 raise SessionError(f"shut down while waiting for {', '.join(missing)} to join")
@@ -272,7 +272,7 @@ class Session:
         self._watchdog.wait_for(())
 
     def _loop(self, progress: Callable[[Progress], None] | None) -> None:
-        self._account.start()
+        self._bookkeeping.start()
         shown = told = 0.0
         self._clock.start()
         while not self._clock.done and not self.state.ending:
@@ -288,24 +288,24 @@ class Session:
             now = monotonic()
             if progress is not None and now - shown > _PROGRESS_S:
                 shown = now
-                progress(self._account.progress())
+                progress(self._bookkeeping.progress())
             if now - told > _STATUS_S:
                 told = now
                 self._tell_status()
-        self._account.stop()
+        self._bookkeeping.stop()
         self._host.drain()
         self._settle()
         if progress is not None:
-            progress(self._account.progress())
+            progress(self._bookkeeping.progress())
 
     def _wait_while_paused(self) -> None:
         self._settle()
         # after the reports are booked: a status that says so tells the steps taken
-        self._account.phase = "paused"
+        self._bookkeeping.phase = "paused"
         self._tell_status()
         while not self.state.wait(0.2):
             self._check()
-        self._account.phase = "running"
+        self._bookkeeping.phase = "running"
         self._clock.start()
 
     def _next_grant(self, budget: int | None) -> Grant | None:
@@ -326,7 +326,7 @@ class Session:
             )
         step, time_ns = self._clock.step, self._clock.time_ns
         horizon_ns = time_ns + self._clock.horizon(budget) * self.plan.step_ns
-        return Grant(self._run_id, 0, step, time_ns, horizon_ns, self._intake.enter(time_ns, step))
+        return Grant(self._run_id, 0, step, time_ns, horizon_ns, self._devices.enter(time_ns, step))
 
     def _step(self, grant: Grant) -> None:
         """Publish a grant, take part in it, and wait until everybody else has.
@@ -352,7 +352,7 @@ class Session:
                 waiting.remove(accepted[0].name)
                 self._acks_to_book.append(accepted)
         self._watchdog.wait_for(())
-        self._account.acknowledged(granted_ns)
+        self._bookkeeping.acknowledged(granted_ns)
         if self._clock.realtime:
             self._settle()  # now rather than when the next sample of a device waits
         count = (grant.horizon_ns - grant.start_ns) // self.plan.step_ns
@@ -381,23 +381,23 @@ class Session:
 
     def _take(self, planned: PlannedParticipant, ack: Ack, payload: bytes | None) -> None:
         """Book what a participant reports: its hashes, its last step, the work of its bonds."""
-        self._observers.ack(planned, ack, self._account.book(planned, ack), payload)
+        self._observers.ack(planned, ack, self._bookkeeping.book(planned, ack), payload)
         if self._on_ack is not None:
             self._on_ack(planned, ack)
 
     def _close(self) -> None:
         """End processes and close everything; the hosts end when the hub's token is gone."""
         self._settle()
-        if self._account.phase != "done":
-            self._account.phase = "failed"
+        if self._bookkeeping.phase != "done":
+            self._bookkeeping.phase = "failed"
         self._tell_status()
         self._watchdog.end()
         self._token.undeclare()
         if self._gate is not None:
             self._gate.close()
-        self._intake.close()
+        self._devices.close()
         self._host.close()
-        self._fleet.end()
+        self._processes.end()
         for entity in self._entities:
             entity.undeclare()
 
@@ -439,12 +439,12 @@ class Session:
             return
         if sample.kind != zenoh.SampleKind.DELETE:
             if planned.role == "device":
-                self._intake.network_links.repeat(name)
+                self._devices.network_links.repeat(name)
             return
-        self._membership.lose(planned.host)
+        self._joined_hosts.lose(planned.host)
         if planned.role == "device":
-            self._intake.forget(name)
-        if self._account.phase not in ("starting", "running", "paused"):
+            self._devices.forget(name)
+        if self._bookkeeping.phase not in ("starting", "running", "paused"):
             return
         if planned.role == "device":
             log.warning(
@@ -460,19 +460,19 @@ class Session:
         """Count what another host had to drop; it has logged why."""
         try:
             decode(StringMessage, sample.payload.to_bytes())
-            self._drops.add(str(sample.key_expr))
+            self._refusals.add(str(sample.key_expr))
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
 
     def _answer_status(self, query: zenoh.Query) -> None:
         with query:
             query.reply(
                 self._keys.status,
-                encode(self._account.status(self._membership.pid)),
+                encode(self._bookkeeping.status(self._joined_hosts.pid)),
                 encoding=zenoh.Encoding.APPLICATION_CDR,
             )
 
     def _tell_status(self) -> None:
-        status = self._account.status(self._membership.pid)
+        status = self._bookkeeping.status(self._joined_hosts.pid)
         self._observers.status(status)
         self._status_publisher.put(encode(status))

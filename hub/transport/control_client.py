@@ -14,7 +14,7 @@ from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
 from schemas.ros import StringMessage
 
-__all__ = ["ask", "present"]
+__all__ = ["ask", "join_session"]
 
 _PATIENCE_S = 5.0
 
@@ -48,7 +48,7 @@ def ask(
     )
 
 
-def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
+def join_session(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
     """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask`
     raises.
     """

@@ -17,7 +17,7 @@ __all__ = [
     "free_endpoint",
     "is_loopback",
     "listening_endpoints",
-    "parted",
+    "split_endpoints",
     "require_loopback",
 ]
 
@@ -56,7 +56,7 @@ def _answers(address: str, port: int) -> bool:
         return probe.connect_ex((address, port)) == 0
 
 
-def parted(endpoints: Iterable[str]) -> tuple[str, list[str]]:
+def split_endpoints(endpoints: Iterable[str]) -> tuple[str, list[str]]:
     """Return the loopback endpoint of a hub, a free one if `endpoints` has none, and those at which its gate
     listens to other machines.
 

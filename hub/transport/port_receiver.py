@@ -10,7 +10,7 @@ from zenoh.handlers import FifoChannel
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
@@ -23,10 +23,10 @@ class PortReceiver:
     dropped and counted.
     """
 
-    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, drops: Drops) -> None:
+    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, refusals: Refusals) -> None:
         self._codec = PortCodec(port)
         self._run = run
-        self._drops = drops
+        self._refusals = refusals
         self._newest = self._batch_step = INITIAL - 1
         self._batch: tuple[Message, ...] = ()
         self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
@@ -58,7 +58,7 @@ class PortReceiver:
             payload = sample.payload.to_bytes()
             value = self._batched(tag, payload) if self._codec.is_event else self._codec.decode(payload)
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
             return None
         if value is None:
             return None

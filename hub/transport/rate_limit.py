@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-__all__ = ["Allowance"]
+__all__ = ["RateLimit"]
 
 
-class Allowance:
+class RateLimit:
     """A bucket that fills at a rate, at most with the messages of a second."""
 
     def __init__(self, rate: float) -> None:

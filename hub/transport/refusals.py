@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 import zenoh
 
-__all__ = ["Drops"]
+__all__ = ["Refusals"]
 
 log = logging.getLogger(__name__)
 
 
-class Drops:
+class Refusals:
     """Counts what was refused, per key, and logs each key's first refusals with their source. For use from
     any thread.
     """

@@ -13,7 +13,7 @@ from hub.transport.cells import RemoteCell
 from hub.transport.lane import LaneReceiver, LaneSender, has_lane, lane_address
 from hub.transport.port_publisher import PortPublisher
 from hub.transport.port_receiver import PortReceiver
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.keys import Keys
 from schemas.ports import Port
 
@@ -28,7 +28,7 @@ class Wire:
         session: zenoh.Session,
         keys: Keys,
         run: int,
-        drops: Drops,
+        refusals: Refusals,
         host: str,
         *,
         spin: bool,
@@ -45,7 +45,7 @@ class Wire:
         self.session = session
         self.keys = keys
         self.run = run
-        self.drops = drops
+        self.refusals = refusals
         self._publishers: list[PortPublisher] = []
         self._bundles: list[Bundle] = []
         self._receivers: list[PortReceiver | LaneReceiver] = []
@@ -109,7 +109,7 @@ class Wire:
                 self.keys.output(planned.key_role, planned.name, port.name),
                 port,
                 self.run,
-                self.drops,
+                self.refusals,
             )
             heard = None  # whoever watches it subscribes to it
         self._receivers.append(receiver)

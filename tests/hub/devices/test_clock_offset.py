@@ -4,14 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hub.devices.clock_offset import ClockOffset, Exchange
+from hub.devices.clock_offset import ClockExchange, ClockOffset
 
 S, MS = 10**9, 10**6
 
 
 def exchange(asked, offset, there, back, thinking=1000):
     received = asked + there + offset
-    return Exchange(asked, received, received + thinking, asked + there + thinking + back)
+    return ClockExchange(asked, received, received + thinking, asked + there + thinking + back)
 
 
 @given(st.integers(-(10**15), 10**15), st.integers(0, 50 * MS), st.integers(0, 50 * MS))

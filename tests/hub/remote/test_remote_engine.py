@@ -7,8 +7,8 @@ import pytest
 
 from hub.planning.scenario_file import load
 from hub.security.access import access_settings
+from hub.session.joined_hosts import JoinedHosts
 from hub.session.launch import launch, plan_of
-from hub.session.membership import Membership
 from hub.transport.control_messages import JoinRequest
 from hub.transport.endpoints import free_endpoint
 from schemas.errors import ConnectError
@@ -97,13 +97,13 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     assert set(seen.participants) == {"hand", "deaf"}
     assert [port.name for port in seen.participants["deaf"].ports] == ["hand"]
     assert (seen.links, len(seen.inlets)) == ((), 1)
-    membership = Membership(
+    joined_hosts = JoinedHosts(
         file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None
     )
-    reply = membership.join(JoinRequest(host="remote/hand", pid=1))
+    reply = joined_hosts.join(JoinRequest(host="remote/hand", pid=1))
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])
     assert reply.plan == seen
-    assert membership.join(JoinRequest(host="other", pid=2)).plan == plan
+    assert joined_hosts.join(JoinRequest(host="other", pid=2)).plan == plan
 
 
 def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded):

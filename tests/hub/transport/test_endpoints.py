@@ -39,16 +39,16 @@ def test_a_gate_is_not_taken_for_a_hub(monkeypatch):
 
 
 def test_the_hub_stays_on_loopback_beside_its_gate(taken):
-    inside, outside = endpoint.parted(["tls/0.0.0.0:7447"])
+    inside, outside = endpoint.split_endpoints(["tls/0.0.0.0:7447"])
     assert outside == ["tls/0.0.0.0:7447"]
     assert is_loopback(inside)
     assert endpoint.address(inside)[1] != 7447
-    assert endpoint.parted(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == (
+    assert endpoint.split_endpoints(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == (
         "tcp/127.0.0.1:5",
         ["tls/0.0.0.0:6", "tls/[::]:6"],
     )
     with pytest.raises(ScenarioError, match="once on loopback"):
-        endpoint.parted(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
+        endpoint.split_endpoints(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
 
 
 @pytest.mark.parametrize(

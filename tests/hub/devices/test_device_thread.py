@@ -5,7 +5,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from hub.devices.loop import DeviceLoop
+from hub.devices.device_thread import DeviceThread
 from hub.participant import Sample
 from schemas.errors import MessageError, ParticipantError
 from schemas.ros import Float64Message, Joy
@@ -55,7 +55,7 @@ def start():
 
     def start(pen, period_ns=MS):
         failures = []
-        loop = DeviceLoop("pen", pen, period_ns, failed=lambda *failure: failures.append(failure))
+        loop = DeviceThread("pen", pen, period_ns, failed=lambda *failure: failures.append(failure))
         loops.append(loop)
         loop.start(Path.cwd())
         return loop, failures
@@ -113,7 +113,7 @@ def test_a_device_that_cannot_be_opened_says_so():
             raise OSError("no such device")
 
     with pytest.raises(ParticipantError, match=r"participant 'pen' failed.*cannot be opened: no such device"):
-        DeviceLoop("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())
+        DeviceThread("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())
 
 
 class Doorbell(Pen):

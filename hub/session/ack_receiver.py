@@ -9,12 +9,12 @@ import zenoh
 from zenoh.handlers import FifoChannel
 
 from hub.planning.plan import Plan, PlannedParticipant
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
 from schemas.lockstep import Ack, Grant, unpack_ack
 
-__all__ = ["Accepted", "Acks"]
+__all__ = ["Accepted", "AckReceiver"]
 
 Accepted = tuple[PlannedParticipant, Ack, bytes]
 """Who reports what, and the bytes of it."""
@@ -22,11 +22,11 @@ Accepted = tuple[PlannedParticipant, Ack, bytes]
 _NO_STEPS: Mapping[str, int] = {}
 
 
-class Acks:
+class AckReceiver:
     """The acks of one run. Whatever is none of it is dropped and counted."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, drops: Drops) -> None:
-        self._session, self._key, self._run, self._drops = session, keys.ack("hub"), run, drops
+    def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, refusals: Refusals) -> None:
+        self._session, self._key, self._run, self._refusals = session, keys.ack("hub"), run, refusals
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
@@ -67,7 +67,7 @@ class Acks:
             if planned.name not in waiting or ack.step != step:
                 raise MessageError(f"reports on step {ack.step}, for which nobody waits")
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
             return None
         return planned, ack, payload
 

@@ -12,7 +12,7 @@ from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import ParticipantError
 
@@ -31,14 +31,14 @@ class SimulatedDevices:
     """
 
     def __init__(
-        self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, DeviceInputs], drops: Drops
+        self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, DeviceInputs], refusals: Refusals
     ) -> None:
-        """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a
+        """Take the devices, and by their names what feeds them; `refusals` counts what comes late because of a
         link.
         """
         meetings = {planned.name for planned in plan.meetings()}
         self._devices = [
-            _Simulated(plan.participants[n], device, feeds[n], n in meetings, drops)
+            _SimulatedDevice(plan.participants[n], device, feeds[n], n in meetings, refusals)
             for n, device in devices.items()
         ]
         self.links = {device.name: device.link for device in self._devices}
@@ -68,15 +68,15 @@ class SimulatedDevices:
             one.device.close()
 
 
-class _Simulated:
+class _SimulatedDevice:
     """One device, its link, and how far its samples have been counted."""
 
     def __init__(
-        self, planned: PlannedParticipant, device: Device, feed: DeviceInputs, meets: bool, drops: Drops
+        self, planned: PlannedParticipant, device: Device, feed: DeviceInputs, meets: bool, refusals: Refusals
     ) -> None:
         self.name, self.planned, self.device, self.meets = planned.name, planned, device, meets
         self.link = NetworkLink(planned.network_link)
-        self._feed, self._drops = feed, drops
+        self._feed, self._refusals = feed, refusals
         self._ports = {port.name: port for port in planned.ports}
         self._sequence = dict.fromkeys(self._ports, 0)
         self._newest_ns = dict.fromkeys(self._ports, INITIAL)
@@ -96,7 +96,7 @@ class _Simulated:
     def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
         newest_ns = self._newest_ns[port]
         if valid_ns < newest_ns:
-            self._drops.refuse(
+            self._refusals.refuse(
                 f"{self.name}.{port}",
                 f"the value of {valid_ns / 1e9:g} s comes late: that of {newest_ns / 1e9:g} s was here"
                 " before it",

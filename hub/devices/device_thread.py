@@ -11,12 +11,12 @@ from pathlib import Path
 from time import monotonic_ns
 from typing import Protocol
 
-from hub.devices.simulated import open_device
+from hub.devices.simulated_devices import open_device
 from hub.participant import Device, Sample, Value
 from schemas.errors import MessageError
 from schemas.ros import DiagnosticStatus, Joy
 
-__all__ = ["DeviceLoop", "Uplink"]
+__all__ = ["DeviceThread", "Uplink"]
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ class Uplink(Protocol):
         ...
 
 
-class DeviceLoop:
+class DeviceThread:
     """Reads a device at its period; what it says goes to the uplink that is attached, and to nobody while
     there is none.
     """

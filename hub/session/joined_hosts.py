@@ -16,7 +16,7 @@ from schemas.errors import MessageError, ParticipantError
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
 
-__all__ = ["Failures", "Membership"]
+__all__ = ["Failures", "JoinedHosts"]
 
 
 class Failures:
@@ -43,7 +43,7 @@ class Failures:
             raise self.first
 
 
-class Membership:
+class JoinedHosts:
     """The hosts of a session other than the hub's own."""
 
     def __init__(

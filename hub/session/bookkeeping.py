@@ -9,22 +9,22 @@ import struct
 from collections.abc import Callable
 from time import monotonic_ns
 
-from hub.devices.session_devices import Intake
+from hub.devices.session_devices import SessionDevices
 from hub.observation.latency import Histogram, by_way
 from hub.observation.observers import Observers
 from hub.observation.summary import Progress, Summary
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recorder import RecorderSummary
 from hub.session.clock import Clock
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.lockstep import Ack
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Latency, ParticipantStatus, SessionStatus
 
-__all__ = ["Account"]
+__all__ = ["Bookkeeping"]
 
 
-class Account:
+class Bookkeeping:
     """The account of one run."""
 
     def __init__(
@@ -33,11 +33,11 @@ class Account:
         plan: Plan,
         run: int,
         clock: Clock,
-        drops: Drops,
+        refusals: Refusals,
         observers: Observers,
-        intake: Intake,
+        devices: SessionDevices,
     ) -> None:
-        """Take what is told of: `run` is its number; `drops` counts what the hub refuses beside what
+        """Take what is told of: `run` is its number; `refusals` counts what the hub refuses beside what
         `observers` do.
         """
         self.phase = "starting"
@@ -48,9 +48,9 @@ class Account:
         self._plan = plan
         self._run = run
         self._clock = clock
-        self._drops = drops
+        self._refusals = refusals
         self._observers = observers
-        self._intake = intake
+        self._devices = devices
         self._answers = Histogram()
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
@@ -116,7 +116,7 @@ class Account:
             dropped_messages=self._dropped,
             detail=self.detail,
             participants=participants,
-            devices=self._intake.statuses,
+            devices=self._devices.statuses,
             latencies=self._latencies,
         )
 
@@ -152,8 +152,8 @@ class Account:
     @property
     def _latencies(self) -> list[Latency]:
         answers = [self._answers.message("grant to state", "all participants")] if self._answers.count else []
-        return [*answers, *self._intake.latencies]
+        return [*answers, *self._devices.latencies]
 
     @property
     def _dropped(self) -> int:
-        return self._drops.total + self._observers.drops.total
+        return self._refusals.total + self._observers.refusals.total
