@@ -215,7 +215,7 @@ class Session:
         wire = Wire(
             session, self._keys, self._run_id, self._refusals, "hub", spin=may_spin(len(self.plan.hosts()))
         )
-        self._host = Host("hub", self.plan, stepped, wire=wire, tap=tap)
+        self._host = Host("hub", self.plan, stepped, wire=wire, listener=tap)
         devices = (
             {n: p for n, p in self._participants.items() if isinstance(p, Device)}
             if self._grants is None
@@ -223,7 +223,7 @@ class Session:
         )
         for device in devices.values():
             device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
-        self._devices.lay(session, devices, self._host.feeds, self._observers, self._fail)
+        self._devices.lay(session, devices, self._host.device_inputs, self._observers, self._fail)
 
     def _start(self) -> None:
         """Start the hosts, wait until all participants are configured and every link has carried a value."""
