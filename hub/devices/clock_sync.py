@@ -1,4 +1,4 @@
-"""Keeps asking the hub what time it is."""
+"""Measures the offset to the hub's clock, again and again."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ _PERIOD_S = 0.5
 
 
 class ClockSync:
-    """Asks while it is entered: a few times in quick succession, then twice a second."""
+    """Queries the hub's clock while it is entered: a few times in quick succession, then twice a second."""
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
-        """Take the session over which the hub answers."""
         self.offset = ClockOffset()
         self._session, self._key = session, keys.control("clock")
         self._ending = threading.Event()
@@ -49,5 +48,5 @@ class ClockSync:
             try:
                 reply = ask(self._session, self._key, Empty(), ClockReply, timeout_s=1.0)
             except (ConnectError, MessageError, zenoh.ZError):
-                continue  # the hub is gone, or about to go: whoever looks after its token knows
+                continue  # the hub is gone, or about to go: its token tells the host
             self.offset.add(ClockExchange(asked_ns, reply.received_ns, reply.replied_ns, monotonic_ns()))

@@ -1,7 +1,6 @@
-"""What devices on other machines say of their condition, in the hub's log: whoever runs the session reads
-which device it is and what to do.
+"""The diagnoses of devices on other machines, in the hub's log: which device, and what to do.
 
-Those that the session has started itself log the same where everybody sees it.
+Devices that the session has started itself write to the same terminal.
 """
 
 from __future__ import annotations
@@ -29,14 +28,13 @@ _LONGEST = 500
 
 
 _RATE = 10.0
-"""Diagnoses of one device that are looked at in a second."""
+"""Diagnoses of one port that are accepted in a second."""
 
 
 class DiagnosticsLog:
-    """Listens to the diagnoses of remote devices, whether or not they are connected to anything."""
+    """Logs the diagnoses of remote devices, whether or not they are connected to anything."""
 
     def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
-        """`refusals` counts what is no diagnosis."""
         self._refusals = refusals
         ports = [
             (planned.name, port.name)
@@ -54,7 +52,7 @@ class DiagnosticsLog:
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
         limit = RateLimit(_RATE)
 
-        def hear(sample: zenoh.Sample) -> None:
+        def receive(sample: zenoh.Sample) -> None:
             try:
                 if not limit.allow(monotonic_ns()):
                     raise MessageError(f"more than {_RATE:g} diagnoses/s")
@@ -62,19 +60,19 @@ class DiagnosticsLog:
             except MessageError as error:
                 self._refusals.refuse_sample(sample, error)
                 return
-            said = " ".join(status.message.split())[:_LONGEST]  # on one line, whoever it is from
-            if self._last.get(source) != (status.level, said):
-                self._last[source] = status.level, said
+            text = " ".join(status.message.split())[:_LONGEST]  # on one line, whatever was sent
+            if self._last.get(source) != (status.level, text):
+                self._last[source] = status.level, text
                 log.log(
                     logging.WARNING if status.level else logging.INFO,
                     "device '%s' says: %s",
                     source.removesuffix("/diagnostics"),
-                    said,
+                    text,
                 )
 
-        return Callback(hear, indirect=True)
+        return Callback(receive, indirect=True)
 
-    def close(self) -> None:
-        """Listen no more."""
+    def undeclare(self) -> None:
+        """Receive no more."""
         for subscriber in self._subscribers:
             subscriber.undeclare()

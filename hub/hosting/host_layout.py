@@ -167,9 +167,7 @@ class HostLayout:
             )
         return self.remote_cells[source, port]
 
-    def _remote_listener(
-        self, planned: PlannedParticipant, port: Port
-    ) -> Callable[[int, Any], None] | None:
+    def _remote_listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, Any], None] | None:
         """Return what calls the listener with the values of another host."""
         listener, step_ns = self._listener, self._plan.step_ns
         if listener is None:

@@ -17,7 +17,8 @@ from zenoh.handlers import Callback
 
 from hub.devices.clock_sync import ClockSync
 from hub.devices.device_thread import DeviceThread
-from hub.devices.uplink import DeviceUplink, Run
+from hub.devices.run_info import RunInfo
+from hub.devices.uplink import DeviceUplink
 from hub.participant import Device
 from hub.planning.registry import make
 from hub.transport.control_client import ask, join_session
@@ -100,7 +101,7 @@ class DeviceHost:
         """Go along with a run until it is over."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
-        run = Run(reply.plan, keys, reply.run, reply.admission)
+        run = RunInfo(reply.plan, keys, reply.run, reply.admission)
         with ExitStack() as stack:
             gone = session.liveliness().declare_subscriber(
                 keys.alive("hub", "hub"), Callback(self._hub_came_or_went, indirect=True), history=True

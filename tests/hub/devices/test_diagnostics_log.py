@@ -57,7 +57,7 @@ def wire():
             (lambda source, port, message: device.put(keys.output("device", source, port), encode(message))),
             refusals,
         )
-        diagnostics.close()
+        diagnostics.undeclare()
 
 
 def until(look):

@@ -161,9 +161,7 @@ def test_what_comes_late_or_twice_is_refused():
     offer(1, value=1.0)
     offer(3, value=3.0)
     for old in (3, 2):
-        with pytest.raises(
-            LateError, match=f"sample {old} of 'stylus.value' comes late: 3 was here before it"
-        ):
+        with pytest.raises(LateError, match=f"sample {old} of 'stylus.value' is late: 3 arrived before it"):
             offer(old)
     offer(1, admission=2, value=7.0)  # the device has joined anew
     with pytest.raises(LateError):

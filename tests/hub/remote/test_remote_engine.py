@@ -80,7 +80,7 @@ class _Starter:
     """Starts a process as soon as the gate of a session is open."""
 
     def __init__(self, session, command):
-        gate = session._gate
+        gate = session.gate
         opening = gate.open
 
         def open_and_start(hub):

@@ -7,8 +7,10 @@ from time import monotonic_ns
 
 import pytest
 
+from hub.hosting.interrupt import Interrupt
 from hub.recording.recording import Recording
 from hub.session import session as session_module
+from hub.session.run import Run
 from schemas.errors import ParticipantError, ScenarioError, SessionError
 from tests.hub.processes import processes
 
@@ -88,11 +90,13 @@ def test_a_participant_that_goes_wrong_is_named_with_step_and_cause(fail, how, p
 def test_a_second_failure_does_not_take_the_place_of_the_first(prepare, monkeypatch, place):
     """A process that has told its error ends, which the watchdog sees at some moment."""
     session = prepare(TRIO, "participants.bad.how=raise")
-    owner, name = (session._interrupt, "disarm") if place == "ending" else (session_module.log, "error")
+    runs = []
+    monkeypatch.setattr(session_module, "Run", lambda *args: runs.append(Run(*args)) or runs[0])
+    owner, name = (Interrupt, "disarm") if place == "ending" else (session_module.log, "error")
     go_on = getattr(owner, name)
 
     def fail_again(*arguments):
-        session._fail("sink", "its process is gone")
+        runs[0].failure.report("sink", "its process is gone")
         go_on(*arguments)
 
     monkeypatch.setattr(owner, name, fail_again)

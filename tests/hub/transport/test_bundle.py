@@ -61,7 +61,7 @@ def test_both_ends_count_the_same_connections():
     plan = plan_of(
         arm, console, connections=["arm.b -> console.x", "arm.e -> console.z", "arm.a -> console.y"]
     )
-    assert [(k.source_port, k.device_port) for k in bundled(plan, "arm", "console")] == [
+    assert [(k.source_port, k.target_port) for k in bundled(plan, "arm", "console")] == [
         ("b", "x"),
         ("a", "y"),
     ]

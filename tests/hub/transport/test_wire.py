@@ -14,6 +14,7 @@ import zenoh
 from zenoh.handlers import Callback, RingChannel
 
 from hub.recording.recording import Recording
+from hub.session.startup import start
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.ros import Header, Joy, PoseStamped
@@ -157,7 +158,7 @@ class Stranger:
             self._watch.undeclare()
 
 
-def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, caplog, capfd):
+def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, monkeypatch, caplog, capfd):
     undisturbed = prepare(SCENARIO).run()
     assert undisturbed.dropped_messages == 0
     session = prepare(SCENARIO, record=tmp_path / "recording")  # so that the hub listens to all outputs
@@ -178,13 +179,12 @@ def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, caplog
 
     over = threading.Event()
     attacker = threading.Thread(target=attack)
-    starting = session._start
 
-    def start():
-        starting()
+    def start_and_attack(run):
+        start(run)
         attacker.start()
 
-    session._start = start
+    monkeypatch.setattr("hub.session.session.start", start_and_attack)
     with caplog.at_level(logging.WARNING):
         try:
             summary = session.run()
