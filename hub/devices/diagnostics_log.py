@@ -65,7 +65,7 @@ class DiagnosticsLog:
                 self._last[source] = status.level, text
                 log.log(
                     logging.WARNING if status.level else logging.INFO,
-                    "device '%s' says: %s",
+                    "device '%s' reports: %s",
                     source.removesuffix("/diagnostics"),
                     text,
                 )

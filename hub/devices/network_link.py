@@ -145,7 +145,7 @@ def in_words(spec: NetworkLinkSpec, outage_ns: int = 0) -> str:
         f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",
         f"up to {spec.jitter / 1e6:g} ms more" if spec.jitter else "",
         f"{100 * spec.loss:g} % lost" if spec.loss else "",
-        "outages as the scenario says" if spec.outages else "",
+        "outages of the scenario" if spec.outages else "",
         f"nothing at all for {outage_ns / 1e9:g} s" if outage_ns else "",
     )
     return ", ".join(part for part in parts if part)

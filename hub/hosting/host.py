@@ -79,7 +79,7 @@ class Host:
 
     @property
     def awaited(self) -> str | None:
-        """The participant for which `run` waits: the one in its step, or one elsewhere whose value is late."""
+        """The participant for which `run` waits: in its step, or in another process with its value."""
         waiting = (source for (source, _), cell in self._remote_cells.items() if cell.waiting)
         return next(waiting, self._stepping)
 
@@ -220,7 +220,7 @@ class Host:
                 bundle.send(Tag.pack(self._wire.run, 0, step, time_ns))
 
     def drain(self) -> None:
-        """Receive what has arrived from other hosts and was not read, for the listener; at the end of a run."""
+        """Receive what has arrived from other hosts and was not read, for the listener."""
         if self._wire is not None:
             self._wire.drain()
 

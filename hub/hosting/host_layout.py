@@ -1,4 +1,4 @@
-"""How the participants of one host are connected: with cells inside the process, and over a wire beyond it."""
+"""How the participants of one host are connected: by cells in this process, by a wire to others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OutputListener = Callable[[PlannedParticipant, Port, int, int, Any], None]
 """Is called with every output value: participant, port, step, time (ns) at which it is valid, value."""
 
 _MANY = 32
-"""Values of one port that may wait for their reader: a socket of Linux holds some 160, then its sender waits."""
+"""Values of one port that may wait for their reader; the sender waits at some 160, a socket of Linux."""
 
 
 class HostLayout:

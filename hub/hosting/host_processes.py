@@ -20,7 +20,7 @@ _END_S = 3.0
 
 
 class HostProcesses:
-    """The host processes that this hub has started."""
+    """The host processes that the hub has started."""
 
     def __init__(self) -> None:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -60,7 +60,7 @@ class HostProcesses:
         }
 
     def end(self) -> None:
-        """Wait for the hosts, which end by themselves once the hub's token is gone; kill those that do not."""
+        """Wait for the hosts, which end once the hub's token is gone; kill those that do not."""
         deadline = monotonic() + _END_S
         for host, process in self._processes.items():
             try:

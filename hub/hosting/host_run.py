@@ -105,7 +105,7 @@ class HostRun:
         return threads
 
     def serve(self) -> None:
-        """Configure, report ready, publish the values at time 0, and step until the process is interrupted."""
+        """Configure, report ready, and step as the hub grants until the process is interrupted."""
         try:
             bonds = self._host.configure(self._directory)
             for thread in self._threads:

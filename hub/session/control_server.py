@@ -28,7 +28,7 @@ Q = TypeVar("Q", bound=BaseModel)
 
 
 class Joins(Protocol):
-    """Who answers hosts that join."""
+    """Answers hosts that join."""
 
     def join(self, request: JoinRequest) -> BaseModel:
         """Return the reply; raises MessageError to refuse."""
@@ -36,7 +36,17 @@ class Joins(Protocol):
 
 
 class ControlServer:
-    """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
+    """Answers control requests in Zenoh's threads; a refused request gets the reason.
+
+    Args:
+        session: The hub's Zenoh session.
+        keys: The keys of the session.
+        state: What `pause`, `resume`, `step` and `shutdown` change.
+        inlets: What `set` writes into.
+        network_links: What `link` changes.
+        joins: What answers `join`.
+        refusals: Counts the requests that are refused.
+    """
 
     def __init__(
         self,
@@ -48,9 +58,6 @@ class ControlServer:
         joins: Joins,
         refusals: Refusals,
     ) -> None:
-        """Steer `state`, write into `inlets`, change links and let hosts join; what is refused is counted in
-        `refusals`.
-        """
         self._refusals = refusals
         self._inlets = inlets
         self._queryables = [
@@ -79,7 +86,7 @@ class ControlServer:
         handler: Callable[[Q], BaseModel],
         key_of: Callable[[Q], str] | None = None,
     ) -> zenoh.Queryable[None]:
-        """Answer on `key`; where that stands for several, `key_of` says on which of them a request may come."""
+        """Answer on `key`; if that is a pattern, a request is allowed on the key that `key_of` returns."""
 
         def answer(query: zenoh.Query) -> None:
             at = key
@@ -91,7 +98,7 @@ class ControlServer:
                     if key_of is not None:
                         if not query.key_expr.intersects(key_of(request)):
                             raise MessageError(
-                                f"this request belongs on {key_of(request)}, and came on {query.key_expr}"
+                                f"this request belongs on {key_of(request)}, and was sent on {query.key_expr}"
                             )
                         at = key_of(request)
                     reply = handler(request)
@@ -135,7 +142,7 @@ class ControlServer:
 
 
 def _reason(error: Exception) -> str:
-    """Return why a request is refused, for the person who made it."""
+    """Return why a request is refused, for the person who sent it."""
     if not isinstance(error, ValidationError):
         return str(error)
     found = error.errors(include_url=False)

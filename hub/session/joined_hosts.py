@@ -1,6 +1,4 @@
-"""Who belongs to a session: hosts join, report ready or failed, and may be lost; the first failure ends the
-run.
-"""
+"""The hosts that have joined a session: they report to be ready or failed, and may be lost."""
 
 from __future__ import annotations
 
@@ -12,39 +10,24 @@ from pathlib import Path
 from hub.planning.plan import Plan
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.zenoh_session import LEASE_MS
-from schemas.errors import MessageError, ParticipantError
+from schemas.errors import MessageError
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
 
-__all__ = ["Failures", "JoinedHosts"]
-
-
-class Failures:
-    """The first failure that any thread reports; `wake` makes the step loop look."""
-
-    def __init__(self, wake: Callable[[], None]) -> None:
-        self._wake = wake
-        self._lock = threading.Lock()
-        self.first: ParticipantError | None = None
-
-    def report(self, participant: str, step: int, cause: str) -> None:
-        """Report that `participant` failed in `step`; only the first report counts, the others are its
-        consequences.
-        """
-        with self._lock:
-            if self.first is not None:
-                return
-            self.first = ParticipantError(participant, step, cause)
-        self._wake()
-
-    def check(self) -> None:
-        """Raise the first failure, if there is one."""
-        if self.first is not None:
-            raise self.first
+__all__ = ["JoinedHosts"]
 
 
 class JoinedHosts:
-    """The hosts of a session other than the hub's own."""
+    """The hosts of a session other than the hub's own.
+
+    Args:
+        scenario: The scenario.
+        plan: Its wiring.
+        directory: Where relative paths of the scenario start.
+        run: The number of the run.
+        watched: Outputs of which the hub needs every value.
+        failed: Is called with participant and cause when a host reports a failure.
+    """
 
     def __init__(
         self,
@@ -55,9 +38,6 @@ class JoinedHosts:
         watched: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
     ) -> None:
-        """`watched`: outputs that the hub listens to; `failed` is told the participant and the cause that a
-        host reports.
-        """
         self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
@@ -69,7 +49,7 @@ class JoinedHosts:
         self._changed = threading.Condition()
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
-        """Answer a host that presents itself, is ready or has failed; raises MessageError to refuse it."""
+        """Answer a host that joins, is ready or has failed; raises MessageError to refuse it."""
         names = [name for name, planned in self._plan.participants.items() if planned.host == request.host]
         if not names or request.host == "hub":
             hosts = (
@@ -83,7 +63,7 @@ class JoinedHosts:
             if known is not None and known.pid != request.pid:
                 lease_s = LEASE_MS / 1e3
                 raise MessageError(
-                    f"host '{request.host}' is here already, as process {known.pid}: end that one, or wait"
+                    f"host '{request.host}' has joined already, as process {known.pid}: end that one, or wait"
                     f" {lease_s:g} s if it is cut off"
                 )
             self._hosts[request.host] = request
@@ -112,7 +92,7 @@ class JoinedHosts:
             self._hosts.pop(host, None)
 
     def missing(self, hosts: list[str]) -> list[str]:
-        """Return which of `hosts` are not ready yet, after waiting a moment for a change."""
+        """Return those of `hosts` that are not ready, after waiting a moment for a change."""
         with self._changed:
             waiting = [host for host in hosts if host not in self._hosts or not self._hosts[host].ready]
             if waiting:
@@ -120,9 +100,7 @@ class JoinedHosts:
             return waiting
 
     def bonds(self) -> Mapping[str, tuple[BondSide, ...]]:
-        """Return the bonds of all hosts' participants, with the numbers that are known once they are
-        configured.
-        """
+        """Return the bonds of all hosts' participants, with the numbers that `configure` has found."""
         return {name: sides for request in self._hosts.values() for name, sides in request.bonds.items()}
 
     def pid(self, host: str) -> int:

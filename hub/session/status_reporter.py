@@ -1,4 +1,4 @@
-"""The status of a session on Zenoh: published, and returned to whoever queries it."""
+"""The status of a session on Zenoh: published at intervals, and the answer to queries."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["StatusReporter"]
 
 
 class StatusReporter:
-    """Publishes and records the status when it is told to, and answers queries for it at any time."""
+    """Publishes and records the status on demand, and answers queries for it at any time."""
 
     def __init__(
         self,

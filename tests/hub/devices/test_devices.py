@@ -30,7 +30,7 @@ measure:
 
 
 def until(session, enough):
-    """Return what shuts `session` down once enough has happened: of the steps, the fresh ones, the presses."""
+    """Return a progress callback that shuts `session` down after enough steps, fresh ones and presses."""
 
     def look(progress):
         if enough(progress.step, *(progress.live[name][0] for name in ("fresh_steps", "pressed"))):

@@ -86,10 +86,10 @@ def test_the_hub_logs_what_remote_devices_say_of_themselves_once(wire, caplog):
 
     until(lambda: refusals.total == 1 and len(lines("far")) == 2 and lines("far/right"))
     assert lines("far") == [
-        ("WARNING", "device 'far' says: absent; plug it in"),
-        ("INFO", "device 'far' says: there"),
+        ("WARNING", "device 'far' reports: absent; plug it in"),
+        ("INFO", "device 'far' reports: there"),
     ]
     ((level, message),) = lines("far/right")
-    assert (level, message[:34]) == ("WARNING", "device 'far/right' says: warmwarmw")
+    assert (level, message[:37]) == ("WARNING", "device 'far/right' reports: warmwarmw")
     assert len(message) < 600
     assert lines("near") == []

@@ -1,6 +1,4 @@
-"""Devices that follow the clock and have inputs: the same bits wherever their sources run, whatever a grant
-covers, and over a link.
-"""
+"""Devices in simulated time with inputs: the same bits wherever their sources run, and over a link."""
 
 import pytest
 
@@ -44,8 +42,8 @@ def test_the_same_bits_wherever_its_sources_run(prepare):
 
 
 LINK = (
-    "participants.hand.network_link={delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}],"
-    " seed: 3}"
+    "participants.hand.network_link="
+    "{delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}], seed: 3}"
 )
 
 

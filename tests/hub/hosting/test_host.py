@@ -1,4 +1,4 @@
-"""One host without a network: what it asks of its participants, and what it says when they do not keep to it."""
+"""One host without a network: what it requires of its participants, and its errors."""
 
 from pathlib import Path
 

@@ -22,7 +22,7 @@ def bundle():
         made = Bundle(session, "trocar/test/engine/arm/signals/console")
         made.heard = session.declare_subscriber("trocar/test/engine/arm/signals/console", FifoChannel(100))
         until = time.monotonic() + 5.0
-        while not made.wanted and time.monotonic() < until:
+        while not made.needed and time.monotonic() < until:
             time.sleep(0.005)
         yield made
         made.close()

@@ -135,7 +135,7 @@ class Stranger:
                 self._session.get(f"{PREFIX}/control/{verb}", payload=payload, handler=RingChannel(1))
 
     def _distort(self):
-        """Send the newest real messages again: without their end, with a NaN at their end, and with a tail."""
+        """Send the newest real messages again: cut short, with a NaN at the end, and with a tail."""
         for key, sample in list(self._newest.items()):
             payload = sample.payload.to_bytes()
             for distorted in (
