@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["ClockOffset", "ClockExchange"]
+__all__ = ["ClockExchange", "ClockOffset"]
 
 _WINDOW = 16
 _DRIFT = 15e-6

@@ -17,7 +17,7 @@ from schemas.network_link import NetworkLinkSpec, Preset
 from schemas.quantity import Duration
 from schemas.ros import StringMessage
 
-__all__ = ["NetworkLinkReply", "NetworkLinkRequest", "NetworkLinkControl"]
+__all__ = ["NetworkLinkControl", "NetworkLinkReply", "NetworkLinkRequest"]
 
 
 class NetworkLinkRequest(BaseModel):

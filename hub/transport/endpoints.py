@@ -15,8 +15,8 @@ __all__ = [
     "free_endpoint",
     "is_loopback",
     "listening_endpoints",
-    "split_endpoints",
     "require_loopback",
+    "split_endpoints",
 ]
 
 PORTS = range(7447, 7467)

@@ -96,7 +96,7 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     seen = plan.seen_from("remote/hand")
     assert set(seen.participants) == {"hand", "deaf"}
     assert [port.name for port in seen.participants["deaf"].ports] == ["hand"]
-    assert (seen.links, len(seen.inlets)) == ((), 1)
+    assert (seen.connections, len(seen.from_devices)) == ((), 1)
     joined_hosts = JoinedHosts(
         file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None
     )
@@ -111,7 +111,7 @@ def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded)
     plan, _ = plan_of(file.scenario, file.params)
     seen = plan.seen_from("remote/far")
     assert seen.order == ("near", "far")
-    assert {(k.source, k.target) for k in seen.links} == {("near", "far"), ("far", "near")}
+    assert {(k.source, k.target) for k in seen.connections} == {("near", "far"), ("far", "near")}
     assert seen.participants["far"] == plan.participants["far"]
     assert seen.stride("far", "out") == plan.stride("far", "out")
 
