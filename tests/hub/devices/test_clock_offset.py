@@ -21,7 +21,7 @@ def test_an_offset_is_right_within_half_a_round_trip(offset, there, back):
     assert abs(one.offset_ns - offset) <= (there + back) / 2 + 1
 
 
-def test_the_quickest_exchange_of_the_last_ones_counts():
+def test_the_fastest_of_the_last_exchanges_counts():
     clocks, chance, offset = ClockOffset(), random.Random(1), 123 * S
     assert clocks.best is None
     for i in range(100):
@@ -47,7 +47,7 @@ def test_clocks_that_drift_apart_are_followed():
 
 
 @pytest.mark.parametrize("jump", [-3 * S, 7 * S])
-def test_a_clock_that_jumps_is_believed_at_once(jump):
+def test_a_clock_that_jumps_is_followed_at_once(jump):
     clocks = ClockOffset()
     for i in range(20):
         clocks.add(exchange(i * S, 0, MS, MS))

@@ -38,9 +38,7 @@ class Stylus(Device):
 
 @pytest.fixture
 def wire():
-    """A hub that listens to `far`, which is on another machine, and not to `near`; and a session that says
-    what it wants.
-    """
+    """A hub that subscribes to `far` on another machine and not to `near`, and a session that may send."""
     specs = {"far": {"kind": "stylus", "host": "remote"}, "near": {"kind": "stylus", "host": "desk"}}
     plan = make_plan(
         Scenario.model_validate({"name": "s", "step": "1 ms", "duration": "1 s", "participants": specs}),
@@ -67,12 +65,12 @@ def until(look):
         sleep(0.01)
 
 
-def test_the_hub_logs_what_remote_devices_say_of_themselves_once(wire, caplog):
+def test_the_hub_logs_the_diagnoses_of_remote_devices_once(wire, caplog):
     caplog.set_level(logging.INFO, "hub.devices.diagnostics_log")
     say, refusals = wire
     say("near", "diagnostics", DiagnosticStatus(level=2, name="near", message="logged by its own host"))
     for level, message in [(2, "absent;\nplug it in"), (2, "absent;\nplug it in"), (0, "there")]:
-        say("far", "diagnostics", DiagnosticStatus(level=level, name="anybody", message=message))
+        say("far", "diagnostics", DiagnosticStatus(level=level, name="any", message=message))
     say("far", "right/diagnostics", DiagnosticStatus(level=1, name="far/right", message="warm" * 1000))
     say("far", "right/diagnostics", StringMessage(data="no diagnosis"))
 

@@ -109,7 +109,7 @@ def test_a_link_is_changed_while_the_session_runs(prepare, host):
     assert summary.latency["state to force"]["hand.numbers"]["largest_s"] == pytest.approx(0.005)
 
 
-def test_the_arm_holds_in_an_outage_and_goes_on_after_it(prepare):
+def test_the_arm_holds_in_an_outage_and_continues_after_it(prepare):
     session = prepare(SCENARIO)
     fresh = []
 

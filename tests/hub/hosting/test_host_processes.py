@@ -2,7 +2,7 @@ from hub.hosting import host_processes as fleet_module
 from hub.hosting.host_processes import HostProcesses
 
 
-def test_hosts_may_be_started_while_the_watchdog_looks_for_dead_ones(monkeypatch):
+def test_hosts_may_be_started_while_the_watchdog_checks_processes(monkeypatch):
     processes = HostProcesses()
 
     class Process:

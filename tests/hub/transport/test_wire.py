@@ -57,7 +57,7 @@ HEARD = [
     *(f"{PREFIX}/engine/{port}" for port in ("talker/out/words", "far_listener/out/heard")),
     *(f"{PREFIX}/device/idle_player/out/{port}" for port in ("hand", "buttons")),
 ]
-"""Keys of this session to which somebody listens."""
+"""Keys of this session that have a subscriber."""
 UNHEARD = [
     f"{PREFIX}/engine/away/refused",  # counted, but the log shows the first refusals only, and those are real
     f"{PREFIX}/hub/status",
@@ -148,7 +148,7 @@ class Stranger:
                     self._session.put(key, distorted, attachment=sample.attachment)
 
     @contextmanager
-    def at_work(self):
+    def sending(self):
         self._thread.start()
         try:
             yield
@@ -162,14 +162,14 @@ def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, monkey
     undisturbed = prepare(SCENARIO).run()
     assert undisturbed.dropped_messages == 0
     session = prepare(SCENARIO, record=tmp_path / "recording")  # so that the hub listens to all outputs
-    session.state.step(390)  # the last steps wait until the stranger has said all
+    session.state.step(390)  # the last steps wait until the stranger has sent all
     strangers = []
 
     def attack():
         try:
             with open_session("client", connect=[session.endpoint]) as client:
                 strangers.append(Stranger(client))
-                with strangers[0].at_work():
+                with strangers[0].sending():
                     while strangers[0].rounds < 2 and not over.wait(0.01):
                         pass
                     session.state.resume()
