@@ -58,6 +58,9 @@ class JoinedHosts:
             raise MessageError(
                 f"session '{self._scenario.name}' has no host '{request.host}'; it has {hosts}"
             )
+        participant, _, cause = request.failed.partition(": ")
+        if request.failed and participant not in names:
+            raise MessageError(f"host '{request.host}' has no participant '{participant}' that could fail")
         with self._changed:
             known = self._hosts.get(request.host)
             if known is not None and known.pid != request.pid:
@@ -70,7 +73,6 @@ class JoinedHosts:
             self._admissions += 1
             self._changed.notify_all()
         if request.failed:
-            participant, _, cause = request.failed.partition(": ")
             self._failed(participant, cause)
         if request.ready or request.failed:
             return Empty()

@@ -11,7 +11,7 @@ from hub.session.joined_hosts import JoinedHosts
 from hub.session.launch import launch, plan_of
 from hub.transport.control_messages import JoinRequest
 from hub.transport.endpoints import free_endpoint
-from schemas.errors import ConnectError
+from schemas.errors import ConnectError, MessageError
 from tests.hub.authorities import Authority, free_port
 
 SCENARIO = """\
@@ -104,6 +104,8 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])
     assert reply.plan == seen
     assert joined_hosts.join(JoinRequest(host="other", pid=2)).plan == plan
+    with pytest.raises(MessageError, match="host 'other' has no participant 'hand' that could fail"):
+        joined_hosts.join(JoinRequest(host="other", pid=2, failed="hand: unplugged"))
 
 
 def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded):
