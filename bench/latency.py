@@ -1,11 +1,11 @@
-"""How long it takes from a stylus to the robot and back: a hand in a process of its own, read at 1 kHz, leads
-PSM1 in MuJoCo in real time.
+"""The latency from a stylus to the robot and back, in real time.
 
     python bench/latency.py --json
 
-Measured end to end by the hand: from the sample in which it has jumped to the arrival of the first pose of
-the tip that moves. Beside it stand the parts that the session itself tells of. On a machine that others use
-too, `chrt -f 10` in front (Linux, as root) tells what it would be alone.
+A hand in a process of its own, read at 1 kHz, leads PSM1 in MuJoCo. Measured end to end by the hand: from
+the sample in which it has jumped to the arrival of the first pose of the tip that moves. Beside it stand the
+parts that the session itself reports. On a machine with other load, `chrt -f 10` in front (Linux, as root)
+shows what it would be without.
 """
 
 from __future__ import annotations
@@ -33,7 +33,11 @@ pace: realtime
 participants:
   hand: {{kind: "tapping:Tapping", host: hand, output: "{output}"}}
   teleop: {{kind: teleoperation}}
-  robot: {{kind: mujoco, host: {host}, publish_period: {step} ms, arms: {{PSM1: {{instrument: palpation-probe}}}}}}
+  robot:
+    kind: mujoco
+    host: {host}
+    publish_period: {step} ms
+    arms: {{PSM1: {{instrument: palpation-probe}}}}
 connections:
   - hand.pose -> teleop.master
   - teleop.servo_jp -> robot.PSM1/servo_jp
@@ -52,7 +56,7 @@ def measure(step_ms: float, seconds: float, host: str) -> dict[str, Any]:
         summary = launch(load(str(file)), endpoint=free_endpoint(range(1))).run()
         times_ms = np.array(json.loads(output.read_text())) / 1e6
     p50, p90, p99 = np.percentile(times_ms, [50, 90, 99])
-    told = {
+    parts = {
         f"{way}: {stream}": [1e3 * row["p50_s"], 1e3 * row["p99_s"]]
         for way, rows in summary.latency.items()
         for stream, row in rows.items()
@@ -64,7 +68,7 @@ def measure(step_ms: float, seconds: float, host: str) -> dict[str, Any]:
         "p99_ms": p99,
         "late_steps": summary.late_steps,
         "steps": summary.steps,
-        "parts_ms": told,
+        "parts_ms": parts,
     }
 
 

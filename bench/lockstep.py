@@ -1,11 +1,10 @@
-"""What a step of Trocar costs without any computation, beside a bare Zenoh exchange of the same payload in
-the same run.
+"""The cost of a step without any computation, beside a bare Zenoh exchange of the same payload.
 
-Window 1: N participants in processes of their own, 64 doubles from neighbour to neighbour, the hub in the
-loop at every step; beside it a bare star, in which the hub sends 64 doubles to all and waits for 64 doubles
-from each. Window K > 1: one grant every K steps; beside it a bare ring, in which each process waits for its
-neighbour alone. With --one-host all participants live in the hub's process; beside it the same calls in a
-plain loop.
+Both are measured in the same run. Window 1: N participants in processes of their own, 64 doubles from
+neighbour to neighbour, the hub in the loop at every step; beside it a bare star, in which the hub sends 64
+doubles to all and waits for 64 doubles from each. Window K > 1: one grant every K steps; beside it a bare
+ring, in which each process waits for its neighbour alone. With --one-host all participants live in the hub's
+process; beside it the same calls in a plain loop.
 """
 
 from __future__ import annotations
@@ -145,7 +144,7 @@ def _wait_for_start(
     neighbour: zenoh.Subscriber | None,
     index: int,
 ) -> None:
-    """Ack ready once the neighbour can be heard, until the first grant says that all are."""
+    """Report ready once values of the neighbour arrive, until the first grant: then all are."""
     heard = neighbour is None
     while grants.try_recv() is None:
         if neighbour is not None:
@@ -164,11 +163,12 @@ def plain_loop(participants: int, steps: int) -> float:
 
     made = [Exchange(str(i), Params()) for i in range(participants)]
     values = [dict(p.configure(Setup(period_ns=10**6, directory=Path()))) for p in made]
-    inputs = [Inputs({"taken": v["given"]}) for v in values]
+    taken = [{"taken": v["given"]} for v in values]
+    inputs = [Inputs(its) for its in taken]
     begun = perf_counter()
     for step in range(steps):
         for i, participant in enumerate(made):
-            inputs[i]._values["taken"] = values[i - 1]["given"]
+            taken[i]["taken"] = values[i - 1]["given"]
             values[i] = participant.step(step * 10**6, 10**6, inputs[i])
     return steps / (perf_counter() - begun)
 

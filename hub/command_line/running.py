@@ -12,7 +12,7 @@ from hub.command_line.hosting import Certificates
 from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
-from hub.transport.endpoints import parted
+from hub.transport.endpoints import split_endpoints
 
 __all__ = ["run"]
 
@@ -55,7 +55,7 @@ def run(
 ) -> None:
     """Run a scenario."""
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
-    inside, outside = parted(listen or ())
+    inside, outside = split_endpoints(listen or ())
     with locating(file.source):
         session = launch(
             file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host

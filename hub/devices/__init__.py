@@ -1,1 +1,1 @@
-"""Devices on their way into simulated time: inlets, network links, clocks."""
+"""Devices: inlets into simulated time, threads that read them, network links and clock offsets."""

@@ -1,25 +1,22 @@
-"""How far the clock of a device's host is from the hub's: four timestamps an exchange, and the best of the
-last exchanges.
+"""The offset of the hub's clock from that of a device's host: four timestamps an exchange, the best of 16.
 
-The clocks are the monotonic ones of both machines, so that nobody who sets a wall clock disturbs it.
+The clocks are the monotonic ones of both machines, so that setting a wall clock does not disturb it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["ClockOffset", "Exchange"]
+__all__ = ["ClockExchange", "ClockOffset"]
 
 _WINDOW = 16
 _DRIFT = 15e-6
-"""How far two clocks drift apart at most while nobody looks, s/s: PHI of NTP's clock filter, RFC 5905 section
-7.1.
-"""
+"""The largest drift between two clocks, s/s: PHI of NTP's clock filter, RFC 5905 section 7.1."""
 
 
 @dataclass(frozen=True)
-class Exchange:
-    """A question to the hub what time it is, and its answer."""
+class ClockExchange:
+    """A query for the time of the hub, and its answer."""
 
     asked_ns: int
     """By the device host's clock, as is `answered_ns`."""
@@ -30,35 +27,34 @@ class Exchange:
 
     @property
     def offset_ns(self) -> int:
-        """The hub's clock minus the host's, if the way there takes as long as the way back (RFC 5905, section
-        8).
-        """
+        """The hub's clock minus the host's, if both ways take equally long (RFC 5905, section 8)."""
         return (self.received_ns - self.asked_ns + self.replied_ns - self.answered_ns) // 2
 
     @property
     def round_trip_ns(self) -> int:
-        """Time on the way, there and back; half of it is how wrong the offset may be."""
+        """Time on the way, there and back; half of it bounds the error of the offset."""
         return max(self.answered_ns - self.asked_ns - (self.replied_ns - self.received_ns), 0)
 
     def error_ns(self, now_ns: int) -> float:
-        """Return how wrong the offset may be by now, as the clocks drift."""
+        """Return the bound of the offset's error at `now_ns`: the clocks drift."""
         return self.round_trip_ns / 2 + _DRIFT * abs(now_ns - self.answered_ns)
 
 
 class ClockOffset:
-    """The offset of two clocks, from the exchange of the last ones that is least wrong by now."""
+    """The offset of two clocks, from the exchange with the smallest error among the last ones."""
 
     def __init__(self) -> None:
-        """Begin without an exchange."""
-        self._exchanges: tuple[Exchange, ...] = ()
-        self.best: Exchange | None = None
-        """The exchange whose offset is least wrong, None before the first; it stays so until the next one, as
-        all of them go wrong at the same pace.
+        self._exchanges: tuple[ClockExchange, ...] = ()
+        self.best: ClockExchange | None = None
+        """The exchange with the smallest error, None before the first.
+
+        It stays the best until the next one, as the errors of all grow at the same rate.
         """
 
-    def add(self, exchange: Exchange) -> None:
-        """Take an exchange. One that cannot be true together with those before (a clock stood still or
-        jumped) makes them forgotten.
+    def add(self, exchange: ClockExchange) -> None:
+        """Add an exchange.
+
+        If it contradicts those before (a clock has stood still or jumped), they are forgotten.
         """
         now_ns, best = exchange.answered_ns, self.best
         if (

@@ -1,7 +1,6 @@
-"""What devices on other machines say of their condition, in the hub's log: whoever runs the session reads
-which device it is and what to do.
+"""The diagnoses of devices on other machines, in the hub's log: which device, and what to do.
 
-Those that the session has started itself log the same where everybody sees it.
+Devices that the session has started itself write to the same terminal.
 """
 
 from __future__ import annotations
@@ -13,14 +12,14 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.planning.plan import Plan
-from hub.transport.rate_limit import Allowance
-from hub.transport.refusals import Drops
+from hub.transport.rate_limit import RateLimit
+from hub.transport.refusals import Refusals
 from schemas.codec import decode
 from schemas.errors import MessageError
 from schemas.keys import Keys
 from schemas.ros import DiagnosticStatus
 
-__all__ = ["Complaints"]
+__all__ = ["DiagnosticsLog"]
 
 log = logging.getLogger(__name__)
 
@@ -29,15 +28,14 @@ _LONGEST = 500
 
 
 _RATE = 10.0
-"""Diagnoses of one device that are looked at in a second."""
+"""Diagnoses of one port that are accepted in a second."""
 
 
-class Complaints:
-    """Listens to the diagnoses of remote devices, whether or not they are connected to anything."""
+class DiagnosticsLog:
+    """Logs the diagnoses of remote devices, whether or not they are connected to anything."""
 
-    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, drops: Drops) -> None:
-        """`drops` counts what is no diagnosis."""
-        self._drops = drops
+    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
+        self._refusals = refusals
         ports = [
             (planned.name, port.name)
             for planned in plan.participants.values()
@@ -52,29 +50,29 @@ class Complaints:
         ]
 
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
-        allowance = Allowance(_RATE)
+        limit = RateLimit(_RATE)
 
-        def hear(sample: zenoh.Sample) -> None:
+        def receive(sample: zenoh.Sample) -> None:
             try:
-                if not allowance.spend(monotonic_ns()):
+                if not limit.allow(monotonic_ns()):
                     raise MessageError(f"more than {_RATE:g} diagnoses/s")
                 status = decode(DiagnosticStatus, sample.payload.to_bytes())
             except MessageError as error:
-                self._drops.count(sample, error)
+                self._refusals.refuse_sample(sample, error)
                 return
-            said = " ".join(status.message.split())[:_LONGEST]  # on one line, whoever it is from
-            if self._last.get(source) != (status.level, said):
-                self._last[source] = status.level, said
+            text = " ".join(status.message.split())[:_LONGEST]  # on one line, whatever was sent
+            if self._last.get(source) != (status.level, text):
+                self._last[source] = status.level, text
                 log.log(
                     logging.WARNING if status.level else logging.INFO,
-                    "device '%s' says: %s",
+                    "device '%s' reports: %s",
                     source.removesuffix("/diagnostics"),
-                    said,
+                    text,
                 )
 
-        return Callback(hear, indirect=True)
+        return Callback(receive, indirect=True)
 
-    def close(self) -> None:
-        """Listen no more."""
+    def undeclare(self) -> None:
+        """Receive no more."""
         for subscriber in self._subscribers:
             subscriber.undeclare()

@@ -1,6 +1,6 @@
 """Inlets: where device samples, and values set by hand, enter simulated time.
 
-Samples arrive whenever they like and are checked at once; at a communication point the newest of each stream
+Samples arrive at any time and are checked at once; at a communication point the newest of each stream
 and all of each event queue are written into the grant. Nothing else enters a simulation.
 """
 
@@ -23,8 +23,7 @@ from schemas.trocar_msgs import InletSample
 __all__ = ["Inlets"]
 
 _MOST_QUEUED = 10_000
-"""An event queue longer than this is a flood: further samples are refused until the next communication point.
-"""
+"""An event queue this long is a flood: more samples are refused until the next communication point."""
 
 
 @dataclass
@@ -35,7 +34,7 @@ class _Inlet:
     simulated: bool = False
     max_age_ns: int = 0
     queue: deque[tuple[bytes, int, int | None]] = field(default_factory=deque[tuple[bytes, int, int | None]])
-    """Payload, arrival, and the time at which the device had it, by its own clock."""
+    """Payload, arrival, and the time at which it was sent, by the device's own clock."""
     arrived_ns: int | None = None
     stale: bool = True
     newest: tuple[int, int] = (0, 0)
@@ -47,29 +46,31 @@ class _Inlet:
         return f"{self.source}.{self.port}"
 
     def follow(self, stamp: Stamp) -> None:
-        """Refuse what is not newer than what was here already; raises LateError."""
+        """Raise LateError for a sample that is not newer than the last one."""
         if stamp[:2] <= self.newest:
             raise LateError(
-                f"sample {stamp.sequence} of '{self.source}.{self.port}' comes late: {self.newest[1]} was"
-                " here before it"
+                f"sample {stamp.sequence} of '{self.source}.{self.port}' is late: {self.newest[1]} arrived"
+                " before it"
             )
         self.newest = stamp[:2]
 
 
 class Inlets:
-    """All inlets of a session. `offer` may be called from any thread, `sample` by the clock alone."""
+    """An inlet for every connected device output, and for every input without a connection.
+
+    `offer` may be called from any thread, `sample` by the step loop alone.
+    """
 
     def __init__(self, plan: Plan) -> None:
-        """Make an inlet of every connected device output, and of every input that nothing feeds."""
         self._lock = threading.Lock()
         self.latencies = Latencies()
         """From a device to the grant."""
         self.offsets_ns = {
-            m.name: 0
-            for m in plan.participants.values()
-            if m.simulated_time or (m.role == "device" and m.host == "hub")
+            planned.name: 0
+            for planned in plan.participants.values()
+            if planned.simulated_time or (planned.role == "device" and planned.host == "hub")
         }
-        """What is added to a device's clock to have that of the hub, as far as it is known."""
+        """What is added to a device's clock to get that of the hub, where it is known."""
         self._inlets: dict[tuple[str, str], _Inlet] = {}
         for inlet in plan.from_devices:
             port = plan.participants[inlet.target].port(inlet.target_port)
@@ -83,22 +84,20 @@ class Inlets:
             )
             known = self._inlets.setdefault((inlet.source, inlet.source_port), new)
             known.max_age_ns = min((age for age in (known.max_age_ns, inlet.max_age_ns) if age), default=0)
-        fed = {(link.target, link.target_port) for link in plan.connections} | {
-            (i.target, i.target_port) for i in plan.from_devices
-        }
+        connected = {(c.target, c.target_port) for c in (*plan.connections, *plan.from_devices)}
         self._settable = {
             (planned.name, port.name): port
             for planned in plan.participants.values()
             for port in planned.ports
-            if planned.role != "device" and port.causality == "input" and (planned.name, port.name) not in fed
+            if planned.role != "device"
+            and port.causality == "input"
+            and (planned.name, port.name) not in connected
         }
         for (name, port_name), port in self._settable.items():
             self._inlets[name, port_name] = _Inlet(name, port_name, PortCodec(port), stale=False)
 
     def settable(self, participant: str, port: str) -> Port:
-        """Return the input that `set` may write; raises MessageError if it is fed by a connection or does not
-        exist.
-        """
+        """Return the input that `set` may write; raises MessageError if it is connected or does not exist."""
         found = self._settable.get((participant, port))
         if found is None:
             raise MessageError(
@@ -110,9 +109,9 @@ class Inlets:
     def offer(
         self, participant: str, port: str, payload: bytes, now_ns: int, stamp: Stamp | None = None
     ) -> None:
-        """Take a sample that arrived at `now_ns` of the port's clock; what is set by hand has no stamp.
+        """Keep a sample that arrived at `now_ns` of the port's clock; a value set by hand has no stamp.
 
-        Raises MessageError if it is none of this port, and LateError if a newer one was here before it.
+        Raises MessageError if it is invalid for this port, and LateError if a newer one arrived before it.
         """
         inlet = self._inlets.get((participant, port))
         if inlet is None:
@@ -133,7 +132,7 @@ class Inlets:
     def sample(self, time_ns: int, wall_ns: int) -> list[InletSample]:
         """Return what enters at a communication point: samples that are new, and changes of staleness.
 
-        A device that follows the clock ages in simulated time `time_ns`, any other in `wall_ns`.
+        Samples of a device in simulated time age in `time_ns`, those of any other in `wall_ns`.
         """
         entering: list[InletSample] = []
         with self._lock:

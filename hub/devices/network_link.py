@@ -1,13 +1,12 @@
-"""The link of a device: delay, jitter, loss and outages between it and the hub, for studies of remote
-operation.
+"""The network link of a device: delay, jitter, loss and outages between it and the hub.
 
-Nothing here looks at a clock: whoever uses a link says what time it is, wall or simulated, so that the same
-seed and the same messages at the same times give the same arrivals. Chance is drawn for each port and
-direction by itself, two numbers a message, whatever the others do.
+For studies of remote operation. Nothing here reads a clock: the caller passes the time, wall or simulated, so
+that the same seed and the same messages at the same times give the same arrivals. Random numbers are drawn
+for each port and direction by itself, two a message, independent of the others.
 
-A *signal* travels as datagrams do: what is lost stays lost, and with jitter one message may overtake another
-(whoever receives refuses the one that comes late). *Events* travel as over TCP: none overtakes another, and a
-lost one is sent again until it is through, each time a round trip later.
+A *signal* travels as datagrams do: a lost message stays lost, and with jitter one message may overtake
+another (the receiver refuses the late one). *Events* travel as over TCP: none overtakes another, and a lost
+one is sent again until it arrives, each time a round trip later.
 """
 
 from __future__ import annotations
@@ -28,21 +27,20 @@ __all__ = ["Line", "NetworkLink", "NetworkLinkOrder", "in_words"]
 
 
 class NetworkLinkOrder(BaseModel):
-    """What is to lie between a device and the hub from now on."""
+    """The network link of a device from now on."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     spec: NetworkLinkSpec
     outage_ns: int = 0
-    """And that nothing gets through for so long."""
+    """Lose every message for this long."""
 
 
 @dataclass
 class Line:
     """One port's messages in one direction. All times in nanoseconds since the start of the device's clock.
 
-    One thread may send while another takes what has arrived: the interpreter does each operation on the heap
-    as one.
+    One thread may send while another receives: each operation on the heap is atomic in the interpreter.
     """
 
     link: NetworkLink
@@ -54,11 +52,11 @@ class Line:
 
     @property
     def empty(self) -> bool:
-        """Say whether nothing is on its way."""
+        """Whether no message is on its way."""
         return not self._waiting
 
     def send(self, now_ns: int, message: Any) -> None:
-        """Put a message on its way."""
+        """Send a message over the link."""
         self.link.used = True
         spec, draw, luck = self.link.spec, self.chance.random(), self.chance.random()
         arrival_ns = now_ns + spec.delay_ns + round(draw * spec.jitter)
@@ -74,38 +72,34 @@ class Line:
         heappush(self._waiting, (arrival_ns, self._count, message))
 
     def arrived(self, now_ns: int) -> Iterator[tuple[int, Any]]:
-        """Yield what has arrived by now and was not yielded before, in the order of arrival, each with its
-        time of arrival.
-        """
+        """Yield time of arrival and message of all that has newly arrived, in the order of arrival."""
         while self._waiting and self._waiting[0][0] <= now_ns:
             arrival_ns, _, message = heappop(self._waiting)
             yield arrival_ns, message
 
 
 class NetworkLink:
-    """Both directions of all ports of one device. Without a spec everything arrives at once; it can be
-    changed at any time.
+    """Both directions of all ports of one device.
+
+    Without a spec everything arrives at once; `order` can change it at any time.
     """
 
     def __init__(self, spec: NetworkLinkSpec | None) -> None:
-        """Take the link of the scenario."""
         self.spec = spec or NetworkLinkSpec()
         self._lines: dict[tuple[str, str], Line] = {}
         self.used = False
-        """Whether anything was ever sent over it: a gateway has hundreds of ports, and most links lie
-        nowhere.
-        """
+        """Whether any message was ever sent over it: a gateway has hundreds of ports, and most links idle."""
         self._outages = list(self.spec.outages)
         self._orders: deque[NetworkLinkOrder] = deque()
 
     @property
     def clear(self) -> bool:
-        """Say whether nothing is between the device and the hub."""
+        """Whether the link neither delays nor loses anything."""
         return not (self.spec.delay_ns or self.spec.jitter or self.spec.loss or self._outages)
 
     @property
     def idle(self) -> bool:
-        """Say whether it is clear and nothing is on its way: what is sent now need not be sent over it."""
+        """Whether it is clear and no message is on its way: messages may pass beside it."""
         return self.clear and (not self.used or all(line.empty for line in self._lines.values()))
 
     def line(self, port: Port) -> Line:
@@ -118,13 +112,11 @@ class NetworkLink:
         return line
 
     def order(self, order: NetworkLinkOrder) -> None:
-        """Ask for another link from the next time on that somebody looks; from any thread."""
+        """Change the link at the next `settle`; from any thread."""
         self._orders.append(order)
 
     def settle(self, now_ns: int) -> None:
-        """Carry out what was ordered: what is sent from now on goes the new way, what is on its way arrives
-        as it was to.
-        """
+        """Carry out the orders, for what is sent from now on; what is on its way arrives as it would have."""
         while self._orders:
             order = self._orders.popleft()
             reseeded, self.spec = order.spec.seed != self.spec.seed, order.spec
@@ -136,7 +128,7 @@ class NetworkLink:
                 line.chance = self._chance(causality, name)
 
     def cut_until(self, now_ns: int) -> int:
-        """Return when the outages in which `now_ns` falls are over; `now_ns` if there is none."""
+        """Return when the outages around `now_ns` are over; `now_ns` if there is none."""
         until_ns = now_ns
         for outage in sorted(self._outages, key=lambda o: o.at):
             if outage.at <= until_ns < outage.at + outage.duration:
@@ -148,12 +140,12 @@ class NetworkLink:
 
 
 def in_words(spec: NetworkLinkSpec, outage_ns: int = 0) -> str:
-    """Return what lies between a device and the hub; empty: nothing."""
+    """Describe a network link; empty if it neither delays nor loses anything."""
     parts = (
         f"{spec.delay_ns / 1e6:g} ms each way" if spec.delay_ns else "",
         f"up to {spec.jitter / 1e6:g} ms more" if spec.jitter else "",
         f"{100 * spec.loss:g} % lost" if spec.loss else "",
-        "outages as the scenario says" if spec.outages else "",
+        "outages of the scenario" if spec.outages else "",
         f"nothing at all for {outage_ns / 1e9:g} s" if outage_ns else "",
     )
     return ", ".join(part for part in parts if part)

@@ -1,4 +1,4 @@
-"""Changes to what lies between devices and the hub, while a session runs."""
+"""Changes of the devices' network links while a session runs."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from schemas.network_link import NetworkLinkSpec, Preset
 from schemas.quantity import Duration
 from schemas.ros import StringMessage
 
-__all__ = ["NetworkLinkReply", "NetworkLinkRequest", "NetworkLinkControl"]
+__all__ = ["NetworkLinkControl", "NetworkLinkReply", "NetworkLinkRequest"]
 
 
 class NetworkLinkRequest(BaseModel):
-    """Change the link of a device; what is not said stays as it is.
+    """Change the network link of a device; fields left out stay as they are.
 
     A preset or a delay takes the place of the other.
     """
@@ -34,31 +34,33 @@ class NetworkLinkRequest(BaseModel):
     jitter: Duration | None = None
     loss: float | None = None
     outage: Duration = Field(default=0, ge=0)
-    """Let nothing through for so long from now on."""
+    """Lose every message for this long from now on."""
 
 
 class NetworkLinkReply(BaseModel):
-    """How the link of a device is from now on."""
+    """The network link of a device from now on."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     device: str
     link: NetworkLinkSpec
     description: str
-    """The same in words; empty: nothing."""
+    """The same in words; empty if it neither delays nor loses anything."""
 
 
 class NetworkLinkControl:
-    """Knows the present link of every device, and has it changed where the device is."""
+    """Knows the network link of every device, and orders changes in the process that runs it.
+
+    `simulated` are the links of the devices in simulated time; orders to the others are published.
+    """
 
     def __init__(
         self, plan: Plan, session: zenoh.Session, keys: Keys, simulated: Mapping[str, NetworkLink]
     ) -> None:
-        """`simulated`: the links of the devices that follow the clock; the others are told over Zenoh."""
         self._specs = {
-            m.name: m.network_link or NetworkLinkSpec()
-            for m in plan.participants.values()
-            if m.role == "device"
+            planned.name: planned.network_link or NetworkLinkSpec()
+            for planned in plan.participants.values()
+            if planned.role == "device"
         }
         self._simulated = simulated
         away = [name for name in self._specs if name not in simulated]
@@ -70,16 +72,19 @@ class NetworkLinkControl:
         self._changed: set[str] = set()
 
     def change(self, request: NetworkLinkRequest) -> NetworkLinkReply:
-        """Change a link; raises MessageError if there is no such device, ValueError if the link cannot be so."""
+        """Change a link.
+
+        Raises MessageError if the device does not exist, ValueError if the link would be invalid.
+        """
         name = request.device
         if name not in self._specs:
             raise MessageError(f"there is no device '{name}'.{did_you_mean(name, self._specs)}")
-        said: dict[str, Any] = request.model_dump(
+        given: dict[str, Any] = request.model_dump(
             mode="json", exclude={"device", "outage"}, exclude_none=True
         )
-        replaced = {"preset": None, "delay": 0} if said.keys() & {"preset", "delay"} else {}
+        replaced = {"preset": None, "delay": 0} if given.keys() & {"preset", "delay"} else {}
         self._specs[name] = NetworkLinkSpec.model_validate(
-            self._specs[name].model_dump(mode="json") | replaced | said
+            self._specs[name].model_dump(mode="json") | replaced | given
         )
         self._order(name, request.outage)
         return NetworkLinkReply(
@@ -89,7 +94,7 @@ class NetworkLinkControl:
         )
 
     def repeat(self, device: str) -> None:
-        """Tell the host of a device that has joined anew how its link was changed before."""
+        """Publish the changed link again, for a device whose host has joined again."""
         if device in self._changed:
             self._order(device, 0)
 
@@ -102,6 +107,6 @@ class NetworkLinkControl:
             self._publishers[name].put(encode(StringMessage(data=order.model_dump_json())))
 
     def undeclare(self) -> None:
-        """Change nothing any more."""
+        """Publish no more."""
         for publisher in self._publishers.values():
             publisher.undeclare()

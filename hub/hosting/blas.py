@@ -1,5 +1,6 @@
-"""One way of computing linear algebra on every machine: numpy's OpenBLAS picks kernels by processor, and they
-round differently.
+"""The same linear algebra on every machine.
+
+numpy's OpenBLAS chooses its kernels by processor, and they round differently.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ __all__ = ["pin_blas"]
 
 
 def pin_blas(environment: MutableMapping[str, str]) -> None:
-    """Fix kernel and threads in `environment`; takes effect in processes that have not imported numpy yet.
+    """Set kernel and threads in `environment`, for processes that have not imported numpy yet.
 
     Haswell is the oldest x86-64 with AVX2, and its kernels run on all later ones. One thread: idle ones spin
     and take the cores of other hosts, and results must not depend on how many there are.

@@ -1,8 +1,7 @@
-"""A process that runs one host of a session: `python -P -m hub.hosting.host_process --connect ENDPOINT
---session NAME --host NAME`.
+"""A process that runs one host of a session.
 
-It joins a hub, makes and configures its participants, steps them as grants come, and ends when the hub is
-gone.
+`python -P -m hub.hosting.host_process --connect ENDPOINT --session NAME --host NAME` joins a hub, makes and
+configures the host's participants, steps them as the hub grants, and ends when the hub is gone.
 """
 
 from __future__ import annotations
@@ -13,44 +12,29 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from time import sleep
 
 import zenoh
-from zenoh.handlers import Callback, FifoChannel
+from zenoh.handlers import Callback
 
-from hub.devices.clock_watch import ClockWatch
-from hub.devices.loop import DeviceLoop
-from hub.devices.uplink import DeviceUplink, Run
-from hub.hosting.host import Host
+from hub.hosting.host_run import HostRun
 from hub.hosting.interrupt import Interrupt
-from hub.participant import Device, Stepped
-from hub.planning.plan import PlannedParticipant
-from hub.planning.registry import make
 from hub.remote.device_host import DeviceHost
 from hub.remote.hub_connection import reach
-from hub.transport.control_client import ask, present
-from hub.transport.control_messages import Empty, JoinReply, JoinRequest
-from hub.transport.lane import may_spin
-from hub.transport.refusals import Drops
-from hub.transport.wire import Wire
-from schemas.codec import encode
-from schemas.errors import MessageError, ParticipantError, TrocarError
+from hub.transport.control_client import join_session
+from hub.transport.control_messages import JoinRequest
+from schemas.errors import TrocarError
 from schemas.keys import Keys
-from schemas.lockstep import Ack, Grant, pack_ack, unpack_grant
-from schemas.ros import StringMessage
 
 __all__ = ["main", "run_device", "run_host"]
 
 log = logging.getLogger(__name__)
 
-_PRIME_S = 0.01
-_IDLE_S = 0.2
 _PATIENCE_S = 2.0
-"""How long a participant may go on computing after the hub is gone, before the process is ended under it."""
+"""How long a participant may go on computing after the hub is gone, before its process is ended."""
 
 
 def run_host(
@@ -61,26 +45,27 @@ def run_host(
     directory: Path | None = None,
     certificates: Path | None = None,
 ) -> None:
-    """Join session `session_name` (`*`: whatever there is) over `endpoint` and run host `host` until the hub
-    ends.
+    """Join a session and run one of its hosts until the hub ends.
 
-    A participant with `host: remote` is a host of its own, called `remote/<participant>`. Relative paths of
-    the scenario start at `directory`, by default where the hub has them. `certificates`: as
-    `hub.remote.hub_connection.reach` has it.
+    Args:
+        endpoint: Where the hub listens.
+        session_name: The session; `*` for whatever session the hub has.
+        host: The host; a participant with `host: remote` is a host of its own, `remote/<participant>`.
+        directory: Where relative paths of the scenario start, by default where the hub has them.
+        certificates: As for `hub.remote.hub_connection.reach`.
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
     request = JoinRequest(host=host, pid=os.getpid())
-    with reach(endpoint, host.removeprefix("remote/"), certificates, mode="peer") as session:
-        reply = present(session, Keys(session_name), request)
-        keys = Keys(reply.session)
-        with _ending_with_hub(session, keys):
-            connect = partial(reach, endpoint, host.removeprefix("remote/"), certificates)
-            joined = _JoinedHost(session, keys, request, reply, directory or Path(reply.directory), connect)
+    connect = partial(reach, endpoint, host.removeprefix("remote/"), certificates)
+    with connect(mode="peer") as session:
+        reply = join_session(session, Keys(session_name), request)
+        with _ending_with_hub(session, Keys(reply.session)):
+            run = HostRun(session, request, reply, directory or Path(reply.directory), connect)
             try:
-                joined.serve()
+                run.serve()
             finally:
-                joined.close()
+                run.close()
 
 
 def run_device(
@@ -91,197 +76,21 @@ def run_device(
     directory: Path | None = None,
     certificates: Path | None = None,
 ) -> None:
-    """Join session `session_name` (`*`: whatever there is) over `endpoint` with the device `name`, and
-    whatever comes after it, until Ctrl-C or SIGTERM.
+    """Join a session with the device `name`, and the sessions after it, until Ctrl-C or SIGTERM.
 
-    `directory` and `certificates` are as for `run_host`. Raises ConnectError if there is no such hub to begin
-    with, MessageError if it has no place for the device, and ParticipantError if the device fails.
+    The arguments are those of `run_host`. Raises ConnectError if there is no such hub at first, MessageError
+    if its session does not have the device, and ParticipantError if the device fails.
     """
     request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
-    host = DeviceHost(
-        name, lambda: reach(endpoint, name, certificates), Keys(session_name), request, directory
-    )
+    connect = partial(reach, endpoint, name, certificates)
+    host = DeviceHost(name, connect, Keys(session_name), request, directory)
     with Interrupt(), contextlib.suppress(KeyboardInterrupt):
         host.serve()
 
 
-class _JoinedHost:
-    """The participants of this process and their connection to the hub."""
-
-    def __init__(
-        self,
-        session: zenoh.Session,
-        keys: Keys,
-        request: JoinRequest,
-        reply: JoinReply,
-        directory: Path,
-        connect: Callable[[], zenoh.Session],
-    ) -> None:
-        self._session, self._keys, self._request, self._run, self._directory = (
-            session,
-            keys,
-            request,
-            reply.run,
-            directory,
-        )
-        plan, host = reply.plan, request.host
-        self._step_ns = plan.step_ns
-        mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
-        made = {
-            name: make(planned.kind, name, reply.params[name], directory) for name, planned in mine.items()
-        }
-        first = next(iter(mine.values()))
-        refused = session.declare_publisher(
-            keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
-        )
-        self._drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
-        self._wire = Wire(
-            session,
-            keys,
-            reply.run,
-            self._drops,
-            host,
-            spin=may_spin(len(plan.hosts())),
-            watched=reply.watched,
-        )
-        self._host = Host(
-            host, plan, {name: p for name, p in made.items() if isinstance(p, Stepped)}, wire=self._wire
-        )
-        self._acks = {
-            planned.name: session.declare_publisher(
-                keys.ack(planned.name),
-                encoding=zenoh.Encoding.APPLICATION_CDR,
-                congestion_control=zenoh.CongestionControl.BLOCK,
-                priority=zenoh.Priority.REAL_TIME,
-                express=True,
-            )
-            for planned in self._host.participants
-        }
-        if self._acks:
-            self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
-        self._next_step = 0
-        devices = {name: device for name, device in made.items() if isinstance(device, Device)}
-        for device in devices.values():
-            device.learn_hub(connect)
-        self._loops = {
-            name: DeviceLoop(name, device, plan.participants[name].read_ns, failed=self._device_failed)
-            for name, device in devices.items()
-        }
-        self._stack = contextlib.ExitStack()
-        if devices:
-            clock, run = (
-                self._stack.enter_context(ClockWatch(session, keys)),
-                Run(plan, keys, reply.run, reply.admission),
-            )
-            for name, loop in self._loops.items():
-                uplink = DeviceUplink(plan.participants[name], run, session, loop, self._drops, clock.offset)
-                self._stack.callback(uplink.close)
-                loop.attach(uplink)
-        self._tokens = [
-            session.liveliness().declare_token(keys.alive(planned.key_role, name))
-            for name, planned in mine.items()
-        ]
-
-    def serve(self) -> None:
-        """Configure, report ready, prime the links, and step until the hub says that the run is over."""
-        try:
-            bonds = self._host.configure(self._directory)
-            for loop in self._loops.values():
-                loop.start(self._directory)
-        except ParticipantError as error:
-            ask(
-                self._session,
-                self._keys.join(self._request.host),
-                self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}),
-                Empty,
-            )
-            raise
-        ask(
-            self._session,
-            self._keys.join(self._request.host),
-            self._request.model_copy(update={"ready": True, "bonds": bonds}),
-            Empty,
-        )
-        while not self._acks:  # devices alone, which live in threads of their own
-            sleep(_IDLE_S)
-        grant = self._first_grant()
-        while True:
-            try:
-                self._host.run(grant, self._done)
-            except ParticipantError as error:
-                self._acks[error.participant].put(
-                    pack_ack(Ack(self._run, 0, error.step, (), (), (), error.cause))
-                )
-                raise
-            grant = self._next_grant()
-
-    def _first_grant(self) -> Grant:
-        """Repeat the values at time 0 until all links have carried theirs and the first grant is here."""
-        told = False
-        while True:
-            self._host.publish_initial()
-            if not told and self._host.linked():
-                told = True
-                for planned in self._host.participants:
-                    self._done(planned, Ack(self._run, 0, -1, (), (), ()))
-            if told and (sample := self._grants.try_recv()) is not None:
-                grant = self._accept(sample)
-                if grant is not None:
-                    return grant
-            sleep(_PRIME_S)
-
-    def _next_grant(self) -> Grant:
-        while True:
-            grant = self._accept(self._grants.recv())
-            if grant is not None:
-                return grant
-
-    def _accept(self, sample: zenoh.Sample) -> Grant | None:
-        try:
-            grant = unpack_grant(sample.payload.to_bytes())
-            if grant.run != self._run:
-                raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
-            if (
-                grant.step != self._next_step
-                or grant.start_ns != grant.step * self._step_ns
-                or grant.horizon_ns <= grant.start_ns
-            ):
-                raise MessageError(
-                    f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step"
-                    f" {self._next_step} is next"
-                )
-        except MessageError as error:
-            self._drops.count(sample, error)
-            return None
-        self._next_step = grant.horizon_ns // self._step_ns
-        return grant
-
-    def _done(self, planned: PlannedParticipant, ack: Ack) -> None:
-        self._acks[planned.name].put(pack_ack(ack))
-
-    def _device_failed(self, name: str, cause: str) -> None:
-        ask(
-            self._session,
-            self._keys.join(self._request.host),
-            self._request.model_copy(update={"failed": f"{name}: {cause}"}),
-            Empty,
-        )
-
-    def close(self) -> None:
-        """Close devices, participants and publishers."""
-        for loop in self._loops.values():
-            loop.close()
-        self._stack.close()
-        self._host.close()
-        for token in self._tokens:
-            token.undeclare()
-
-
 @contextlib.contextmanager
 def _ending_with_hub(session: zenoh.Session, keys: Keys) -> Generator[None]:
-    """Interrupt the main thread when the hub's liveliness token is gone, and end the process if that does not
-    help.
-    """
+    """Interrupt the main thread when the hub's liveliness token is gone; end the process if that fails."""
     over, interrupt = threading.Event(), Interrupt()
 
     def gone(sample: zenoh.Sample) -> None:

@@ -1,4 +1,4 @@
-"""Takes the main thread out of whatever it waits for or computes."""
+"""Interrupts the main thread in whatever it waits for or computes."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ __all__ = ["Interrupt"]
 
 
 class Interrupt:
-    """While it is entered, SIGTERM raises KeyboardInterrupt in the main thread; calling it does the same from
-    any thread.
+    """While it is entered, SIGTERM raises KeyboardInterrupt in the main thread, and so does calling it.
 
-    SIGINT itself would not do: a shell lets the programs that it starts in the background ignore it. Entered
-    in another thread than the main one, it does nothing.
+    It may be called from any thread. SIGINT would not work: a shell lets the programs that it starts in the
+    background ignore it. Entered in another thread than the main one, it does nothing.
     """
 
     def __init__(self) -> None:
@@ -31,9 +30,9 @@ class Interrupt:
         return self
 
     def disarm(self) -> None:
-        """Raise nothing any more: the main thread is closing what it has opened.
+        """Raise nothing any more: the main thread closes what it has opened.
 
-        No signal is on its way from other threads after that.
+        No signal of another thread is pending after that.
         """
         with self._sending:
             self._armed = self._raised = False
@@ -49,15 +48,13 @@ class Interrupt:
                 interrupt_main(signal.SIGTERM)
 
     def _raise(self, _number: int, _frame: FrameType | None) -> None:
-        """Runs in the main thread, between two of its instructions: after `disarm` nothing can come."""
+        """Handle SIGTERM, between two instructions of the main thread; after `disarm` it does nothing."""
         if self._armed:
             self._armed, self._raised = False, True
             raise KeyboardInterrupt
 
     def check(self) -> None:
-        """Raise again what was raised and got lost: in a callback that Zenoh calls in the main thread nobody
-        hears of it.
-        """
+        """Raise again an interrupt that was lost: Zenoh swallows one in a callback in the main thread."""
         if self._raised:
             raise KeyboardInterrupt
 

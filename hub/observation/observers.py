@@ -15,7 +15,7 @@ from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.lane import has_lane
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
@@ -47,7 +47,7 @@ class Observers:
     ) -> None:
         self.measures = measures
         self.energy = EnergyBooks(plan)
-        self.drops = Drops()
+        self.refusals = Refusals()
         self._run = run
         self._plan = plan
         self._keys = keys
@@ -128,7 +128,7 @@ class Observers:
             payload = sample.payload.to_bytes()
             value = watched.codec.decode(payload)
         except MessageError as error:
-            self.drops.count(sample, error)
+            self.refusals.refuse_sample(sample, error)
             return
         watched.newest = (tag.step, tag.index)
         if tag.step > INITIAL and not watched.codec.is_event:

@@ -19,17 +19,31 @@ class Inputs:
 
     `inputs["port"]` is the value at the start of the step; `at` follows it inside the step where the
     connection is linear: between the source's last two values while it is ahead, beyond them while it is not.
-    The arrays belong to whoever produced them: read, do not write.
+    The arrays belong to their producer: read, do not write.
     """
 
     __slots__ = ("_events", "_rates", "_stale", "_values")
 
-    def __init__(self, values: dict[str, Any]) -> None:
-        """Store the value of every input port at time 0; the host writes the later ones."""
+    def __init__(
+        self,
+        values: dict[str, Any],
+        *,
+        rates: dict[str, Vector] | None = None,
+        events: dict[str, tuple[Message, ...]] | None = None,
+        stale: set[str] | None = None,
+    ) -> None:
+        """Read from these containers, which the host keeps and writes to before each step.
+
+        Args:
+            values: The value of every signal input; at first the one at time 0.
+            rates: The slope (1/s) of every input whose connection is linear.
+            events: The messages of every event port that has any in this step.
+            stale: The inputs whose device is silent.
+        """
         self._values = values
-        self._rates: dict[str, Vector] = {}
-        self._events: dict[str, tuple[Message, ...]] = {}
-        self._stale: set[str] = set()
+        self._rates = {} if rates is None else rates
+        self._events = {} if events is None else events
+        self._stale = set[str]() if stale is None else stale
 
     def __getitem__(self, port: str) -> Vector:
         """Return the vector at the start of the step."""
@@ -43,8 +57,9 @@ class Inputs:
         return cast("Message | None", self._values[port])
 
     def at(self, port: str, tau: float) -> Vector:
-        """Return the vector `tau` seconds after the start of the step: held, or extrapolated if the
-        connection says so.
+        """Return the vector `tau` seconds after the start of the step, held or extrapolated.
+
+        The connection says which of the two: see `rate`.
         """
         rate = self._rates.get(port)
         return self[port] if rate is None else self._values[port] + tau * rate
@@ -63,7 +78,8 @@ class Inputs:
         return not self._events
 
     def stale(self, port: str) -> bool:
-        """Say whether the device behind this port has been silent for longer than the port allows, or never
-        spoke.
+        """Return whether the device of this port is silent for longer than the port allows.
+
+        Also true before its first sample.
         """
         return port in self._stale

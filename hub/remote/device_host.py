@@ -15,14 +15,15 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.devices.clock_watch import ClockWatch
-from hub.devices.loop import DeviceLoop
-from hub.devices.uplink import DeviceUplink, Run
+from hub.devices.clock_sync import ClockSync
+from hub.devices.device_thread import DeviceThread
+from hub.devices.run_info import RunInfo
+from hub.devices.uplink import DeviceUplink
 from hub.participant import Device
 from hub.planning.registry import make
-from hub.transport.control_client import ask, present
+from hub.transport.control_client import ask, join_session
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import ConnectError, MessageError, ParticipantError
 from schemas.keys import Keys
@@ -60,7 +61,7 @@ class DeviceHost:
             request,
             directory,
         )
-        self._loop: DeviceLoop | None = None
+        self._loop: DeviceThread | None = None
         self._held: tuple[Any, ...] = ()
         self._failure: ParticipantError | None = None
         self._over = threading.Event()
@@ -77,7 +78,7 @@ class DeviceHost:
             while True:
                 try:
                     with self._connect() as session:
-                        reply = present(session, self._keys, self._request)
+                        reply = join_session(session, self._keys, self._request)
                         joined, told = True, ""
                         self._take_part(session, reply)
                     log.warning(
@@ -100,7 +101,7 @@ class DeviceHost:
         """Go along with a run until it is over."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
-        run = Run(reply.plan, keys, reply.run, reply.admission)
+        run = RunInfo(reply.plan, keys, reply.run, reply.admission)
         with ExitStack() as stack:
             gone = session.liveliness().declare_subscriber(
                 keys.alive("hub", "hub"), Callback(self._hub_came_or_went, indirect=True), history=True
@@ -109,7 +110,7 @@ class DeviceHost:
             refused = session.declare_publisher(
                 keys.refused("device", self._name), encoding=zenoh.Encoding.APPLICATION_CDR
             )
-            drops = Drops(tell=lambda key: refused.put(encode(StringMessage(data=key))))
+            refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
             try:
                 loop = self._device_loop(reply)
             except ParticipantError as error:
@@ -118,8 +119,8 @@ class DeviceHost:
                     self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}),
                 )
                 raise
-            clock = stack.enter_context(ClockWatch(session, keys))
-            uplink = DeviceUplink(planned, run, session, loop, drops, clock.offset)
+            clock = stack.enter_context(ClockSync(session, keys))
+            uplink = DeviceUplink(planned, run, session, loop, refusals, clock.offset)
             stack.callback(uplink.close)
             loop.attach(uplink)
             token = session.liveliness().declare_token(keys.alive("device", self._name))
@@ -137,7 +138,7 @@ class DeviceHost:
                 )
                 raise self._failure
 
-    def _device_loop(self, reply: JoinReply) -> DeviceLoop:
+    def _device_loop(self, reply: JoinReply) -> DeviceThread:
         """Return the loop of the device, which stays open from one run to the next unless the scenario wants
         another one.
         """
@@ -152,7 +153,7 @@ class DeviceHost:
                 raise ParticipantError(self._name, -1, f"'{planned.kind}' is no device here")
             device.learn_hub(self._connect)
             self._loop, self._held = (
-                DeviceLoop(self._name, device, planned.read_ns, failed=self._device_failed),
+                DeviceThread(self._name, device, planned.read_ns, failed=self._device_failed),
                 wanted,
             )
             self._loop.start(directory)

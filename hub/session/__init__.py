@@ -1,1 +1,1 @@
-"""One session: its clock, its participants, its beginning and its end."""
+"""One session: clock, step loop, control requests, start and end."""

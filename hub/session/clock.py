@@ -9,29 +9,34 @@ from hub.planning.plan import Plan
 __all__ = ["Clock"]
 
 _WINDOW_NS = 10_000_000
-"""Simulated time that a grant covers where nothing enters and the scenario does not say: what is asked of the
-hub then takes effect at 100 Hz of simulated time, and turning round costs a step of 1 ms a tenth.
+"""Simulated time that a grant covers where nothing enters and the scenario sets no window.
+
+Requests to the hub then take effect at 100 Hz of simulated time, and a step of 1 ms bears a tenth of what a
+grant costs.
 """
 
 _CAUGHT_UP_NS = 50_000_000
-"""By how much a step may come late before simulated time slips (docs/decisions/0034): two pictures of the
-endoscope drawn without a GPU take 22 ms.
+"""How late a step may be before simulated time slips (docs/decisions/0034).
+
+Two pictures of the endoscope drawn without a GPU take 22 ms.
 """
 
 
 class Clock:
-    """Hands out horizons in steps.
+    """The simulated time of a run, and the horizon of each grant, in steps.
 
-    Pace `fast` never waits; `realtime` follows the wall clock and counts what comes late.
+    Pace `fast` never waits; `realtime` follows the wall clock and counts late steps. By default a grant is
+    one step in real time, where every step waits for the wall clock, and with several hosts, where the end of
+    a process inside a grant would stay unnoticed until its horizon.
+
+    Args:
+        plan: The plan of the session.
+        window: The most steps of a grant; None: as many as are of use.
+        realtime: Follow the wall clock.
+        steps: The number of steps of the whole run; None: until it is stopped.
     """
 
     def __init__(self, plan: Plan, *, window: int | None, realtime: bool, steps: int | None) -> None:
-        """Take the most steps of a grant (None: as many as are of use), the pace, and the number of steps of
-        the whole run (None: until stopped).
-
-        A window has to be asked for in real time, where every step waits for the wall clock, and with several
-        hosts, of whose steps inside a grant nothing is heard if one of them dies.
-        """
         self.step_ns = plan.step_ns
         self.step = 0
         self.late_steps = 0
@@ -53,14 +58,14 @@ class Clock:
 
     @property
     def done(self) -> bool:
-        """Say whether the run has all its steps."""
+        """Whether all steps of the run are done."""
         return self.steps is not None and self.step >= self.steps
 
     def horizon(self, most: int | None = None) -> int:
         """Return how many steps the next grant covers.
 
-        No participant that listens to a device may start a step inside a grant, or it would miss the newest
-        samples; and no device may be due inside it that is to be written what the others have computed.
+        Inside a grant, no participant that reads a device may start a step, or it would miss the newest
+        samples; and no device may be due that is written what the others have computed.
         """
         count = self._window if most is None else min(self._window, most)
         if self.steps is not None:
@@ -70,13 +75,13 @@ class Clock:
         return count
 
     def start(self) -> None:
-        """Let wall time run from here, at the beginning and after a pause."""
+        """Let wall time run from now, at the start and after a pause."""
         self._wall_zero_ns = monotonic_ns() - self.time_ns
 
     def advance(self, count: int) -> None:
-        """Go on by `count` steps; in real time wait for the wall clock.
+        """Advance by `count` steps; in real time wait for the wall clock.
 
-        What comes late is caught up by the next steps; what is too late for that slips.
+        Later steps catch up a delay, up to a limit; beyond it simulated time slips.
         """
         self.step += count
         if not self.realtime:

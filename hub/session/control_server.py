@@ -16,7 +16,7 @@ from hub.devices.network_link_control import NetworkLinkControl, NetworkLinkRequ
 from hub.session.run_state import RunState
 from hub.transport.control_messages import ClockReply, Empty, JoinRequest, Refusal, SetRequest, StepRequest
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import decode, encode, message_type
 from schemas.errors import MessageError, TrocarError
 from schemas.keys import Keys
@@ -28,7 +28,7 @@ Q = TypeVar("Q", bound=BaseModel)
 
 
 class Joins(Protocol):
-    """Who answers hosts that join."""
+    """Answers hosts that join."""
 
     def join(self, request: JoinRequest) -> BaseModel:
         """Return the reply; raises MessageError to refuse."""
@@ -36,7 +36,17 @@ class Joins(Protocol):
 
 
 class ControlServer:
-    """Answers control requests in Zenoh's threads; a request that is refused gets the reason."""
+    """Answers control requests in Zenoh's threads; a refused request gets the reason.
+
+    Args:
+        session: The hub's Zenoh session.
+        keys: The keys of the session.
+        state: What `pause`, `resume`, `step` and `shutdown` change.
+        inlets: What `set` writes into.
+        network_links: What `link` changes.
+        joins: What answers `join`.
+        refusals: Counts the requests that are refused.
+    """
 
     def __init__(
         self,
@@ -46,12 +56,9 @@ class ControlServer:
         inlets: Inlets,
         network_links: NetworkLinkControl,
         joins: Joins,
-        drops: Drops,
+        refusals: Refusals,
     ) -> None:
-        """Steer `state`, write into `inlets`, change links and let hosts join; what is refused is counted in
-        `drops`.
-        """
-        self._drops = drops
+        self._refusals = refusals
         self._inlets = inlets
         self._queryables = [
             self._declare(
@@ -79,7 +86,7 @@ class ControlServer:
         handler: Callable[[Q], BaseModel],
         key_of: Callable[[Q], str] | None = None,
     ) -> zenoh.Queryable[None]:
-        """Answer on `key`; where that stands for several, `key_of` says on which of them a request may come."""
+        """Answer on `key`; if that is a pattern, a request is allowed on the key that `key_of` returns."""
 
         def answer(query: zenoh.Query) -> None:
             at = key
@@ -91,13 +98,13 @@ class ControlServer:
                     if key_of is not None:
                         if not query.key_expr.intersects(key_of(request)):
                             raise MessageError(
-                                f"this request belongs on {key_of(request)}, and came on {query.key_expr}"
+                                f"this request belongs on {key_of(request)}, and was sent on {query.key_expr}"
                             )
                         at = key_of(request)
                     reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
                     reason = _reason(error)
-                    self._drops.refuse(key, reason)
+                    self._refusals.refuse(key, reason)
                     reply = Refusal(refused=reason)
                 query.reply(
                     at,
@@ -135,7 +142,7 @@ class ControlServer:
 
 
 def _reason(error: Exception) -> str:
-    """Return why a request is refused, for the person who made it."""
+    """Return why a request is refused, for the person who sent it."""
     if not isinstance(error, ValidationError):
         return str(error)
     found = error.errors(include_url=False)

@@ -26,7 +26,7 @@ __all__ = ["in_one_host", "launch", "plan_of"]
 
 
 def plan_of(scenario: Scenario, params: Mapping[str, Params]) -> tuple[Plan, dict[str, Stepped | Device]]:
-    """Return the wiring of `scenario`, and its participants as they declare themselves; raises ScenarioError."""
+    """Return the plan of `scenario`, and its participants, not configured; raises ScenarioError."""
     kinds = {name: spec.kind for name, spec in scenario.participants.items()}
     participants = {name: registry.load(kind)(name, params[name]) for name, kind in kinds.items()}
     return (
@@ -54,8 +54,8 @@ def launch(
 ) -> Session:
     """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
 
-    `outside`: where other machines may join by TLS, with the hub's certificate; that is looked for in
-    `certificates`, by default in this user's directory.
+    `outside` are the endpoints where other machines may join by TLS, with the hub's certificate from
+    `certificates`, by default this user's directory.
     """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
     plan, participants = plan_of(scenario, loaded.params)

@@ -1,4 +1,4 @@
-"""Whether a session runs, is paused or is to end."""
+"""Whether a session runs, is paused or shall end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["RunState"]
 
 
 class RunState:
-    """Whether the session runs, is paused or is to end; shared by the clock loop and the control threads."""
+    """Whether the session runs, is paused or shall end; shared by the step loop and the control threads."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -20,7 +20,7 @@ class RunState:
         self._set(0)
 
     def resume(self) -> None:
-        """Go on without limit."""
+        """Continue without a limit."""
         self._set(None)
 
     def step(self, steps: int) -> None:
@@ -30,7 +30,7 @@ class RunState:
             self._changed.notify_all()
 
     def shutdown(self) -> None:
-        """End the session in good order at the next communication point."""
+        """End the session at the next communication point."""
         with self._changed:
             self._ending = True
             self._changed.notify_all()
@@ -42,7 +42,7 @@ class RunState:
 
     @property
     def ending(self) -> bool:
-        """Say whether the session is to end."""
+        """Whether the session shall end."""
         return self._ending
 
     @property
@@ -51,13 +51,13 @@ class RunState:
         return self._budget
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait while paused, at most `timeout_s`; say whether the session may go on."""
+        """Wait while paused, at most `timeout_s`; return whether the session may continue."""
         with self._changed:
             self._changed.wait_for(lambda: self._budget != 0 or self._ending, timeout_s)
             return self._budget != 0 or self._ending
 
     def spend(self, steps: int) -> None:
-        """Count steps that were taken."""
+        """Subtract steps that were taken from the budget."""
         with self._changed:
             if self._budget is not None:
                 self._budget = max(self._budget - steps, 0)

@@ -1,6 +1,6 @@
-"""What the signals of one participant are for one device of the wall clock, all of a step in one message.
+"""Bundles: the signals of one participant for one wall-time device, all of a step in one message.
 
-A gateway to ROS is told a hundred of them at a time. As a message each they took the hub 1.9 ms of a step
+A gateway to ROS receives a hundred of them at a time. As a message each they took the hub 1.9 ms of a step
 (docs/decisions/0034).
 """
 
@@ -18,51 +18,51 @@ from schemas.errors import MessageError
 __all__ = ["Bundle", "bundled", "unpacked"]
 
 _HEAD = struct.Struct("<II")
-"""Which of the outlets, and how many bytes of CDR follow."""
+"""Index of the connection, and the number of bytes of CDR that follow."""
 
 
 def bundled(plan: Plan, source: str, device: str) -> list[ConnectionToDevice]:
-    """Return the connections whose values go together, in the order in which both ends count them: those of
-    signals.
-    """
-    between = (outlet for outlet in plan.to_devices if (outlet.source, outlet.target) == (source, device))
+    """Return the connections in a bundle, those of signals, in the order of their indices."""
     return [
         outlet
-        for outlet in between
-        if plan.participants[source].port(outlet.source_port).variability == "signal"
+        for outlet in plan.to_devices
+        if (outlet.source, outlet.target) == (source, device)
+        and plan.participants[source].port(outlet.source_port).variability == "signal"
     ]
 
 
 class Bundle:
-    """Collects and publishes. A device to which the way is choked misses some, and holds nobody up."""
+    """Collects the values of a step and publishes them under `key`.
+
+    A device whose connection is congested misses some, and delays no one.
+    """
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
-        """Take the key on which the device listens."""
         self._parts: list[bytes] = []
-        self._way = Publisher(session, key, zenoh.CongestionControl.DROP, lambda: None, always=False)
+        self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, lambda: None, always=False)
 
     @property
-    def wanted(self) -> bool:
-        """Whether the device listens."""
-        return self._way.wanted
+    def needed(self) -> bool:
+        """Whether the device subscribes."""
+        return self._publisher.needed
 
     def add(self, index: int, payload: bytes) -> None:
-        """Put the value of an outlet to those that go with this step."""
+        """Add the value of the connection with this index."""
         self._parts += _HEAD.pack(index, len(payload)), payload
 
     def send(self, tag: bytes) -> None:
-        """Publish what has been collected, if there is anything."""
+        """Publish what was added since the last time, if anything."""
         if self._parts:
-            self._way.put(b"".join(self._parts), tag)
+            self._publisher.put(b"".join(self._parts), tag)
             self._parts.clear()
 
     def close(self) -> None:
         """Publish no more."""
-        self._way.close()
+        self._publisher.close()
 
 
 def unpacked(payload: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield outlet and CDR of each value in a bundle. Raises MessageError if the bytes are none."""
+    """Yield index and CDR of each value in a bundle; raises MessageError if the bytes are invalid."""
     at = 0
     while at < len(payload):
         if len(payload) - at < _HEAD.size:

@@ -1,5 +1,4 @@
-"""Where the values of one output port wait for whoever needs them: the same rules inside a process and
-between processes.
+"""Cells: the last values of an output port, by the same rules inside a process and between processes.
 
 A value carries the step in which its source computed it (the *tag*; -1 for the value at time 0). Readers ask
 for a tag, never for "the newest", so that the result does not depend on timing or on who runs where.
@@ -20,32 +19,36 @@ INITIAL = -1
 
 
 class Receiver(Protocol):
-    """Where a remote cell's values come from."""
+    """Receives the values of a remote cell."""
 
     def receive(self) -> tuple[int, Any]:
         """Wait for the next valid value; return its tag and the value."""
         ...
 
     def poll(self) -> tuple[int, Any] | None:
-        """Return the next valid value if one is here."""
+        """Return the next valid value if one has arrived."""
         ...
 
 
 class Cell:
-    """The last values of one output port of a participant in this process."""
+    """The last values of one output port of a participant in this process.
+
+    Args:
+        period: The source's period, in steps.
+        stride: The distance of two values, in steps.
+        depth: The number of values that readers may look back.
+    """
 
     def __init__(self, period: int, stride: int, depth: int) -> None:
-        """Take the source's period and the distance of two values, both in steps, and how many values readers
-        may look back.
-        """
         self._period = period
         self.stride = stride
         self._depth = depth
         self._values: dict[int, Any] = {}
 
     def put(self, tag: int, value: Any) -> None:
-        """Store the value computed in step `tag`; an array is copied if readers look back, as its owner may
-        reuse it.
+        """Store the value computed in step `tag`.
+
+        An array is copied if readers look back, as its owner may reuse it.
         """
         if self._depth == 1:
             self._values = {tag: value}
@@ -59,14 +62,15 @@ class Cell:
         return self._values[tag]
 
     def tag(self, step: int, *, fresh: bool) -> int:
-        """Return the tag that a reader in `step` sees: of the newest step begun (fresh), or of the newest
-        completed by then.
+        """Return the tag that a reader in `step` sees.
+
+        It is that of the newest step begun (`fresh`), or of the newest step completed by then.
         """
         count = (step + self._period if fresh else step) // self.stride
         return count * self.stride - self._period if count else INITIAL
 
     def valid_from(self, tag: int) -> int:
-        """Return the communication point at which the value of `tag` holds: the end of the step that made it."""
+        """Return the communication point at which the value of `tag` holds: the end of its step."""
         return tag + self._period if tag > INITIAL else 0
 
     def before(self, tag: int) -> int:
@@ -79,7 +83,10 @@ class Cell:
 
 
 class RemoteCell(Cell):
-    """The values of an output port of a participant in another process; `get` waits for them to arrive."""
+    """The values of an output port of a participant in another process; `get` waits for them to arrive.
+
+    `listener` is called with each of them and its tag, once and in order.
+    """
 
     def __init__(
         self,
@@ -87,48 +94,48 @@ class RemoteCell(Cell):
         stride: int,
         depth: int,
         receiver: Receiver,
-        heard: Callable[[int, Any], None] | None = None,
+        listener: Callable[[int, Any], None] | None = None,
     ) -> None:
-        """Take where the values come from; `heard` is shown each of them with its tag, once, in order."""
         super().__init__(period, stride, depth)
         self._receiver = receiver
-        self._heard = heard
+        self._listener = listener
         self._newest = INITIAL - 1
         self.waiting = False
-        """Whether somebody waits in `get` now."""
+        """Whether `get` waits for a value now."""
 
     def primed(self) -> bool:
-        """Say whether the value at time 0 is here; later values must not have been asked for yet."""
+        """Return whether the value at time 0 has arrived; to be called before any `get`."""
         while INITIAL not in self._values and (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)
         return INITIAL in self._values
 
     def _keep(self, tag: int, value: Any) -> None:
-        # the value at time 0 is sent until every host has it; whatever else is old is a repetition
+        # the value at time 0 is repeated until every host has it; any other old value is a duplicate
         if tag > self._newest:
             self._newest = tag
             self.put(tag, value)
-            if self._heard is not None:
-                self._heard(tag, value)
+            if self._listener is not None:
+                self._listener(tag, value)
 
     def take_until(self, tag: int) -> None:
-        """Take what has arrived up to the value of step `tag`, the next one that is asked for: whoever sends
-        waits where too much is not taken.
+        """Receive what has arrived up to the value of step `tag`, the next one that is read.
+
+        A sender waits while too many of its values are not received.
         """
         while self._newest < tag and (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)
 
     def drain(self) -> None:
-        """Take what has arrived and nobody has asked for."""
+        """Receive what has arrived and was not read."""
         while (arrived := self._receiver.poll()) is not None:
             self._keep(*arrived)
 
     def get(self, tag: int) -> Any:
-        """Return the value computed in step `tag`, as soon as it is here."""
+        """Return the value computed in step `tag`, when it has arrived."""
         while tag not in self._values:
             if self._newest > tag:
                 raise SessionError(
-                    f"the value of step {tag} was lost on its way: step {self._newest} arrived instead"
+                    f"the value of step {tag} was lost: that of step {self._newest} arrived instead"
                 )
             self.waiting = True
             self._keep(*self._receiver.receive())

@@ -1,4 +1,4 @@
-"""Asks the control queryables of a session."""
+"""Sends requests to the control queryables of a session."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
 from schemas.ros import StringMessage
 
-__all__ = ["ask", "present"]
+__all__ = ["ask", "join_session"]
 
 _PATIENCE_S = 5.0
 
@@ -27,7 +27,7 @@ def ask(
 ) -> R:
     """Send a control request and return the reply.
 
-    Raises ConnectError if nobody answers in time, MessageError if the request is refused.
+    Raises ConnectError if there is no answer in time, MessageError if the request is refused.
     """
     replies = session.get(
         key, payload=encode(StringMessage(data=request.model_dump_json())), timeout=timeout_s
@@ -42,15 +42,14 @@ def ask(
             try:
                 raise MessageError(Refusal.model_validate_json(text).refused) from None
             except ValidationError as error:
-                raise MessageError(f"{key} answered something else than {reply_model.__name__}") from error
-    raise ConnectError(
-        f"nobody answers on {key}: is the hub running, and does its session have what this names?"
-    )
+                raise MessageError(f"the answer on {key} is not a valid {reply_model.__name__}") from error
+    raise ConnectError(f"no answer on {key}: is the hub running, and does its session have what this names?")
 
 
-def present(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
-    """Present a host to the hub, which gets a moment if it has only just begun to listen; raises what `ask`
-    raises.
+def join_session(session: zenoh.Session, keys: Keys, request: JoinRequest) -> JoinReply:
+    """Join a session with a host, and return the hub's reply.
+
+    A hub that has only just started to listen gets a few seconds. Raises what `ask` raises.
     """
     deadline = monotonic() + _PATIENCE_S
     while True:

@@ -17,7 +17,7 @@ class _Json(BaseModel):
 
 
 class Empty(_Json):
-    """Nothing to say."""
+    """A request or a reply without content."""
 
 
 class Refusal(_Json):
@@ -33,7 +33,7 @@ class StepRequest(_Json):
 
 
 class SetRequest(_Json):
-    """Write `value` to an input that nothing feeds: numbers for a vector, else the message as JSON."""
+    """Write `value` to an input without a connection: numbers for a vector, else the message as JSON."""
 
     participant: str
     port: str
@@ -41,35 +41,36 @@ class SetRequest(_Json):
 
 
 class JoinRequest(_Json):
-    """A host process presents itself (first request), and says that its participants are configured (second)."""
+    """A host process joins (first request), and reports that its participants are configured (second)."""
 
     host: str
     pid: int
     ready: bool = False
     bonds: dict[str, tuple[BondSide, ...]] = {}
     failed: str = ""
-    """Why the host cannot go on: `participant: cause`."""
+    """Why the host has failed: `participant: cause`."""
 
 
 class ClockReply(_Json):
-    """What time it is by the hub's monotonic clock: when the question came, and when the answer went."""
+    """The time by the hub's monotonic clock: when the request arrived, and when the reply was sent."""
 
     received_ns: int
     replied_ns: int
 
 
 class JoinReply(_Json):
-    """All that a host needs to make its participants."""
+    """All that a host needs to create its participants."""
 
     session: str
     run: int
     admission: int
-    """Counts the hosts that were let in: a device's samples carry it, so that those of a host before it are
-    known.
+    """The number of this admission.
+
+    A device's samples carry it, so that those of an earlier host are recognised.
     """
     plan: Plan
     """For another machine, the part of it that concerns the host."""
     params: dict[str, dict[str, Any]]
     directory: str
     watched: list[tuple[str, str]]
-    """Outputs, as participant and port, whose every value the hub wants: for a recording or a measure."""
+    """Outputs, as participant and port, of which the hub needs every value: for a recording or a measure."""

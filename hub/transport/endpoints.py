@@ -1,6 +1,4 @@
-"""Where a hub listens, and where to look for hubs: on loopback without more ado, elsewhere through a gate
-that speaks TLS.
-"""
+"""Where a hub listens, and where to look for hubs: on loopback by TCP, elsewhere through a gate by TLS."""
 
 from __future__ import annotations
 
@@ -17,8 +15,8 @@ __all__ = [
     "free_endpoint",
     "is_loopback",
     "listening_endpoints",
-    "parted",
     "require_loopback",
+    "split_endpoints",
 ]
 
 PORTS = range(7447, 7467)
@@ -26,8 +24,9 @@ PORTS = range(7447, 7467)
 
 
 def free_endpoint(ports: Iterable[int] = PORTS) -> str:
-    """Return the endpoint of the first loopback port that is free. Port 0 is any free one. Raises
-    ConnectError if none is.
+    """Return the endpoint of the first free loopback port; port 0 stands for any free one.
+
+    Raises ConnectError if all are taken.
     """
     for port in ports:
         try:
@@ -42,8 +41,9 @@ def free_endpoint(ports: Iterable[int] = PORTS) -> str:
 
 
 def listening_endpoints() -> list[str]:
-    """Return the endpoints of the ports where somebody listens on loopback alone: who listens on all
-    addresses is the gate of a hub.
+    """Return the endpoints where a process listens on loopback alone.
+
+    One that listens on all addresses is the gate of a hub.
     """
     return [
         _endpoint(port) for port in PORTS if _answers("127.0.0.1", port) and not _answers("127.0.0.2", port)
@@ -56,11 +56,11 @@ def _answers(address: str, port: int) -> bool:
         return probe.connect_ex((address, port)) == 0
 
 
-def parted(endpoints: Iterable[str]) -> tuple[str, list[str]]:
-    """Return the loopback endpoint of a hub, a free one if `endpoints` has none, and those at which its gate
-    listens to other machines.
+def split_endpoints(endpoints: Iterable[str]) -> tuple[str, list[str]]:
+    """Return the loopback endpoint of a hub, and those at which its gate listens to other machines.
 
-    Raises ScenarioError if one of them is neither TCP on loopback nor TLS.
+    If `endpoints` has no loopback endpoint, a free one is chosen. Raises ScenarioError if one of them is
+    neither TCP on loopback nor TLS.
     """
     given = list(endpoints)
     outside = [endpoint for endpoint in given if endpoint.startswith("tls/")]
@@ -82,7 +82,7 @@ def require_loopback(endpoint: str) -> str:
 
 
 def is_loopback(endpoint: str) -> bool:
-    """Say whether an endpoint is TCP within this machine."""
+    """Return whether an endpoint is TCP within this machine."""
     if not endpoint.startswith("tcp/"):
         return False
     host, _ = address(endpoint)
@@ -92,7 +92,7 @@ def is_loopback(endpoint: str) -> bool:
 
 
 def address(endpoint: str) -> tuple[str, int]:
-    """Return host and port of an endpoint such as tls/hub.example:7447. Raises ScenarioError if it is none."""
+    """Return host and port of an endpoint such as tls/hub.example:7447; raises ScenarioError."""
     _, slash, rest = endpoint.partition("/")
     host, colon, port = rest.rpartition(":")
     if not (slash and colon and host and port.isdecimal()):

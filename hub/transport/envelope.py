@@ -1,4 +1,4 @@
-"""The attachments of values and samples on Zenoh: which run and step they belong to, and when they were sent."""
+"""The attachments of values and samples on Zenoh: run, step or sequence number, and time of sending."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from schemas.errors import MessageError
 __all__ = ["Stamp", "Tag"]
 
 _TAG = struct.Struct("<QIqqHHq")
-
-
 _STAMP = struct.Struct("<QQq")
 
 
@@ -47,7 +45,7 @@ class Tag:
 
     @classmethod
     def of(cls, sample: zenoh.Sample) -> Tag:
-        """Return the tag of `sample`; raises MessageError if it has none."""
+        """Return the tag of `sample`; raises MessageError if there is none."""
         raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
         if len(raw) != _TAG.size:
             raise MessageError(f"attachment of {len(raw)} bytes, a value's tag has {_TAG.size}")
@@ -58,13 +56,11 @@ class Stamp(NamedTuple):
     """The attachment of every sample of a device."""
 
     admission: int
-    """The hub counts the hosts that it lets join; a device that joined anew begins to count its samples anew.
-    """
+    """The number of its host's admission: a device that joins again counts its samples from 1 again."""
     sequence: int
     """Counts the samples of one port."""
     sent_ns: int
-    """When the device had it, by the clock of the device: the monotonic clock of its host, or simulated time.
-    """
+    """When the device returned it, by the monotonic clock of its host, or in simulated time."""
 
     def pack(self) -> bytes:
         """Return the bytes of a stamp."""
@@ -72,7 +68,7 @@ class Stamp(NamedTuple):
 
     @classmethod
     def of(cls, sample: zenoh.Sample) -> Stamp:
-        """Return the stamp of `sample`; raises MessageError if it has none."""
+        """Return the stamp of `sample`; raises MessageError if there is none."""
         raw = b"" if sample.attachment is None else sample.attachment.to_bytes()
         if len(raw) != _STAMP.size:
             raise MessageError(f"attachment of {len(raw)} bytes, a device's sample has {_STAMP.size}")

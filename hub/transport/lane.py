@@ -2,7 +2,7 @@
 
 A Zenoh hop wakes three threads, a socket one; between processes that wait for each other at every millisecond
 this is half of the step (docs/decisions/0006-fast-lane.md). The values are the same, under the same tags;
-what anybody else subscribes to is still published on Zenoh. Linux only, between processes of one user.
+other subscribers still receive them from Zenoh. Linux only, between processes of one user.
 """
 
 from __future__ import annotations
@@ -34,14 +34,15 @@ _SPIN_NS = 2_000_000
 
 
 def may_spin(hosts: int) -> bool:
-    """Say whether a host may keep its core busy while it waits: only if each of `hosts` processes has a core
-    of its own.
+    """Return whether a host may keep its core busy while it waits.
+
+    It may if each of `hosts` processes has a core of its own.
     """
     return hasattr(os, "sched_getaffinity") and hosts <= len(os.sched_getaffinity(0))
 
 
 def has_lane(port: Port, one_host: str, other_host: str) -> bool:
-    """Say whether the values of `port` can go past Zenoh from one host to the other."""
+    """Return whether the values of `port` can go from one host to the other without Zenoh."""
     if (
         not hasattr(socket, "SO_PEERCRED")
         or one_host.startswith("remote/")
@@ -54,16 +55,15 @@ def has_lane(port: Port, one_host: str, other_host: str) -> bool:
 
 
 def lane_address(run: int, participant: str, port: str, reader_host: str) -> str:
-    """Return the address of a lane, in Linux' abstract namespace: no file is left behind, however a process
-    ends.
-    """
+    """Return the address of a lane, in Linux' abstract namespace: it leaves no file behind."""
     name = f"{run:x} {participant} {port} {reader_host}"
     return f"\0trocar-{hashlib.blake2b(name.encode(), digest_size=16).hexdigest()}"
 
 
 def _is_ours(connection: socket.socket) -> bool:
-    """Say whether the process at the other end belongs to the same user: names in the abstract namespace are
-    open to all.
+    """Return whether the process at the other end belongs to the same user.
+
+    Names in the abstract namespace are open to all.
     """
     _, user, _ = _CREDENTIALS.unpack(
         connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
@@ -74,7 +74,7 @@ def _is_ours(connection: socket.socket) -> bool:
 class LaneSender:
     """The writing end.
 
-    It connects while values at time 0 are repeated; until then there is nobody to write to.
+    It connects while values at time 0 are repeated; before that there is no reader.
     """
 
     def __init__(self, address: str) -> None:
@@ -85,7 +85,7 @@ class LaneSender:
         """Send the value computed in `step`."""
         if self._socket is None and not (step == INITIAL and self._connect()):
             return
-        # the reader is gone; the hub, which looks after processes, knows why
+        # the reader is gone; the hub, which watches processes, reports why
         with suppress(BrokenPipeError, ConnectionResetError):
             self._socket.send(_HEAD.pack(step) + value.tobytes())  # pyright: ignore[reportOptionalMemberAccess]
 
@@ -93,7 +93,7 @@ class LaneSender:
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
             connection.connect(self._address)
-        except ConnectionRefusedError:  # nobody listens yet
+        except ConnectionRefusedError:  # the reader does not listen yet
             connection.close()
             return False
         if not _is_ours(connection):
@@ -109,10 +109,12 @@ class LaneSender:
 
 
 class LaneReceiver:
-    """The reading end; it listens from the start."""
+    """The reading end; it listens from the start.
+
+    With `spin` it polls for a while before it sleeps.
+    """
 
     def __init__(self, address: str, port: Port, *, spin: bool) -> None:
-        """`spin`: look again and again for a while before going to sleep."""
         self._spin_ns = _SPIN_NS if spin else 0
         self._codec = VectorCodec(port)
         self._connection: socket.socket | None = None
@@ -123,7 +125,7 @@ class LaneReceiver:
         self._length = _HEAD.size + 8 * self._codec.size
 
     def poll(self) -> tuple[int, Any] | None:
-        """Return the next value if one is here."""
+        """Return the next value if one has arrived."""
         if self._connection is None and not self._accept():
             return None
         try:
@@ -134,7 +136,7 @@ class LaneReceiver:
     def receive(self) -> tuple[int, Any]:
         """Wait for the next value and return it with its tag's step."""
         if self._connection is None:
-            raise MessageError(f"port '{self._codec.port.name}': nobody has connected to this lane yet")
+            raise MessageError(f"port '{self._codec.port.name}': no sender has connected to this lane yet")
         until_ns = perf_counter_ns() + self._spin_ns
         while perf_counter_ns() < until_ns:
             with suppress(BlockingIOError):
@@ -155,7 +157,7 @@ class LaneReceiver:
 
     def _parse(self, packet: bytes) -> tuple[int, Vector]:
         while not packet:
-            sleep(1.0)  # the writer is gone: the hub reports it and interrupts whoever waits here
+            sleep(1.0)  # the sender is gone: the hub reports it and interrupts this thread
         if len(packet) != self._length:
             raise MessageError(
                 f"port '{self._codec.port.name}': a packet of {len(packet)} bytes, expected {self._length}"

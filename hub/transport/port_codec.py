@@ -14,7 +14,7 @@ __all__ = ["PortCodec"]
 
 
 class PortCodec:
-    """Values of one port to CDR and back, whatever its type."""
+    """Encodes and decodes the values of one port, of any type."""
 
     def __init__(self, port: Port) -> None:
         self.port = port
@@ -27,14 +27,16 @@ class PortCodec:
         return self.vector.encode(value, time_ns) if self.vector is not None else encode(value)
 
     def decode(self, payload: bytes) -> Any:
-        """Return the vector or message in `payload` written by a `PortCodec` of the same port; raises
-        MessageError.
+        """Return the vector or message in `payload`, as a `PortCodec` of the same port has encoded it.
+
+        Raises MessageError if it is invalid.
         """
         return self.vector.decode(payload) if self.vector is not None else decode(self._model, payload)
 
     def accept(self, payload: bytes) -> Any:
-        """Return the vector or message in `payload` written by anybody (joints in any order, frame left out);
-        raises MessageError.
+        """Return the vector or message in `payload`, from any sender: joints in any order, frame left out.
+
+        Raises MessageError if it is invalid.
         """
         if self.vector is not None and self.vector.fits(payload):
             return self.vector.decode(payload)

@@ -23,8 +23,19 @@ __all__ = ["PortPublisher"]
 class PortPublisher:
     """Publishes the values of one output port; without a reader it costs a flag test.
 
-    Devices of the wall clock hear events under a key of their own, and signals in bundles. A step without
-    events is told only to those who need every value (`always`): dozens of quiet ports cost nothing.
+    Wall-time devices receive events under a key of their own, and signals in bundles. A step without events
+    is published only for readers that need every value (`always`): dozens of quiet ports cost nothing.
+
+    Args:
+        session: The Zenoh session.
+        keys: The keys of the session.
+        planned: The participant.
+        port: Its output.
+        run: The number of the run.
+        always: A reader needs every value from the first on.
+        feeds: Wall-time devices receive its events.
+        bundles: Where its signal goes to wall-time devices, with its index in each.
+        lanes: Fast lanes to other hosts of this machine.
     """
 
     def __init__(
@@ -40,60 +51,49 @@ class PortPublisher:
         bundles: Sequence[tuple[Bundle, int]] = (),
         lanes: Sequence[LaneSender] = (),
     ) -> None:
-        """`always`: somebody needs every value from the first on; `feeds`: a device of the wall clock takes
-        its events; `bundles`: for its signals.
-        """
         self.codec = PortCodec(port)
         self._lanes = lanes
         self._run = run
         self._always = always
         self._bundles = bundles
         block = zenoh.CongestionControl.BLOCK
-        self._ways: list[Publisher] = []
-        self._ways.append(
-            Publisher(
-                session,
-                keys.output(planned.key_role, planned.name, port.name),
-                block,
-                self._look,
-                always=always,
-            )
-        )
+        self._publishers: list[Publisher] = []
+        key = keys.output(planned.key_role, planned.name, port.name)
+        self._publishers.append(Publisher(session, key, block, self._update, always=always))
         if feeds:
-            self._ways.append(
-                Publisher(session, keys.feed(planned.name, port.name), block, self._look, always=False)
-            )
-        self._look()
+            key = keys.feed(planned.name, port.name)
+            self._publishers.append(Publisher(session, key, block, self._update, always=False))
+        self._update()
 
-    def _look(self) -> None:
-        self._wanted = [way for way in self._ways if way.wanted]
+    def _update(self) -> None:
+        self._needed = [publisher for publisher in self._publishers if publisher.needed]
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
         for lane in self._lanes:
             lane.send(step, value)
-        bundles = [bundle for bundle in self._bundles if bundle[0].wanted] if self._bundles else ()
-        if not self._wanted and not bundles:
+        bundles = [bundle for bundle in self._bundles if bundle[0].needed] if self._bundles else ()
+        if not self._needed and not bundles:
             return
         if not self.codec.is_event:
             payload = self.codec.encode(value, time_ns)
             for bundle, index in bundles:
                 bundle.add(index, payload)
-            if self._wanted:
+            if self._needed:
                 self._send(payload, Tag.pack(self._run, 0, step, time_ns))
             return
         if not value and self._always:
-            self._ways[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
+            self._publishers[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
             self._send(encode(message), Tag.pack(self._run, 0, step, time_ns, index, len(value)))
 
     def _send(self, payload: bytes, tag: bytes) -> None:
-        for way in self._wanted:
-            way.put(payload, tag)
+        for publisher in self._needed:
+            publisher.put(payload, tag)
 
     def close(self) -> None:
         """Stop publishing."""
         for lane in self._lanes:
             lane.close()
-        for way in self._ways:
-            way.close()
+        for publisher in self._publishers:
+            publisher.close()

@@ -10,7 +10,7 @@ from zenoh.handlers import FifoChannel
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.errors import MessageError
 from schemas.message import Message
 from schemas.ports import Port
@@ -19,14 +19,15 @@ __all__ = ["PortReceiver"]
 
 
 class PortReceiver:
-    """Receives the values of one output port of another process, in order; invalid and foreign messages are
-    dropped and counted.
+    """Receives the values of one output port of another process, in order.
+
+    Invalid messages and those of another run are refused and counted.
     """
 
-    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, drops: Drops) -> None:
+    def __init__(self, session: zenoh.Session, key: str, port: Port, run: int, refusals: Refusals) -> None:
         self._codec = PortCodec(port)
         self._run = run
-        self._drops = drops
+        self._refusals = refusals
         self._newest = self._batch_step = INITIAL - 1
         self._batch: tuple[Message, ...] = ()
         self._subscriber = session.declare_subscriber(key, FifoChannel(4096))
@@ -39,7 +40,7 @@ class PortReceiver:
                 return arrived
 
     def poll(self) -> tuple[int, Any] | None:
-        """Return the next valid value if one is here."""
+        """Return the next valid value if one has arrived."""
         while (sample := self._subscriber.try_recv()) is not None:
             arrived = self._accept(sample)
             if arrived is not None:
@@ -53,12 +54,12 @@ class PortReceiver:
                 raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
             if tag.step <= self._newest:
                 if tag.step == INITIAL:
-                    return None  # it is sent until every host has it
-                raise MessageError(f"the value of step {tag.step} has been here already")
+                    return None  # it is repeated until every host has it
+                raise MessageError(f"the value of step {tag.step} has arrived already")
             payload = sample.payload.to_bytes()
             value = self._batched(tag, payload) if self._codec.is_event else self._codec.decode(payload)
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
             return None
         if value is None:
             return None
@@ -66,10 +67,12 @@ class PortReceiver:
         return tag.step, value
 
     def _batched(self, tag: Tag, payload: bytes) -> tuple[Message, ...] | None:
-        """Put an event to those of the same step; return them once they are all here."""
+        """Add an event to those of the same step; return them when all have arrived."""
         batch = self._batch if tag.step == self._batch_step else ()
         if tag.index != len(batch):
-            raise MessageError(f"event {tag.index} of step {tag.step} comes where event {len(batch)} is due")
+            raise MessageError(
+                f"event {tag.index} of step {tag.step} arrived where event {len(batch)} is next"
+            )
         events = (self._codec.decode(payload),) if payload or tag.count else ()
         self._batch_step, self._batch = tag.step, (*batch, *events)
         return self._batch if tag.index + 1 >= tag.count else None

@@ -1,4 +1,4 @@
-"""A publisher on Zenoh that knows whether anybody listens."""
+"""A publisher on Zenoh that knows whether it has subscribers."""
 
 from __future__ import annotations
 
@@ -12,42 +12,45 @@ __all__ = ["Publisher"]
 
 
 class Publisher:
-    """Publishes under one key, at once and before all else; tells when the first listener comes and the last
-    one goes.
+    """Publishes under one key, immediately and with the highest priority.
+
+    Args:
+        session: The Zenoh session.
+        key: The key.
+        congestion: What happens to a message that cannot be sent now.
+        changed: Is called whenever `needed` may have changed.
+        always: It is needed without subscribers too.
     """
 
     def __init__(
         self,
         session: zenoh.Session,
         key: str,
-        choked: zenoh.CongestionControl,
+        congestion: zenoh.CongestionControl,
         changed: Callable[[], None],
         *,
         always: bool,
     ) -> None:
-        """`choked`: what becomes of a message that cannot go now; `changed` is called whenever `wanted` may
-        be another; `always`: it is wanted anyhow.
-        """
         self._publisher = session.declare_publisher(
             key,
             encoding=zenoh.Encoding.APPLICATION_CDR,
-            congestion_control=choked,
+            congestion_control=congestion,
             priority=zenoh.Priority.REAL_TIME,
             express=True,
         )
-        self.wanted = always
-        """Whether somebody listens."""
+        self.needed = always
+        """Whether there is a subscriber."""
         self._changed = changed
         if not always:
             self._listener = self._publisher.declare_matching_listener(Callback(self._match, indirect=False))
             self._match(self._publisher.matching_status)
 
     def _match(self, status: Any) -> None:
-        self.wanted = bool(status.matching)
+        self.needed = bool(status.matching)
         self._changed()
 
     def put(self, payload: bytes, tag: bytes) -> None:
-        """Publish a message with what goes along with it."""
+        """Publish a message with its attachment."""
         self._publisher.put(payload, attachment=tag)
 
     def close(self) -> None:

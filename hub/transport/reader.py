@@ -1,6 +1,4 @@
-"""How an input is read from the cell of its source, and what a device that follows the clock is fed from such
-readings.
-"""
+"""How an input is read from the cell of its source, also that of a device in simulated time."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ from schemas.ports import Port
 __all__ = ["DeviceInputs", "Reader", "as_messages"]
 
 Messages = Callable[[Any, int], tuple[Message, ...]]
-"""Takes a value and the time (ns) at which it is valid."""
+"""Makes messages of a value and the time (ns) at which it is valid."""
 
 
 @dataclass(slots=True)
@@ -29,14 +27,12 @@ class Reader:
     fresh: bool
     linear: bool
     messages: Messages | None
-    """For an event port: what makes its messages of a value of the source; None for a signal."""
+    """For an event port: makes its messages of a value of the source; None for a signal."""
     stride_s: float
     seen: int = INITIAL
 
     def events(self, step: int, step_ns: int) -> list[tuple[int, Message]]:
-        """Return what is new to an event port in `step`, oldest first, each with the time (ns) at which it is
-        valid.
-        """
+        """Return what is new in `step` on an event port, oldest first: time of validity (ns) and message."""
         if self.messages is None:
             raise ValueError(f"'{self.port}' is a signal")
         cell, tag = self.cell, self.cell.tag(step, fresh=self.fresh)
@@ -49,21 +45,19 @@ class Reader:
 
 
 class DeviceInputs:
-    """What one device that follows the clock is written: at a communication point, what all participants had
-    computed by then.
+    """The connected inputs of a device in simulated time.
+
+    At a communication point they are what all participants had computed by then.
     """
 
     def __init__(self, readers: Sequence[Reader], step_ns: int) -> None:
-        """Take the readers of the device's connected inputs."""
         self._events = [reader for reader in readers if reader.messages is not None]
         self._signals = [reader for reader in readers if reader.messages is None]
         self._newest = {reader.port: INITIAL - 1 for reader in self._signals}
         self._step_ns = step_ns
 
     def due(self, step: int) -> Iterator[tuple[str, int, Value]]:
-        """Yield port, time (ns) at which it is valid and value: every event, and the newest value of each
-        signal that has a new one.
-        """
+        """Yield port, time of validity (ns) and value of every event, and of each signal with a new value."""
         for reader in self._signals:
             tag = reader.cell.tag(step, fresh=False)
             if tag > self._newest[reader.port]:
@@ -75,8 +69,9 @@ class DeviceInputs:
 
 
 def as_messages(source: Port, target: Port) -> Messages | None:
-    """Return what makes the messages of an event port `target` of a value of `source`; None if the target is
-    a signal.
+    """Return the function that makes messages of an event port `target` of a value of `source`.
+
+    None if the target is a signal.
     """
     if target.variability == "signal":
         return None

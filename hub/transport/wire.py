@@ -1,4 +1,4 @@
-"""A host"s publishers and receivers on one Zenoh session, with the fast lanes beside it."""
+"""A host's connections to other processes: Zenoh, and fast lanes on the same machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hub.transport.cells import RemoteCell
 from hub.transport.lane import LaneReceiver, LaneSender, has_lane, lane_address
 from hub.transport.port_publisher import PortPublisher
 from hub.transport.port_receiver import PortReceiver
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.keys import Keys
 from schemas.ports import Port
 
@@ -21,38 +21,43 @@ __all__ = ["Wire"]
 
 
 class Wire:
-    """A host's publishers and receivers on one Zenoh session, with the fast lanes beside it."""
+    """A host's publishers and receivers on one Zenoh session, with its fast lanes.
+
+    Args:
+        session: The Zenoh session.
+        keys: The keys of the session.
+        run: The number of the run.
+        refusals: Counts the messages that are refused.
+        host: The host's name.
+        spin: Its lanes may keep a core busy while they wait.
+        watched: The outputs of which the hub needs every value.
+    """
 
     def __init__(
         self,
         session: zenoh.Session,
         keys: Keys,
         run: int,
-        drops: Drops,
+        refusals: Refusals,
         host: str,
         *,
         spin: bool,
         watched: Sequence[tuple[str, str]] = (),
     ) -> None:
-        """Take the session and the name of the host whose values go over it.
-
-        `spin`: its lanes may keep a core busy while they wait; `watched`: the outputs that the hub wants in
-        full.
-        """
         self._spin = spin
         self.host = host
         self._watched = set(watched)
         self.session = session
         self.keys = keys
         self.run = run
-        self.drops = drops
+        self.refusals = refusals
         self._publishers: list[PortPublisher] = []
         self._bundles: list[Bundle] = []
         self._receivers: list[PortReceiver | LaneReceiver] = []
         self._cells: list[RemoteCell] = []
 
     def bundle(self, source: str, device: str) -> Bundle:
-        """Return what carries the signals of a participant here to a device of the wall clock."""
+        """Return the bundle of a participant's signals for a wall-time device."""
         bundle = Bundle(self.session, self.keys.signals(source, device))
         self._bundles.append(bundle)
         return bundle
@@ -68,8 +73,8 @@ class Wire:
     ) -> PortPublisher:
         """Return a publisher of an output of a participant here; the hosts `readers` need every value.
 
-        Devices of the wall clock get events if it `feeds` them, and signals in `bundles`, each with the
-        number that it has there.
+        Wall-time devices receive its events if it `feeds` them, and its signal in `bundles`, each with the
+        signal's index in it.
         """
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, planned.name, port.name, host)) for host in fast]
@@ -94,10 +99,11 @@ class Wire:
         port: Port,
         stride: int,
         depth: int,
-        heard: Callable[[int, Any], None] | None = None,
+        listener: Callable[[int, Any], None] | None = None,
     ) -> RemoteCell:
-        """Return the cell of an output of a participant elsewhere; `heard` is shown each value that comes by
-        a lane.
+        """Return the cell of an output of a participant in another process.
+
+        `listener` is called with each value that arrives by a lane.
         """
         if has_lane(port, planned.host, self.host):
             receiver = LaneReceiver(
@@ -109,20 +115,20 @@ class Wire:
                 self.keys.output(planned.key_role, planned.name, port.name),
                 port,
                 self.run,
-                self.drops,
+                self.refusals,
             )
-            heard = None  # whoever watches it subscribes to it
+            listener = None  # an observer subscribes to it
         self._receivers.append(receiver)
-        cell = RemoteCell(planned.period, stride, depth, receiver, heard)
+        cell = RemoteCell(planned.period, stride, depth, receiver, listener)
         self._cells.append(cell)
         return cell
 
     def linked(self) -> bool:
-        """Say whether the initial value of every remote cell has arrived, that is, whether every link works."""
+        """Return whether the initial value of every remote cell has arrived."""
         return all(cell.primed() for cell in self._cells)
 
     def drain(self) -> None:
-        """Take the values that have arrived and nobody has asked for."""
+        """Receive the values that have arrived and were not read."""
         for cell in self._cells:
             cell.drain()
 

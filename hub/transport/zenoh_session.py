@@ -13,16 +13,16 @@ from schemas.errors import ConnectError
 __all__ = ["LEASE_MS", "open_session"]
 
 LEASE_MS = 10_000
-"""A peer that is silent for this long is gone. One that dies is known at once, as its sockets close; one on a
-busy machine may stand for seconds.
+"""A peer that is silent for this long is gone.
+
+The end of a process is known at once, as its sockets close; one on a busy machine may be silent for seconds.
 """
 
 
 _EVENT_BATCHES = 16
-"""Of 64 KiB, for events that wait for their way, Zenoh's most: three pictures.
+"""Batches of 64 KiB for events that wait to be sent, the most that Zenoh allows: three pictures.
 
-With its default, two, the second picture of a stereo pair was dropped now and then while the first one was on
-its way.
+With its default, two, the second picture of a stereo pair was dropped now and then while the first was sent.
 """
 
 
@@ -33,7 +33,7 @@ def open_session(
     connect: Sequence[str] = (),
     security: Mapping[str, Any] | None = None,
 ) -> zenoh.Session:
-    """Open a Zenoh session that scouts for nobody: it listens and connects where it is told to.
+    """Open a Zenoh session without scouting: it listens and connects only at the given endpoints.
 
     `security`: Zenoh's settings of TLS and of access, as `hub.security.credentials` and `hub.security.access`
     make them.

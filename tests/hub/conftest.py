@@ -66,15 +66,12 @@ InstallPlugin = Callable[..., None]
 Prepare = Callable[..., Session]
 
 _HANGS_S = 180
-"""A test of the hub that takes longer hangs: every thread's stack is printed, and the run of the tests ends.
-"""
+"""A test of the hub that takes longer hangs: all stacks are printed, and the test run ends."""
 
 
 @pytest.fixture
 def install_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[InstallPlugin]:
-    """Return a function that installs a distribution with the given entry points and module text, for one
-    test.
-    """
+    """Return a function that installs a distribution for one test, with entry points and a module."""
     modules: list[str] = []
 
     def install(
@@ -141,7 +138,7 @@ def toys(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> 
 
 @pytest.fixture
 def prepare(toys: None, tmp_path: Path) -> Prepare:
-    """Return a function that makes a session of a scenario's text, with overrides, on an endpoint of its own."""
+    """Return a function that makes a session of a scenario's text, on an endpoint of its own."""
 
     def prepare(text: str, *overrides: str, **options: Any) -> Session:
         file = tmp_path / "session.yaml"

@@ -1,4 +1,4 @@
-"""What the operating system knows of the processes of a session."""
+"""The processes of a session, as the operating system lists them."""
 
 import os
 from pathlib import Path

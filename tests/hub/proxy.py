@@ -1,4 +1,4 @@
-"""A network between a hub and a host that tests can choke and cut."""
+"""A network between a hub and a host that tests can hold and cut."""
 
 import socket
 import threading
@@ -27,7 +27,7 @@ class Proxy:
         self._listener.close()
 
     def hold(self):
-        """Let nothing through, and keep what comes for later."""
+        """Let nothing through, and keep what arrives for later."""
         self._flowing.clear()
 
     def go_on(self):
@@ -62,7 +62,7 @@ class Proxy:
     def _reach(self):
         try:
             return socket.create_connection(("127.0.0.1", self._target))
-        except OSError:  # nobody listens there any more
+        except OSError:  # the hub is gone
             return None
 
     def _forward(self, source, target):
@@ -76,7 +76,7 @@ class Proxy:
     @staticmethod
     def _close(end):
         with suppress(OSError):
-            end.shutdown(socket.SHUT_RDWR)  # wakes whoever reads from it
+            end.shutdown(socket.SHUT_RDWR)  # wakes the thread that reads from it
         end.close()
 
     @staticmethod

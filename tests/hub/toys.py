@@ -1,7 +1,7 @@
 """Small participants for the tests of the hub. Child processes find them as `toys:Name` through PYTHONPATH.
 
-Their states are chaotic or chained hashes, so that a value that comes a step too early or too late, twice or
-not at all, changes every state hash from there on.
+Their states are chaotic or chained hashes, so that a value that arrives a step too early or too late, twice
+or not at all, changes every state hash from there on.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MixerParams(Params):
 
 
 class Mixer(Bare):
-    """Folds three inputs into a chaotic state and gives it on."""
+    """Folds three inputs into a chaotic state, and publishes it."""
 
     params_model = MixerParams
 
@@ -97,7 +97,7 @@ class Chain(Bare):
 
 
 class Loud(Bare):
-    """Gives 32 KiB in each step."""
+    """Publishes 32 KiB in each step."""
 
     ports = (Port(name="out", causality="output", size=4096),)
 
@@ -109,7 +109,7 @@ class Loud(Bare):
 
 
 class Talker(Chain):
-    """Says between 0 and 4 things in a step."""
+    """Publishes 0 to 4 words in a step."""
 
     ports = (Port(name="words", causality="output", type=TEXT, variability="event"),)
 
@@ -169,7 +169,7 @@ class Ledger(Chain):
 
 
 class Follower(Chain):
-    """Listens to a device: a pose, the staleness of it, and buttons of which none may be lost."""
+    """Reads a device: a pose, its staleness, and buttons of which none may be lost."""
 
     ports = (
         Port(name="hand", causality="input", type=POSE),
@@ -194,7 +194,7 @@ class Follower(Chain):
 
 
 class Deaf(Bare):
-    """Listens to a device and does nothing with what it says; counts what comes."""
+    """Counts the fresh samples and the buttons of a device; its state does not depend on them."""
 
     ports = (
         Port(name="hand", causality="input", type=POSE),
@@ -273,9 +273,7 @@ class Player(Device):
 
 
 class Hand(Device):
-    """Lives in simulated time and says what it was told, folded: `numbers` in `a`, and how many words in `b`;
-    what is said last was told first.
-    """
+    """Lives in simulated time; `out` folds the numbers written to it, the time, and the count of words."""
 
     ports = (
         Port(name="numbers", causality="input", size=SIZE),
@@ -285,18 +283,18 @@ class Hand(Device):
     )
 
     def open(self, directory):
-        self.told, self.heard = np.zeros(SIZE), 0
+        self.folded, self.heard = np.zeros(SIZE), 0
 
     def write(self, port, value):
         if port == "words":
             assert value.data == f"word {self.heard}"
             self.heard += 1
         else:
-            self.told = (0.5 * self.told + value) % 1.0
+            self.folded = (0.5 * self.folded + value) % 1.0
 
     def read(self, t):
-        said = self.told + np.array([0.0, t * 1e-9, 1e-3 * self.heard])
-        return [Sample("out", Float64MultiArray(data=said)), Sample("unused", StringMessage(data=f"{t}"))]
+        value = self.folded + np.array([0.0, t * 1e-9, 1e-3 * self.heard])
+        return [Sample("out", Float64MultiArray(data=value)), Sample("unused", StringMessage(data=f"{t}"))]
 
     def close(self):
         pass
@@ -307,7 +305,7 @@ class PadParams(Params):
 
 
 class Pad(Device):
-    """Writes down, a line each, what it is told: words, and messages made of a signal."""
+    """Writes to a file, a line each, what it receives: words, and messages made of a signal."""
 
     params_model = PadParams
     ports = (
@@ -330,7 +328,7 @@ class Pad(Device):
 
 
 class Slow(Device):
-    """Takes 20 ms for what it is told."""
+    """Takes 20 ms for a write."""
 
     ports = (Port(name="numbers", causality="input", size=SIZE),)
 

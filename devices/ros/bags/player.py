@@ -20,7 +20,7 @@ from devices.ros.topics.row import Row
 from devices.ros.topics.rules import as_signal, check
 from devices.ros.topics.stamps import stamp_of, stamped
 from hub.participant import Device, Sample
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import message_type, validated
 from schemas.errors import MessageError
 from schemas.message import Message
@@ -48,7 +48,7 @@ class BagPlayer(Device):
         """Take the participant's name and what is to be played."""
         super().__init__(name, params)
         self._bag: RosBag | None = None
-        self._drops = Drops()
+        self._refusals = Refusals()
         self._playback = Playback()
 
     @property
@@ -83,7 +83,7 @@ class BagPlayer(Device):
                 bag.path,
                 listed(passed_over),
             )
-        self._drops = Drops()
+        self._refusals = Refusals()
         self._playback = Playback(self._play(bag, played))
 
     def read(self, t: int) -> list[Sample]:
@@ -106,7 +106,7 @@ class BagPlayer(Device):
             try:
                 message = rules[row.topic].heeded(raw, recorded_ns)
             except MessageError as error:
-                self._drops.refuse(f"'{self.name}': {topic}", f"{error} (at {time_ns / 1e9:g} s)")
+                self._refusals.refuse(f"'{self.name}': {topic}", f"{error} (at {time_ns / 1e9:g} s)")
                 continue
             if row.port is not None:
                 yield time_ns, Sample(row.port.name, stamped(message, time_ns))

@@ -4,14 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hub.devices.clock_offset import ClockOffset, Exchange
+from hub.devices.clock_offset import ClockExchange, ClockOffset
 
 S, MS = 10**9, 10**6
 
 
 def exchange(asked, offset, there, back, thinking=1000):
     received = asked + there + offset
-    return Exchange(asked, received, received + thinking, asked + there + thinking + back)
+    return ClockExchange(asked, received, received + thinking, asked + there + thinking + back)
 
 
 @given(st.integers(-(10**15), 10**15), st.integers(0, 50 * MS), st.integers(0, 50 * MS))
@@ -21,7 +21,7 @@ def test_an_offset_is_right_within_half_a_round_trip(offset, there, back):
     assert abs(one.offset_ns - offset) <= (there + back) / 2 + 1
 
 
-def test_the_quickest_exchange_of_the_last_ones_counts():
+def test_the_fastest_of_the_last_exchanges_counts():
     clocks, chance, offset = ClockOffset(), random.Random(1), 123 * S
     assert clocks.best is None
     for i in range(100):
@@ -47,7 +47,7 @@ def test_clocks_that_drift_apart_are_followed():
 
 
 @pytest.mark.parametrize("jump", [-3 * S, 7 * S])
-def test_a_clock_that_jumps_is_believed_at_once(jump):
+def test_a_clock_that_jumps_is_followed_at_once(jump):
     clocks = ClockOffset()
     for i in range(20):
         clocks.add(exchange(i * S, 0, MS, MS))

@@ -30,7 +30,7 @@ measure:
 
 
 def until(session, enough):
-    """Return what shuts `session` down once enough has happened: of the steps, the fresh ones, the presses."""
+    """Return a progress callback that shuts `session` down after enough steps, fresh ones and presses."""
 
     def look(progress):
         if enough(progress.step, *(progress.live[name][0] for name in ("fresh_steps", "pressed"))):
@@ -40,7 +40,7 @@ def until(session, enough):
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])
-def test_samples_enter_as_they_come(prepare, host):
+def test_samples_enter_as_they_arrive(prepare, host):
     session = prepare(SCENARIO, f"participants.player.host={host}")
     summary = session.run(until(session, lambda steps, fresh, pressed: fresh > 100 and pressed > 50))
     assert summary.dropped_messages == 0
@@ -61,7 +61,7 @@ def test_a_device_that_fails_ends_the_run(prepare, host, when):
     assert raised.value.participant == "player"
 
 
-def test_a_remote_device_may_go_and_come_back(prepare):
+def test_a_remote_device_may_leave_and_join_again(prepare):
     session = prepare(SCENARIO, "participants.player.host=remote")
     outcome, hosts, fresh_steps = [], [], [0.0]
 
@@ -118,7 +118,7 @@ def test_a_remote_device_may_go_and_come_back(prepare):
 
 
 TOLD = """\
-name: told
+name: written
 step: 1 ms
 pace: realtime
 participants:
@@ -132,8 +132,8 @@ connections:
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])
-def test_a_device_is_told_every_event_and_each_value_of_a_signal_once(prepare, tmp_path, host):
-    file = tmp_path / "told.txt"
+def test_a_device_receives_every_event_and_each_value_of_a_signal_once(prepare, tmp_path, host):
+    file = tmp_path / "written.txt"
     session = prepare(TOLD, f"participants.pad.file={file}", f"participants.talker.host={host}")
 
     def lines(port):
@@ -165,16 +165,16 @@ connections:
 """
 
 
-def test_a_device_that_is_slow_is_told_what_is_new_and_misses_the_rest(prepare):
+def test_a_slow_device_receives_the_newest_values_and_misses_the_rest(prepare):
     summary = prepare(SLOW).run()
-    told = summary.latency["state to force"]["mixer.out -> console.numbers"]
-    assert told["count"] < summary.steps / 5
+    latency = summary.latency["state to force"]["mixer.out -> console.numbers"]
+    assert latency["count"] < summary.steps / 5
     # in a queue the last would have waited for nearly all of it
-    assert told["largest_s"] < 0.25 * summary.wall_time_s
+    assert latency["largest_s"] < 0.25 * summary.wall_time_s
 
 
 @pytest.mark.parametrize("host", ["hub", "other"])
-def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connected(prepare, tmp_path, host):
+def test_device_samples_are_measured_and_recorded_with_or_without_a_connection(prepare, tmp_path, host):
     scenario = (
         SCENARIO.replace("  - player.buttons -> deaf.buttons\n", "")
         + "  x: {kind: peak-norm, of: player.hand.position}\n"
@@ -190,7 +190,7 @@ def test_what_a_device_says_is_measured_and_recorded_whether_or_not_it_is_connec
     assert verify(recording).same
 
 
-def test_a_device_that_sends_more_than_it_may_is_held_to_it(prepare, caplog):
+def test_a_device_that_exceeds_its_rate_limit_is_limited(prepare, caplog):
     session = prepare(SCENARIO, "participants.player.rate_limit=50")
     summary = session.run(until(session, lambda steps, fresh, pressed: steps > 1500))
     assert summary.dropped_messages > 500

@@ -3,11 +3,11 @@ from time import monotonic, sleep
 
 import pytest
 
-from hub.devices.diagnostics_log import Complaints
+from hub.devices.diagnostics_log import DiagnosticsLog
 from hub.participant import Device, Params
 from hub.planning.wiring import make_plan
 from hub.transport.endpoints import free_endpoint
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.keys import Keys
@@ -38,26 +38,24 @@ class Stylus(Device):
 
 @pytest.fixture
 def wire():
-    """A hub that listens to `far`, which is on another machine, and not to `near`; and a session that says
-    what it wants.
-    """
+    """A hub that subscribes to `far` on another machine and not to `near`, and a session that may send."""
     specs = {"far": {"kind": "stylus", "host": "remote"}, "near": {"kind": "stylus", "host": "desk"}}
     plan = make_plan(
         Scenario.model_validate({"name": "s", "step": "1 ms", "duration": "1 s", "participants": specs}),
         {name: Stylus(name, Params()) for name in specs},
         dict.fromkeys(specs, "device"),
     )
-    endpoint, drops, keys = free_endpoint([0]), Drops(), Keys("s")
+    endpoint, refusals, keys = free_endpoint([0]), Refusals(), Keys("s")
     with (
         open_session("router", listen=[endpoint]) as hub,
         open_session("client", connect=[endpoint]) as device,
     ):
-        complaints = Complaints(plan, keys, hub, drops)
+        diagnostics = DiagnosticsLog(plan, keys, hub, refusals)
         yield (
             (lambda source, port, message: device.put(keys.output("device", source, port), encode(message))),
-            drops,
+            refusals,
         )
-        complaints.close()
+        diagnostics.undeclare()
 
 
 def until(look):
@@ -67,12 +65,12 @@ def until(look):
         sleep(0.01)
 
 
-def test_the_hub_logs_what_remote_devices_say_of_themselves_once(wire, caplog):
+def test_the_hub_logs_the_diagnoses_of_remote_devices_once(wire, caplog):
     caplog.set_level(logging.INFO, "hub.devices.diagnostics_log")
-    say, drops = wire
+    say, refusals = wire
     say("near", "diagnostics", DiagnosticStatus(level=2, name="near", message="logged by its own host"))
     for level, message in [(2, "absent;\nplug it in"), (2, "absent;\nplug it in"), (0, "there")]:
-        say("far", "diagnostics", DiagnosticStatus(level=level, name="anybody", message=message))
+        say("far", "diagnostics", DiagnosticStatus(level=level, name="any", message=message))
     say("far", "right/diagnostics", DiagnosticStatus(level=1, name="far/right", message="warm" * 1000))
     say("far", "right/diagnostics", StringMessage(data="no diagnosis"))
 
@@ -84,12 +82,12 @@ def test_the_hub_logs_what_remote_devices_say_of_themselves_once(wire, caplog):
             if f"'{source}'" in record.getMessage()
         ]
 
-    until(lambda: drops.total == 1 and len(lines("far")) == 2 and lines("far/right"))
+    until(lambda: refusals.total == 1 and len(lines("far")) == 2 and lines("far/right"))
     assert lines("far") == [
-        ("WARNING", "device 'far' says: absent; plug it in"),
-        ("INFO", "device 'far' says: there"),
+        ("WARNING", "device 'far' reports: absent; plug it in"),
+        ("INFO", "device 'far' reports: there"),
     ]
     ((level, message),) = lines("far/right")
-    assert (level, message[:34]) == ("WARNING", "device 'far/right' says: warmwarmw")
+    assert (level, message[:37]) == ("WARNING", "device 'far/right' reports: warmwarmw")
     assert len(message) < 600
     assert lines("near") == []

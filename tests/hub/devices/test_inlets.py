@@ -85,7 +85,7 @@ def test_streams_keep_the_newest_and_events_all_in_order(actions):
 
 
 @pytest.mark.parametrize("clock", ["wall", "simulated"])
-def test_silence_is_told_once_and_so_is_its_end(clock):
+def test_staleness_enters_once_and_so_does_its_end(clock):
     box = inlets(clock, age=10)
 
     def sample(now):
@@ -103,10 +103,10 @@ def test_silence_is_told_once_and_so_is_its_end(clock):
     box.offer("stylus", "value", number(2.0), 20)
     assert sample(20) == [("value", False, True)]
     box.offer("stylus", "value", number(3.0), 21)
-    assert sample(40) == [("value", True, True)]  # it came, but is too old by now
+    assert sample(40) == [("value", True, True)]  # it arrived, but is too old by now
 
 
-def test_the_age_of_a_sample_is_told():
+def test_a_sample_enters_with_its_age():
     box = inlets()
     box.offer("stylus", "value", number(1.0), 5)
     assert [s.age_ns for s in box.sample(0, 12)] == [7]
@@ -134,14 +134,14 @@ def test_a_flood_of_events_is_refused_until_the_next_communication_point(monkeyp
         ("button", number(1.0), "no such message"),
     ],
 )
-def test_what_is_no_sample_of_the_port_is_refused(port, payload, message):
+def test_an_invalid_sample_is_refused(port, payload, message):
     box = inlets()
     with pytest.raises(MessageError, match=message):
         box.offer("stylus", port, payload, 0)
     assert box.sample(0, 0) == []
 
 
-def test_an_input_that_nothing_feeds_can_be_set():
+def test_an_input_without_a_connection_can_be_set():
     box = inlets()
     assert box.settable("engine", "knob").size == 2
     box.offer("engine", "knob", encode(Float64MultiArray(data=np.array([3.0, 4.0]))), 0)
@@ -152,7 +152,7 @@ def test_an_input_that_nothing_feeds_can_be_set():
         box.settable("engine", "value")
 
 
-def test_what_comes_late_or_twice_is_refused():
+def test_a_late_or_repeated_sample_is_refused():
     box = inlets(host="remote")
 
     def offer(sequence, *, admission=1, value=0.0):
@@ -161,9 +161,7 @@ def test_what_comes_late_or_twice_is_refused():
     offer(1, value=1.0)
     offer(3, value=3.0)
     for old in (3, 2):
-        with pytest.raises(
-            LateError, match=f"sample {old} of 'stylus.value' comes late: 3 was here before it"
-        ):
+        with pytest.raises(LateError, match=f"sample {old} of 'stylus.value' is late: 3 arrived before it"):
             offer(old)
     offer(1, admission=2, value=7.0)  # the device has joined anew
     with pytest.raises(LateError):

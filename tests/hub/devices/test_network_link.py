@@ -33,7 +33,7 @@ def travel(line, count=200, period=MS):
 
 
 @given(SPECS)
-def test_signals_may_be_lost_or_overtaken_but_take_no_longer_than_they_may(spec):
+def test_signals_may_be_lost_or_overtaken_but_their_delay_is_bounded(spec):
     arrived = travel(NetworkLink(spec).line(SIGNAL))
     assert len({message for message, _ in arrived}) == len(arrived) <= 200
     assert [time for _, time in arrived] == sorted(time for _, time in arrived)
@@ -56,14 +56,14 @@ def test_events_all_arrive_in_order(spec):
 
 
 @given(SPECS)
-def test_chance_is_that_of_the_seed_the_port_and_the_direction_alone(spec):
+def test_arrivals_depend_on_seed_port_and_direction_alone(spec):
     alone, busy = NetworkLink(spec), NetworkLink(spec)
     busy.line(EVENTS).send(0, "another port's message")
     travel(busy.line(BACK), 17)
     assert travel(alone.line(SIGNAL)) == travel(busy.line(SIGNAL))
 
 
-def test_loss_is_as_frequent_as_it_is_said_to_be():
+def test_loss_is_as_frequent_as_specified():
     spec, n = NetworkLinkSpec(loss=0.1, delay="10 ms", jitter="4 ms"), 20_000
     arrived = travel(NetworkLink(spec).line(SIGNAL), n)
     assert len(arrived) / n == pytest.approx(0.9, abs=4 * math.sqrt(0.09 / n))
@@ -110,7 +110,7 @@ def test_overlapping_outages_are_one():
     assert link.cut_until(16 * MS) == 16 * MS
 
 
-def test_what_a_scenario_may_say():
+def test_network_links_in_a_scenario():
     assert [NetworkLinkSpec(preset=f"{ns // MS} ms").delay_ns for ns in PRESETS] == list(PRESETS)
     assert NetworkLinkSpec.model_validate({"delay": "7 ms", "jitter": "1 ms"}).delay_ns == 7 * MS
     with pytest.raises(

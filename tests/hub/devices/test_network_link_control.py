@@ -34,7 +34,7 @@ measure:
 """
 
 
-def during(session, act):
+def during(session, act, progress=None):
     """Run a session and `act` beside it; what goes wrong in `act` is raised here."""
     failed = []
 
@@ -52,7 +52,7 @@ def during(session, act):
 
     thread = threading.Thread(target=console)
     thread.start()
-    summary = session.run()
+    summary = session.run(progress)
     thread.join()
     if failed:
         raise failed[0]
@@ -109,12 +109,14 @@ def test_a_link_is_changed_while_the_session_runs(prepare, host):
     assert summary.latency["state to force"]["hand.numbers"]["largest_s"] == pytest.approx(0.005)
 
 
-def test_the_arm_holds_in_an_outage_and_goes_on_after_it(prepare):
+def test_the_arm_holds_in_an_outage_and_continues_after_it(prepare):
     session = prepare(SCENARIO)
     fresh = []
 
+    latest = []
+
     def count():
-        return session._observers.measures.live()["fresh_steps"][0]
+        return latest[-1].live["fresh_steps"][0]
 
     def act():
         relink(session, outage="500 ms")
@@ -124,7 +126,7 @@ def test_the_arm_holds_in_an_outage_and_goes_on_after_it(prepare):
         fresh.append(count())
         until(lambda: count() > fresh[1] + 100)
 
-    during(session, act)
+    during(session, act, latest.append)
     assert fresh[1] - fresh[0] < 50
 
 

@@ -1,4 +1,4 @@
-"""One host without a network: what it asks of its participants, and what it says when they do not keep to it."""
+"""One host without a network: what it requires of its participants, and its errors."""
 
 from pathlib import Path
 
@@ -65,7 +65,7 @@ GOOD = {"out": np.zeros(2)}
         (StateError("no state"), "no state"),
     ],
 )
-def test_what_is_wrong_with_an_output_is_told_with_participant_and_step(bad, message):
+def test_an_invalid_output_is_reported_with_participant_and_step(bad, message):
     port = out(size=2)
     with pytest.raises(ParticipantError, match=message) as raised:
         host_of(Scripted("a", [bad], port)).configure(Path())
@@ -77,18 +77,18 @@ def test_what_is_wrong_with_an_output_is_told_with_participant_and_step(bad, mes
     assert (raised.value.participant, raised.value.step) == ("a", 2)
 
 
-def test_integers_are_no_vector():
+def test_integers_are_not_a_vector():
     with pytest.raises(ParticipantError, match="int64 of shape"):
         host_of(Scripted("a", [{"out": np.zeros(2, np.int64)}], out(size=2))).configure(Path())
 
 
-def test_an_output_is_asked_for_when_it_is_due_only():
+def test_an_output_is_needed_only_when_it_is_due():
     host = host_of(Scripted("a", [GOOD, {}, {}, GOOD, {}, {}, GOOD], out(size=2, period_ns=3 * MS)))
     host.configure(Path())
     assert len(run(host, 6)[0][1].state_hash) == 6
 
 
-def test_every_participant_is_closed_whatever_the_others_do(caplog):
+def test_every_participant_is_closed_even_if_others_raise(caplog):
     parts = [Scripted(name, []) for name in "ab"]
     host_of(*parts).close()
     assert [part.closed for part in parts] == [1, 1]
@@ -109,7 +109,7 @@ def test_reports_hold_the_steps_that_each_took():
     assert host.due(7, 3) == ["one", "three"]
 
 
-def test_somebody_who_keeps_the_others_waiting_is_known_by_name():
+def test_the_participant_that_is_waited_for_is_known_by_name():
     seen = []
 
     class Curious(Part):
@@ -181,11 +181,11 @@ def test_each_new_value_of_a_signal_is_one_message_of_an_event_port(algorithm, l
         },
         {"ramp": Ramp("ramp"), "inbox": inbox},
     )
-    expected, told = [], 0
+    expected, sent = [], 0
     for step in range(0, 12, target_ms):
         ready = (step if late else step + source_ms) // source_ms
-        expected.append([pytest.approx(1e-3 * source_ms * n) for n in range(told + 1, ready + 1)])
-        told = ready
+        expected.append([pytest.approx(1e-3 * source_ms * n) for n in range(sent + 1, ready + 1)])
+        sent = ready
     assert [[message.data[0] for message in messages] for messages in inbox.seen] == expected
 
 
@@ -212,7 +212,7 @@ def test_a_message_made_of_a_signal_has_stamp_frame_and_names():
     assert (second.position.tolist(), second.header.stamp.nanosec) == ([1.0, 1e-3], 2 * MS)
 
 
-def test_an_event_port_hears_all_of_its_sources_in_the_order_of_the_connections():
+def test_an_event_port_receives_all_of_its_sources_in_the_order_of_the_connections():
     inbox = Inbox("inbox", unit="s")
     scenario = {
         "name": "two",

@@ -1,9 +1,9 @@
 from hub.hosting import host_processes as fleet_module
-from hub.hosting.host_processes import Fleet
+from hub.hosting.host_processes import HostProcesses
 
 
-def test_hosts_may_be_started_while_the_watchdog_looks_for_dead_ones(monkeypatch):
-    fleet = Fleet()
+def test_hosts_may_be_started_while_the_watchdog_checks_processes(monkeypatch):
+    processes = HostProcesses()
 
     class Process:
         """Lives, and lets another host start at the very moment it is looked at."""
@@ -16,10 +16,10 @@ def test_hosts_may_be_started_while_the_watchdog_looks_for_dead_ones(monkeypatch
         def poll(self):
             if "two" not in started:
                 started.append("two")
-                fleet.start("two", "tcp/127.0.0.1:1", "session")
+                processes.start("two", "tcp/127.0.0.1:1", "session")
 
     started = ["one"]
     monkeypatch.setattr(fleet_module.subprocess, "Popen", Process)
-    fleet.start("one", "tcp/127.0.0.1:1", "session")
-    assert fleet.dead() == {}
+    processes.start("one", "tcp/127.0.0.1:1", "session")
+    assert processes.dead() == {}
     assert started == ["one", "two"]

@@ -142,7 +142,7 @@ def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
         ]
         second = subprocess.run(command, capture_output=True, text=True, timeout=30)
         assert second.returncode == 1
-        assert f"host 'remote/player' is here already, as process {process.pid}: end that one" in " ".join(
+        assert f"host 'remote/player' has joined already, as process {process.pid}: end that one" in " ".join(
             second.stderr.split()
         )
         assert running.is_followed()

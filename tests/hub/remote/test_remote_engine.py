@@ -7,11 +7,11 @@ import pytest
 
 from hub.planning.scenario_file import load
 from hub.security.access import access_settings
+from hub.session.joined_hosts import JoinedHosts
 from hub.session.launch import launch, plan_of
-from hub.session.membership import Membership
 from hub.transport.control_messages import JoinRequest
 from hub.transport.endpoints import free_endpoint
-from schemas.errors import ConnectError
+from schemas.errors import ConnectError, MessageError
 from tests.hub.authorities import Authority, free_port
 
 SCENARIO = """\
@@ -80,7 +80,7 @@ class _Starter:
     """Starts a process as soon as the gate of a session is open."""
 
     def __init__(self, session, command):
-        gate = session._gate
+        gate = session.gate
         opening = gate.open
 
         def open_and_start(hub):
@@ -96,14 +96,16 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     seen = plan.seen_from("remote/hand")
     assert set(seen.participants) == {"hand", "deaf"}
     assert [port.name for port in seen.participants["deaf"].ports] == ["hand"]
-    assert (seen.links, len(seen.inlets)) == ((), 1)
-    membership = Membership(
+    assert (seen.connections, len(seen.from_devices)) == ((), 1)
+    joined_hosts = JoinedHosts(
         file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None
     )
-    reply = membership.join(JoinRequest(host="remote/hand", pid=1))
+    reply = joined_hosts.join(JoinRequest(host="remote/hand", pid=1))
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])
     assert reply.plan == seen
-    assert membership.join(JoinRequest(host="other", pid=2)).plan == plan
+    assert joined_hosts.join(JoinRequest(host="other", pid=2)).plan == plan
+    with pytest.raises(MessageError, match="host 'other' has no participant 'hand' that could fail"):
+        joined_hosts.join(JoinRequest(host="other", pid=2, failed="hand: unplugged"))
 
 
 def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded):
@@ -111,7 +113,7 @@ def test_what_a_host_elsewhere_sees_of_a_session_is_enough_to_step_in_it(loaded)
     plan, _ = plan_of(file.scenario, file.params)
     seen = plan.seen_from("remote/far")
     assert seen.order == ("near", "far")
-    assert {(k.source, k.target) for k in seen.links} == {("near", "far"), ("far", "near")}
+    assert {(k.source, k.target) for k in seen.connections} == {("near", "far"), ("far", "near")}
     assert seen.participants["far"] == plan.participants["far"]
     assert seen.stride("far", "out") == plan.stride("far", "out")
 

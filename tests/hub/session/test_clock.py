@@ -57,7 +57,7 @@ def test_a_run_without_an_end_is_never_done():
         ("1 ms", False, "far", 1),
     ],
 )
-def test_a_grant_covers_10_ms_where_nobody_says_and_nothing_enters(step, realtime, host, count):
+def test_a_grant_covers_10_ms_by_default_where_nothing_enters(step, realtime, host, count):
     quiet = plan_of(Part("one", out()), Part("other", out()), specs={"other": {"host": host}}, step=step)
     assert Clock(quiet, window=None, realtime=realtime, steps=None).horizon() == count
 

@@ -102,7 +102,7 @@ def test_pausing_at_any_moment_makes_no_empty_grant(steer):
     assert outcome[0].state == "done"
 
 
-def test_set_changes_an_input_that_nothing_feeds(steer, prepare):
+def test_set_changes_an_input_without_a_connection(steer, prepare):
     def hash_with(*requests):
         with steer("duration=300 ms", paused=True) as (console, outcome):
             for request in requests:
@@ -131,12 +131,12 @@ def test_what_cannot_be_set_is_refused_with_the_reason(steer, participant, port,
     assert outcome[0].state == "done"
 
 
-def test_strangers_may_not_join(steer):
+def test_unknown_hosts_may_not_join(steer):
     with steer() as (console, _):
         for host, message in (
             ("nowhere", "has no host 'nowhere'; it has other"),
             ("hub", "no host 'hub'"),
-            ("other", "is here already, as process"),
+            ("other", "has joined already, as process"),
         ):
             with pytest.raises(MessageError, match=message):
                 console.ask(f"join/{host}", JoinRequest(host=host, pid=1), JoinReply)
@@ -147,15 +147,16 @@ def test_a_host_joins_under_its_own_name_and_need_not_know_the_session(steer):
         with pytest.raises(
             MessageError,
             match=(
-                "belongs on trocar/steered/control/join/there, and came on trocar/steered/control/join/other"
+                "belongs on trocar/steered/control/join/there,"
+                " and was sent on trocar/steered/control/join/other"
             ),
         ):
             console.ask("join/other", JoinRequest(host="there", pid=1), JoinReply)
-        with pytest.raises(MessageError, match="is here already, as process"):
+        with pytest.raises(MessageError, match="has joined already, as process"):
             ask(console._client, Keys("*").join("other"), JoinRequest(host="other", pid=1), JoinReply)
 
 
-def test_status_says_who_lives_where(steer):
+def test_status_has_the_host_of_each_participant(steer):
     with steer() as (console, _):
         console.ask("pause")
         status = console.until(lambda s: s.state == "paused")
@@ -172,7 +173,7 @@ def test_status_says_who_lives_where(steer):
     assert status.sim_time_ns == status.step * 1_000_000
 
 
-def test_nobody_answers_for_a_session_that_is_not_there(steer):
+def test_a_session_that_does_not_exist_does_not_answer(steer):
     with steer() as (console, _), pytest.raises(ConnectError, match="is the hub running"):
         ask(console._client, Keys("other").control("pause"), Empty(), Empty, timeout_s=0.5)
 

@@ -1,14 +1,14 @@
-"""Bad days: whoever fails is named with the step, the recording is closed and readable, and nothing is left
-behind.
-"""
+"""Failures: the participant and its step are named, the recording is readable, and nothing is left behind."""
 
 from pathlib import Path
 from time import monotonic_ns
 
 import pytest
 
+from hub.hosting.interrupt import Interrupt
 from hub.recording.recording import Recording
 from hub.session import session as session_module
+from hub.session.run import Run
 from schemas.errors import ParticipantError, ScenarioError, SessionError
 from tests.hub.processes import processes
 
@@ -76,7 +76,7 @@ def fail(prepare, tmp_path, caplog):
         ("shape", "one process"),
     ],
 )
-def test_a_participant_that_goes_wrong_is_named_with_step_and_cause(fail, how, placement):
+def test_a_participant_that_fails_is_named_with_step_and_cause(fail, how, placement):
     error = fail(
         TRIO, f"participants.bad.how={how}", "participants.bad.at=7", "window=3", *PLACEMENTS[placement]
     )
@@ -85,14 +85,16 @@ def test_a_participant_that_goes_wrong_is_named_with_step_and_cause(fail, how, p
 
 
 @pytest.mark.parametrize("place", ["ending", "telling"])
-def test_a_second_failure_does_not_take_the_place_of_the_first(prepare, monkeypatch, place):
-    """A process that has told its error ends, which the watchdog sees at some moment."""
+def test_a_second_failure_does_not_replace_the_first(prepare, monkeypatch, place):
+    """A process that has reported its error ends, which the watchdog notices at some moment."""
     session = prepare(TRIO, "participants.bad.how=raise")
-    owner, name = (session._interrupt, "disarm") if place == "ending" else (session_module.log, "error")
+    runs = []
+    monkeypatch.setattr(session_module, "Run", lambda *args: runs.append(Run(*args)) or runs[0])
+    owner, name = (Interrupt, "disarm") if place == "ending" else (session_module.log, "error")
     go_on = getattr(owner, name)
 
     def fail_again(*arguments):
-        session._fail("sink", "its process is gone")
+        runs[0].failure.report("sink", "its process is gone")
         go_on(*arguments)
 
     monkeypatch.setattr(owner, name, fail_again)
@@ -127,12 +129,12 @@ def test_a_killed_process(fail, tmp_path, placement, step):
         f"participants.bad.stamp={tmp_path / 'killed'}",
         *PLACEMENTS[placement],
     )
-    told_ms = (monotonic_ns() - int((tmp_path / "killed").read_text())) / 1e6
+    reported_ms = (monotonic_ns() - int((tmp_path / "killed").read_text())) / 1e6
     assert error.step == step
     assert "killed by SIGKILL" in str(error)
     assert error.participant == "bad" or "bad" in str(error)
     assert error.grants == step + 1
-    assert told_ms < 5000
+    assert reported_ms < 5000
 
 
 def test_a_process_that_ends_by_itself(fail):
@@ -141,7 +143,7 @@ def test_a_process_that_ends_by_itself(fail):
     assert "exit code 7" in str(error)
 
 
-def test_a_remote_participant_that_does_not_come(fail):
+def test_a_remote_participant_that_does_not_join(fail):
     error = fail(TRIO, "participants.bad.host=remote", "join_limit=300 ms", error=SessionError)
     assert "remote/bad did not join within 0.3 s (join_limit) at tcp/127.0.0.1" in str(error)
 

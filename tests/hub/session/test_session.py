@@ -66,7 +66,7 @@ PLACEMENTS = {
     "one host": [],
     "two hosts": _on("one", ONE),
     "three hosts": _on("one", ONE) + _on("other", OTHER),
-    "nobody in the hub": _on("one", ONE) + _on("other", OTHER) + _on("third", THIRD),
+    "none in the hub": _on("one", ONE) + _on("other", OTHER) + _on("third", THIRD),
 }
 
 
@@ -83,8 +83,8 @@ def reference(prepare):
         ("two hosts", 1, True),
         ("two hosts", 10, False),
         ("three hosts", 3, False),
-        ("nobody in the hub", 1, False),
-        ("nobody in the hub", 10, True),
+        ("none in the hub", 1, False),
+        ("none in the hub", 10, True),
     ],
 )
 def test_the_same_hashes_wherever_participants_run(prepare, reference, tmp_path, placement, window, recorded):
@@ -110,7 +110,7 @@ def test_every_event_arrives_and_silence_is_marked(reference):
     assert reference.measures["stale_steps"] == 60 - 41  # the last pose is of 30 ms, and fresh up to 40 ms
 
 
-def test_a_change_of_wiring_changes_the_hashes(prepare, reference):
+def test_a_change_of_the_connections_changes_the_hashes(prepare, reference):
     for wiring in (
         "order=[rare, fast, two, five]",
         "connections.5.extrapolation=hold",
@@ -123,7 +123,7 @@ def test_a_change_of_wiring_changes_the_hashes(prepare, reference):
         assert prepare(text, wiring).run().state_hash != reference.state_hash
 
 
-def test_what_was_recorded_comes_out_again(prepare, tmp_path):
+def test_a_recorded_session_is_read_back(prepare, tmp_path):
     prepare(NETWORK, "window=7", *PLACEMENTS["two hosts"], record=tmp_path / "recording").run()
     verified = verify(Recording(tmp_path / "recording"))
     assert (verified.same, verified.steps) == (True, 60)
@@ -147,6 +147,6 @@ connections:
 """
 
 
-def test_hundreds_of_values_between_two_readings_hold_up_nobody(prepare):
+def test_hundreds_of_values_between_two_readings_delay_no_host(prepare):
     hashes = [prepare(SELDOM, *_on(host, ("seldom", "ledger"))).run().state_hash for host in ("hub", "far")]
     assert hashes[0] == hashes[1]

@@ -98,7 +98,7 @@ def _ignore_interrupts():
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_ends_in_good_order(hub, number):
+def test_an_interrupted_run_closes_its_recording_and_processes(hub, number):
     run = hub(ENDLESS)
     run.wait_until_it_records()
     os.kill(run.process.pid, number)
@@ -122,7 +122,7 @@ def test_a_run_in_the_background_of_a_script_ends_by_sigterm(hub):
     assert "killing it" not in errors
 
 
-def test_a_host_that_stands_still_for_seconds_is_waited_for(hub):
+def test_a_host_that_is_stopped_for_seconds_is_waited_for(hub):
     run = hub(ENDLESS)
     run.wait_until_it_records()
     (host,) = hosts(run.endpoint)
@@ -154,7 +154,7 @@ def test_a_failed_session_is_exit_code_1(hub):
     assert "participant 'here' failed at step 5: ArithmeticError: the rope is torn" in errors
 
 
-def test_an_interrupt_that_got_lost_in_a_callback_comes_again():
+def test_an_interrupt_that_is_lost_in_a_callback_is_raised_again():
     with Interrupt() as interrupt:
         with suppress(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGTERM)

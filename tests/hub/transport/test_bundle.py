@@ -1,6 +1,4 @@
-"""What the signals of a participant are for a device: together in one message, and nothing else than was
-sent.
-"""
+"""Bundles: the signals of a participant for a device, in one message."""
 
 import time
 
@@ -20,20 +18,20 @@ from tests.hub.parts import Part, Stylus, into, out, plan_of
 def bundle():
     with open_session("router", listen=[free_endpoint(range(1))]) as session:
         made = Bundle(session, "trocar/test/engine/arm/signals/console")
-        made.heard = session.declare_subscriber("trocar/test/engine/arm/signals/console", FifoChannel(100))
+        made.received = session.declare_subscriber("trocar/test/engine/arm/signals/console", FifoChannel(100))
         until = time.monotonic() + 5.0
-        while not made.wanted and time.monotonic() < until:
+        while not made.needed and time.monotonic() < until:
             time.sleep(0.005)
         yield made
         made.close()
 
 
 @given(values=st.lists(st.tuples(st.integers(0, 200), st.binary(max_size=300)), min_size=1, max_size=20))
-def test_what_is_put_together_comes_apart_again(bundle, values):
+def test_a_bundle_unpacks_to_the_values_that_were_added(bundle, values):
     for index, payload in values:
         bundle.add(index, payload)
     bundle.send(b"tag")
-    sample = bundle.heard.recv()
+    sample = bundle.received.recv()
     assert sample.attachment.to_bytes() == b"tag"
     assert list(unpacked(sample.payload.to_bytes())) == values
 
@@ -42,26 +40,26 @@ def test_a_step_without_values_sends_nothing(bundle):
     bundle.send(b"nothing")
     bundle.add(0, b"something")
     bundle.send(b"first")
-    assert bundle.heard.recv().attachment.to_bytes() == b"first"
-    assert bundle.heard.try_recv() is None
+    assert bundle.received.recv().attachment.to_bytes() == b"first"
+    assert bundle.received.try_recv() is None
 
 
 @pytest.mark.parametrize(("cut", "where"), [(4, "within a head"), (10, "within a value of 5")])
-def test_bytes_that_are_none_are_refused(bundle, cut, where):
+def test_invalid_bytes_are_refused(bundle, cut, where):
     bundle.add(7, b"12345")
     bundle.send(b"")
-    payload = bundle.heard.recv().payload.to_bytes()
+    payload = bundle.received.recv().payload.to_bytes()
     with pytest.raises(MessageError, match=where):
         list(unpacked(payload[:cut]))
 
 
-def test_both_ends_count_the_same_connections():
+def test_both_ends_number_the_same_connections():
     arm = Part("arm", out("a"), out("b"), out("e", variability="event"))
     console = Stylus("console", into("x"), into("y"), into("z", variability="event"))
     plan = plan_of(
         arm, console, connections=["arm.b -> console.x", "arm.e -> console.z", "arm.a -> console.y"]
     )
-    assert [(k.source_port, k.device_port) for k in bundled(plan, "arm", "console")] == [
+    assert [(k.source_port, k.target_port) for k in bundled(plan, "arm", "console")] == [
         ("b", "x"),
         ("a", "y"),
     ]

@@ -80,8 +80,8 @@ def test_a_remote_cell_is_primed_by_the_value_at_time_0_only():
     assert RemoteCell(1, 1, 1, Script([INITIAL])).primed()
 
 
-def test_a_lost_value_is_told():
+def test_a_lost_value_is_an_error():
     cell = RemoteCell(1, 1, 1, Script([INITIAL, 0, 2]))
     assert cell.get(0) == 0
-    with pytest.raises(SessionError, match="the value of step 1 was lost on its way: step 2 arrived instead"):
+    with pytest.raises(SessionError, match="the value of step 1 was lost: that of step 2 arrived instead"):
         cell.get(1)

@@ -9,18 +9,18 @@ from schemas.errors import ConnectError, ScenarioError
 
 @pytest.fixture
 def taken():
-    """A port on which somebody listens."""
+    """A port on which a process listens."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
         yield listener.getsockname()[1]
 
 
-def test_a_taken_port_is_passed_over(taken):
+def test_a_taken_port_is_skipped(taken):
     assert endpoint.free_endpoint([taken, 0]) != f"tcp/127.0.0.1:{taken}"
 
 
-def test_no_free_port_is_an_error_that_says_what_to_do(taken):
+def test_no_free_port_is_an_error_with_a_remedy(taken):
     with pytest.raises(ConnectError, match="give --listen"):
         endpoint.free_endpoint([taken])
 
@@ -39,16 +39,16 @@ def test_a_gate_is_not_taken_for_a_hub(monkeypatch):
 
 
 def test_the_hub_stays_on_loopback_beside_its_gate(taken):
-    inside, outside = endpoint.parted(["tls/0.0.0.0:7447"])
+    inside, outside = endpoint.split_endpoints(["tls/0.0.0.0:7447"])
     assert outside == ["tls/0.0.0.0:7447"]
     assert is_loopback(inside)
     assert endpoint.address(inside)[1] != 7447
-    assert endpoint.parted(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == (
+    assert endpoint.split_endpoints(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == (
         "tcp/127.0.0.1:5",
         ["tls/0.0.0.0:6", "tls/[::]:6"],
     )
     with pytest.raises(ScenarioError, match="once on loopback"):
-        endpoint.parted(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
+        endpoint.split_endpoints(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_an_endpoint_has_a_host_and_a_port(where: str, parts: tuple[str, int]) -
 @pytest.mark.parametrize(
     "where", ["hub.example:7447", "tls/hub.example", "tls/:7447", "tls/hub.example:port"]
 )
-def test_what_is_no_endpoint_is_refused_with_an_example(where: str) -> None:
+def test_an_invalid_endpoint_is_refused_with_an_example(where: str) -> None:
     with pytest.raises(ScenarioError, match="write tls/HOST:PORT"):
         endpoint.address(where)
 

@@ -14,6 +14,7 @@ import zenoh
 from zenoh.handlers import Callback, RingChannel
 
 from hub.recording.recording import Recording
+from hub.session.startup import start
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.ros import Header, Joy, PoseStamped
@@ -56,7 +57,7 @@ HEARD = [
     *(f"{PREFIX}/engine/{port}" for port in ("talker/out/words", "far_listener/out/heard")),
     *(f"{PREFIX}/device/idle_player/out/{port}" for port in ("hand", "buttons")),
 ]
-"""Keys of this session to which somebody listens."""
+"""Keys of this session that have a subscriber."""
 UNHEARD = [
     f"{PREFIX}/engine/away/refused",  # counted, but the log shows the first refusals only, and those are real
     f"{PREFIX}/hub/status",
@@ -134,7 +135,7 @@ class Stranger:
                 self._session.get(f"{PREFIX}/control/{verb}", payload=payload, handler=RingChannel(1))
 
     def _distort(self):
-        """Send the newest real messages again: without their end, with a NaN at their end, and with a tail."""
+        """Send the newest real messages again: cut short, with a NaN at the end, and with a tail."""
         for key, sample in list(self._newest.items()):
             payload = sample.payload.to_bytes()
             for distorted in (
@@ -147,7 +148,7 @@ class Stranger:
                     self._session.put(key, distorted, attachment=sample.attachment)
 
     @contextmanager
-    def at_work(self):
+    def sending(self):
         self._thread.start()
         try:
             yield
@@ -157,18 +158,18 @@ class Stranger:
             self._watch.undeclare()
 
 
-def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, caplog, capfd):
+def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, monkeypatch, caplog, capfd):
     undisturbed = prepare(SCENARIO).run()
     assert undisturbed.dropped_messages == 0
     session = prepare(SCENARIO, record=tmp_path / "recording")  # so that the hub listens to all outputs
-    session.state.step(390)  # the last steps wait until the stranger has said all
+    session.state.step(390)  # the last steps wait until the stranger has sent all
     strangers = []
 
     def attack():
         try:
             with open_session("client", connect=[session.endpoint]) as client:
                 strangers.append(Stranger(client))
-                with strangers[0].at_work():
+                with strangers[0].sending():
                     while strangers[0].rounds < 2 and not over.wait(0.01):
                         pass
                     session.state.resume()
@@ -178,13 +179,12 @@ def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, caplog
 
     over = threading.Event()
     attacker = threading.Thread(target=attack)
-    starting = session._start
 
-    def start():
-        starting()
+    def start_and_attack(run):
+        start(run)
         attacker.start()
 
-    session._start = start
+    monkeypatch.setattr("hub.session.session.start", start_and_attack)
     with caplog.at_level(logging.WARNING):
         try:
             summary = session.run()

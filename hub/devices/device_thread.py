@@ -1,6 +1,4 @@
-"""A device that lives in wall time: a thread reads it at its own rate, and when it has something new, whether
-or not a hub is there to be told.
-"""
+"""A device in wall time: a thread reads it at its own rate, and as soon as it has something new."""
 
 from __future__ import annotations
 
@@ -11,80 +9,80 @@ from pathlib import Path
 from time import monotonic_ns
 from typing import Protocol
 
-from hub.devices.simulated import open_device
+from hub.devices.simulated_devices import open_device
 from hub.participant import Device, Sample, Value
 from schemas.errors import MessageError
 from schemas.ros import DiagnosticStatus, Joy
 
-__all__ = ["DeviceLoop", "Uplink"]
+__all__ = ["DeviceThread", "Uplink"]
 
 log = logging.getLogger(__name__)
 
 _LONGEST_SLEEP_S = 0.05
 _LINK_NS = 1_000_000
-"""How often a link is asked what has come through it."""
-_STATES = (Joy, DiagnosticStatus)
+"""Period at which an uplink is called while its network link delays messages."""
 
 
 class Uplink(Protocol):
     """Where the samples go."""
 
     def exchange(self, t: int, samples: list[Sample]) -> bool:
-        """Take the samples read at `t` (ns since the loop's start); return whether a link holds things up, so
-        that it wants to be asked again soon.
+        """Send the samples read at `t` (ns since the thread's start).
+
+        Returns whether a network link delays anything, so that this must be called again soon.
         """
         ...
 
 
-class DeviceLoop:
-    """Reads a device at its period; what it says goes to the uplink that is attached, and to nobody while
-    there is none.
+class DeviceThread:
+    """Reads a device at its period, with or without a hub: samples go to the uplink that is attached.
+
+    `failed` is called with the device's name and the cause when an error ends the thread.
     """
 
     def __init__(
         self, name: str, device: Device, period_ns: int, *, failed: Callable[[str, str], None]
     ) -> None:
-        """`failed` is told the device's name and the cause when the loop ends by an error."""
         self._name, self._device, self._period_ns, self._failed = name, device, period_ns, failed
         self._uplink: Uplink | None = None
         self._attaching = threading.Lock()
-        self._standing: dict[str, Sample] = {}
-        """The newest buttons and diagnosis of each port: they hold until another one is told."""
+        self._current: dict[str, Sample] = {}
+        """The newest buttons and diagnosis of each port: they hold until the next ones."""
         self._ending = False
         self._start_ns = monotonic_ns()
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
 
     @property
     def now_ns(self) -> int:
-        """Time since the loop's start."""
+        """Time since the thread's start."""
         return monotonic_ns() - self._start_ns
 
     def start(self, directory: Path) -> None:
-        """Open the device and begin to read it."""
+        """Open the device and start to read it; raises ParticipantError."""
         open_device(self._name, self._device, directory)
         self._start_ns = monotonic_ns()
         self._thread.start()
 
     def attach(self, uplink: Uplink | None) -> None:
-        """Give what is read from now on to `uplink`; the one before gets nothing any more once this returns.
+        """Give what is read from now on to `uplink`, and nothing more to the one before.
 
-        First of all it gets buttons and diagnoses as they are: they may have changed while nobody listened.
+        First it gets the buttons and diagnoses as they are: they may have changed while none was attached.
         """
         with self._attaching:
             self._uplink = uplink
-            if uplink is not None and self._standing:
-                uplink.exchange(self.now_ns, list(self._standing.values()))
+            if uplink is not None and self._current:
+                uplink.exchange(self.now_ns, list(self._current.values()))
 
     def write(self, port: str, value: Value) -> None:
         """Write to the device; may be called from any thread.
 
-        Raises MessageError if it refuses the value; anything else ends the loop.
+        Raises MessageError if the device refuses the value; any other error ends the thread.
         """
         try:
             self._device.write(port, value)
         except MessageError:
             raise
-        except Exception as error:  # noqa: BLE001  # it is logged and told
+        except Exception as error:  # noqa: BLE001  # it is logged and reported
             self._fail(error)
 
     def _run(self) -> None:
@@ -92,24 +90,23 @@ class DeviceLoop:
         try:
             while not self._ending:
                 t = self.now_ns
-                samples = list(self._device.read(t))
-                delayed = False
-                with self._attaching:
-                    self._standing.update(
-                        (sample.port, sample)
-                        for sample in samples
-                        if isinstance(sample.message, Joy | DiagnosticStatus)
-                    )
-                    if self._uplink is not None:
-                        delayed = self._uplink.exchange(t, samples)
+                delayed = self._read(t)
                 if self._start_ns + t >= due_ns:  # it was not read early
                     period_ns = min(self._period_ns, _LINK_NS) if delayed else self._period_ns
-                    due_ns = max(due_ns + period_ns, self._start_ns + t)  # what is late is not caught up
+                    due_ns = max(due_ns + period_ns, self._start_ns + t)  # a late read is not caught up
                 while not self._ending and (left_ns := due_ns - monotonic_ns()) > 0:
                     if self._device.wait(min(left_ns / 1e9, _LONGEST_SLEEP_S)):
                         break
-        except Exception as error:  # noqa: BLE001  # it is logged and told
+        except Exception as error:  # noqa: BLE001  # it is logged and reported
             self._fail(error)
+
+    def _read(self, t: int) -> bool:
+        """Read the device and give its samples to the uplink; return whether a link delays anything."""
+        samples = list(self._device.read(t))
+        lasting = [sample for sample in samples if isinstance(sample.message, Joy | DiagnosticStatus)]
+        with self._attaching:
+            self._current.update((sample.port, sample) for sample in lasting)
+            return self._uplink is not None and self._uplink.exchange(t, samples)
 
     def _fail(self, error: Exception) -> None:
         if not self._ending:
@@ -118,7 +115,7 @@ class DeviceLoop:
             self._failed(self._name, f"{type(error).__name__}: {error}")
 
     def close(self) -> None:
-        """End the loop and close the device."""
+        """End the thread and close the device."""
         self._ending = True
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)

@@ -1,4 +1,4 @@
-"""Keeps asking the hub what time it is."""
+"""Measures the offset to the hub's clock, again and again."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from typing import Self
 
 import zenoh
 
-from hub.devices.clock_offset import ClockOffset, Exchange
+from hub.devices.clock_offset import ClockExchange, ClockOffset
 from hub.transport.control_client import ask
 from hub.transport.control_messages import ClockReply, Empty
 from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
 
-__all__ = ["ClockWatch"]
+__all__ = ["ClockSync"]
 
 _FIRST, _FIRST_PERIOD_S = 8, 0.05
 _PERIOD_S = 0.5
 
 
-class ClockWatch:
-    """Asks while it is entered: a few times in quick succession, then twice a second."""
+class ClockSync:
+    """Queries the hub's clock while it is entered: a few times in quick succession, then twice a second."""
 
     def __init__(self, session: zenoh.Session, keys: Keys) -> None:
-        """Take the session over which the hub answers."""
         self.offset = ClockOffset()
         self._session, self._key = session, keys.control("clock")
         self._ending = threading.Event()
@@ -49,5 +48,5 @@ class ClockWatch:
             try:
                 reply = ask(self._session, self._key, Empty(), ClockReply, timeout_s=1.0)
             except (ConnectError, MessageError, zenoh.ZError):
-                continue  # the hub is gone, or about to go: whoever looks after its token knows
-            self.offset.add(Exchange(asked_ns, reply.received_ns, reply.replied_ns, monotonic_ns()))
+                continue  # the hub is gone, or about to go: its token tells the host
+            self.offset.add(ClockExchange(asked_ns, reply.received_ns, reply.replied_ns, monotonic_ns()))

@@ -1,4 +1,4 @@
-"""Devices that follow the clock: read, and written to, at communication points."""
+"""Devices in simulated time: read and written at communication points."""
 
 from __future__ import annotations
 
@@ -12,48 +12,49 @@ from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import ParticipantError
 
 __all__ = ["SimulatedDevices", "open_device"]
 
 Take = Callable[[str, Sample, bytes, int, Stamp], None]
-"""Gets a sample: device, sample, its bytes, when it arrived (simulated ns), and its stamp."""
+"""Is called with a sample: device, sample, its bytes, time of arrival (simulated ns), and its stamp."""
 
 
 class SimulatedDevices:
-    """The devices of the hub's process that follow the clock.
+    """The devices of the hub's process that live in simulated time.
 
-    One that is written to, or sits behind a link, is met at every period of its own, wherever the
-    participants are that feed it: first it is written what they had computed by then, and then it is read.
-    Any other is read whenever the hub looks.
+    One with inputs, or behind a network link, is exchanged with once in each of its own periods, wherever the
+    participants run that it is connected to: first it is written what they had computed by then, then it is
+    read. Any other is read at every communication point.
     """
 
     def __init__(
-        self, plan: Plan, devices: Mapping[str, Device], feeds: Mapping[str, DeviceInputs], drops: Drops
+        self,
+        plan: Plan,
+        devices: Mapping[str, Device],
+        inputs: Mapping[str, DeviceInputs],
+        refusals: Refusals,
     ) -> None:
-        """Take the devices, and by their names what feeds them; `drops` counts what comes late because of a
-        link.
-        """
-        meetings = {planned.name for planned in plan.meetings()}
+        periodic = {planned.name for planned in plan.meetings()}
         self._devices = [
-            _Simulated(plan.participants[n], device, feeds[n], n in meetings, drops)
-            for n, device in devices.items()
+            _SimulatedDevice(plan.participants[name], device, inputs[name], name in periodic, refusals)
+            for name, device in devices.items()
         ]
         self.links = {device.name: device.link for device in self._devices}
         self.latencies = Latencies()
         """From a value to the device."""
 
     def open(self, directory: Path) -> None:
-        """Open all; raises ParticipantError naming the one that cannot be."""
+        """Open all; raises ParticipantError with the name of the one that cannot be opened."""
         for one in self._devices:
             open_device(one.name, one.device, directory)
 
     def exchange(self, time_ns: int, step: int, take: Take) -> None:
-        """Write to all devices that are due, and hand on what they have; raises ParticipantError."""
+        """Write and read all devices that are due; raises ParticipantError."""
         for one in self._devices:
-            if one.meets and step % one.planned.period:
+            if one.periodic and step % one.planned.period:
                 continue
             try:
                 one.write(time_ns, step, self.latencies)
@@ -68,15 +69,20 @@ class SimulatedDevices:
             one.device.close()
 
 
-class _Simulated:
-    """One device, its link, and how far its samples have been counted."""
+class _SimulatedDevice:
+    """One device, its network link, and the sequence numbers of its samples."""
 
     def __init__(
-        self, planned: PlannedParticipant, device: Device, feed: DeviceInputs, meets: bool, drops: Drops
+        self,
+        planned: PlannedParticipant,
+        device: Device,
+        inputs: DeviceInputs,
+        periodic: bool,
+        refusals: Refusals,
     ) -> None:
-        self.name, self.planned, self.device, self.meets = planned.name, planned, device, meets
+        self.name, self.planned, self.device, self.periodic = planned.name, planned, device, periodic
         self.link = NetworkLink(planned.network_link)
-        self._feed, self._drops = feed, drops
+        self._inputs, self._refusals = inputs, refusals
         self._ports = {port.name: port for port in planned.ports}
         self._sequence = dict.fromkeys(self._ports, 0)
         self._newest_ns = dict.fromkeys(self._ports, INITIAL)
@@ -84,22 +90,21 @@ class _Simulated:
     def write(self, time_ns: int, step: int, latencies: Latencies) -> None:
         """Write what has arrived from the simulation."""
         self.link.settle(time_ns)
-        for port, valid_ns, value in self._feed.due(step):
+        for port, valid_ns, value in self._inputs.due(step):
             self.link.line(self._ports[port]).send(valid_ns, (valid_ns, value))
         for port in self._ports.values():
-            for _, (valid_ns, value) in (
-                self.link.line(port).arrived(time_ns) if port.causality == "input" else ()
-            ):
+            if port.causality != "input":
+                continue
+            for _, (valid_ns, value) in self.link.line(port).arrived(time_ns):
                 self._write_one(port.name, valid_ns, value)
                 latencies.add("state to force", f"{self.name}.{port.name}", time_ns - valid_ns)
 
     def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
         newest_ns = self._newest_ns[port]
         if valid_ns < newest_ns:
-            self._drops.refuse(
-                f"{self.name}.{port}",
-                f"the value of {valid_ns / 1e9:g} s comes late: that of {newest_ns / 1e9:g} s was here"
-                " before it",
+            late, newest = f"{valid_ns / 1e9:g} s", f"{newest_ns / 1e9:g} s"
+            self._refusals.refuse(
+                f"{self.name}.{port}", f"the value of {late} is late: that of {newest} arrived before it"
             )
             return
         self._newest_ns[port] = valid_ns
@@ -109,13 +114,12 @@ class _Simulated:
         """Yield the samples that have arrived at the hub: sample, its bytes, time of arrival, stamp."""
         for sample in self.device.read(time_ns):
             number = self._sequence[sample.port] = self._sequence[sample.port] + 1
-            self.link.line(self._ports[sample.port]).send(
-                time_ns, (sample, encode(sample.message), Stamp(0, number, time_ns))
-            )
+            stamped = sample, encode(sample.message), Stamp(0, number, time_ns)
+            self.link.line(self._ports[sample.port]).send(time_ns, stamped)
         for port in self._ports.values():
-            for arrival_ns, (sample, payload, stamp) in (
-                self.link.line(port).arrived(time_ns) if port.causality == "output" else ()
-            ):
+            if port.causality != "output":
+                continue
+            for arrival_ns, (sample, payload, stamp) in self.link.line(port).arrived(time_ns):
                 yield sample, payload, arrival_ns, stamp
 
 

@@ -1,6 +1,4 @@
-"""Devices that follow the clock and have inputs: the same bits wherever their sources run, whatever a grant
-covers, and over a link.
-"""
+"""Devices in simulated time with inputs: the same bits wherever their sources run, and over a link."""
 
 import pytest
 
@@ -22,7 +20,7 @@ connections:
   - talker.words -> hand.words
   - mixer.out -> other.a
 measure:
-  told: {kind: final, of: hand.out}
+  last: {kind: final, of: hand.out}
 """
 PLACEMENTS = (
     ("window=1",),
@@ -34,7 +32,7 @@ PLACEMENTS = (
 
 def run(prepare, *overrides, **options):
     summary = prepare(SCENARIO, *overrides, **options).run()
-    return summary.state_hash, summary.measures["told"]
+    return summary.state_hash, summary.measures["last"]
 
 
 def test_the_same_bits_wherever_its_sources_run(prepare):
@@ -44,30 +42,30 @@ def test_the_same_bits_wherever_its_sources_run(prepare):
 
 
 LINK = (
-    "participants.hand.network_link={delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}],"
-    " seed: 3}"
+    "participants.hand.network_link="
+    "{delay: 5 ms, jitter: 4 ms, loss: 0.2, outages: [{at: 30 ms, duration: 6 ms}], seed: 3}"
 )
 
 
-def test_a_link_gives_the_same_bits_too(prepare):
+def test_a_network_link_gives_the_same_bits_too(prepare):
     first = run(prepare, LINK)
     assert run(prepare, LINK, *PLACEMENTS[-1]) == first
     assert run(prepare, LINK.replace("seed: 3", "seed: 4")) != first
 
 
-def test_what_came_over_a_link_simulates_again(prepare, tmp_path):
+def test_a_session_with_a_link_is_re_simulated(prepare, tmp_path):
     summary = prepare(SCENARIO, LINK, "participants.mixer.host=far", record=tmp_path / "recording").run()
     assert summary.recording_complete
     recording = Recording(tmp_path / "recording")
-    said = [message.time_ns for message in recording.messages("/device/hand/out/unused")]
-    assert said == sorted(said)
-    assert len(said) > 5
+    times = [message.time_ns for message in recording.messages("/device/hand/out/unused")]
+    assert times == sorted(times)
+    assert len(times) > 5
     verified = verify(recording)
     assert (verified.same, verified.steps) == (True, 60)
 
 
 @pytest.mark.parametrize("delay", [0, 10])
-def test_how_long_things_take_is_told_in_simulated_time(prepare, delay):
+def test_latencies_are_in_simulated_time(prepare, delay):
     overrides = ["participants.hand.period=2 ms"] + (
         [f"participants.hand.network_link.delay={delay} ms"] if delay else []
     )

@@ -5,7 +5,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from hub.devices.loop import DeviceLoop
+from hub.devices.device_thread import DeviceThread
 from hub.participant import Sample
 from schemas.errors import MessageError, ParticipantError
 from schemas.ros import Float64Message, Joy
@@ -15,7 +15,7 @@ MS = 1_000_000
 
 
 class Pen(Stylus):
-    """Says how often it was read, and button 1 at the third read; what it is told to raise, it raises."""
+    """Returns how often it was read, and button 1 at the third read; raises the errors it is given."""
 
     def __init__(self, fails_at=10**9, refuses=None):
         super().__init__("pen", out("count"), out("button", variability="event"))
@@ -51,42 +51,42 @@ class Uplink:
 
 @pytest.fixture
 def start():
-    loops = []
+    threads = []
 
     def start(pen, period_ns=MS):
         failures = []
-        loop = DeviceLoop("pen", pen, period_ns, failed=lambda *failure: failures.append(failure))
-        loops.append(loop)
-        loop.start(Path.cwd())
-        return loop, failures
+        thread = DeviceThread("pen", pen, period_ns, failed=lambda *failure: failures.append(failure))
+        threads.append(thread)
+        thread.start(Path.cwd())
+        return thread, failures
 
     yield start
-    for loop in loops:
-        loop.close()
+    for thread in threads:
+        thread.close()
 
 
-def test_an_uplink_gets_what_is_read_while_it_is_attached_and_the_buttons_as_they_are(start):
+def test_an_attached_uplink_gets_all_samples_and_first_the_present_buttons(start):
     pen, uplink, later = Pen(), Uplink(), Uplink()
-    loop, failures = start(pen)
+    thread, failures = start(pen)
     while pen.reads < 10:
         sleep(0.001)
-    loop.attach(uplink)
+    thread.attach(uplink)
     assert uplink.enough.wait(5)
-    loop.attach(later)
-    told = len(uplink.got)
+    thread.attach(later)
+    count = len(uplink.got)
     assert later.enough.wait(5)
-    assert len(uplink.got) == told
+    assert len(uplink.got) == count
     for got in (uplink.got, later.got):
         assert [port for _, port in got][:2] == ["button", "count"]
         times = [t for t, _ in got]
         assert times == sorted(times)
         assert [port for _, port in got].count("button") == 1
-    loop.close()
+    thread.close()
     assert pen.closed
     assert failures == []
 
 
-def test_what_a_device_raises_is_told_once_and_ends_its_loop(start):
+def test_an_error_of_a_device_is_reported_once_and_ends_its_thread(start):
     pen = Pen(fails_at=5)
     _, failures = start(pen)
     while not failures:
@@ -96,28 +96,28 @@ def test_what_a_device_raises_is_told_once_and_ends_its_loop(start):
     assert pen.reads == 5
 
 
-def test_a_value_that_is_refused_is_the_writers_affair_and_any_other_error_the_devices(start):
-    loop, failures = start(Pen(refuses=MessageError("no such port")))
+def test_a_refused_value_is_raised_to_the_writer_and_any_other_error_ends_the_device(start):
+    thread, failures = start(Pen(refuses=MessageError("no such port")))
     with pytest.raises(MessageError, match="no such port"):
-        loop.write("force", 1.0)
+        thread.write("force", 1.0)
     assert failures == []
-    loop, failures = start(Pen(refuses=OSError("burnt out")))
-    loop.write("force", 1.0)
-    loop.write("force", 1.0)
+    thread, failures = start(Pen(refuses=OSError("burnt out")))
+    thread.write("force", 1.0)
+    thread.write("force", 1.0)
     assert failures == [("pen", "OSError: burnt out")]
 
 
-def test_a_device_that_cannot_be_opened_says_so():
+def test_a_device_that_cannot_be_opened_is_named():
     class Unplugged(Pen):
         def open(self, directory):
             raise OSError("no such device")
 
     with pytest.raises(ParticipantError, match=r"participant 'pen' failed.*cannot be opened: no such device"):
-        DeviceLoop("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())
+        DeviceThread("pen", Unplugged(), MS, failed=lambda *_: None).start(Path.cwd())
 
 
 class Doorbell(Pen):
-    """Says at once when there is something new."""
+    """Returns from `wait` at once when there is something new."""
 
     def __init__(self):
         super().__init__()
@@ -131,10 +131,10 @@ class Doorbell(Pen):
         yield from super().read(t)
 
 
-def test_what_is_new_is_read_before_the_period_is_over(start):
+def test_a_device_with_news_is_read_before_its_period_is_over(start):
     bell, uplink = Doorbell(), Uplink()
-    loop, failures = start(bell, 3600 * 1000 * MS)
-    loop.attach(uplink)
+    thread, failures = start(bell, 3600 * 1000 * MS)
+    thread.attach(uplink)
     for _ in range(25):
         bell.rung.set()
         while bell.rung.is_set():

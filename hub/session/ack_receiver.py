@@ -1,4 +1,4 @@
-"""What stepped participants of other processes report to the hub: acks of grants, and failures."""
+"""Receives what stepped participants of other processes report: acks of grants, and failures."""
 
 from __future__ import annotations
 
@@ -9,39 +9,39 @@ import zenoh
 from zenoh.handlers import FifoChannel
 
 from hub.planning.plan import Plan, PlannedParticipant
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
 from schemas.lockstep import Ack, Grant, unpack_ack
 
-__all__ = ["Accepted", "Acks"]
+__all__ = ["Accepted", "AckReceiver"]
 
 Accepted = tuple[PlannedParticipant, Ack, bytes]
-"""Who reports what, and the bytes of it."""
+"""The participant, its ack, and the bytes of it."""
 
 _NO_STEPS: Mapping[str, int] = {}
 
 
-class Acks:
-    """The acks of one run. Whatever is none of it is dropped and counted."""
+class AckReceiver:
+    """Receives the acks of one run; all other messages are refused and counted."""
 
-    def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, drops: Drops) -> None:
-        self._session, self._key, self._run, self._drops = session, keys.ack("hub"), run, drops
+    def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, refusals: Refusals) -> None:
+        self._session, self._key, self._run, self._refusals = session, keys.ack("hub"), run, refusals
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
     def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Accepted | None:
-        """Wait for a message, and return it if it is a valid report of one of `waiting` on `grant`, in which
-        participants take `steps`.
+        """Wait for a message, and return it if it is a valid ack of `grant` from one of `waiting`.
 
-        Raises ParticipantError if it reports a failure. Returns None for anything else, and when `wake` was
-        called.
+        `steps` are the numbers of steps that participants take in the grant. Returns None for any other
+        message, and when `wake` was called. Raises ParticipantError if the message reports a failure.
         """
         return self._accept(self._subscriber.recv(), waiting, grant.step, steps)
 
     def ready(self, waiting: Sequence[str]) -> str | None:
-        """Return which of `waiting` has reported to be ready, if a message of one is here; raises
-        ParticipantError.
+        """Return the one of `waiting` that reports to be ready, if its message has arrived.
+
+        Raises ParticipantError if it reports a failure.
         """
         sample = self._subscriber.try_recv()
         accepted = None if sample is None else self._accept(sample, waiting, -1, _NO_STEPS)
@@ -65,16 +65,14 @@ class Acks:
             if ack.error:
                 raise ParticipantError(planned.name, ack.step, ack.error)
             if planned.name not in waiting or ack.step != step:
-                raise MessageError(f"reports on step {ack.step}, for which nobody waits")
+                raise MessageError(f"acknowledges step {ack.step}, which is not awaited")
         except MessageError as error:
-            self._drops.count(sample, error)
+            self._refusals.refuse_sample(sample, error)
             return None
         return planned, ack, payload
 
     def raise_failure(self) -> None:
-        """Raise the failure that a participant has reported in its own words, if there is one among what is
-        here.
-        """
+        """Raise the failure that a participant itself has reported, if such a message has arrived."""
         while (sample := self._subscriber.try_recv()) is not None:
             planned = self._planned.get(str(sample.key_expr))
             with suppress(MessageError):

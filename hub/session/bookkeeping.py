@@ -1,6 +1,4 @@
-"""What the hub knows of its run, and how it tells it: a status for consoles, a progress line, and a summary
-at the end.
-"""
+"""What the hub knows of its run: reported as a status, a progress line, and a summary at the end."""
 
 from __future__ import annotations
 
@@ -9,23 +7,23 @@ import struct
 from collections.abc import Callable
 from time import monotonic_ns
 
-from hub.devices.session_devices import Intake
+from hub.devices.session_devices import SessionDevices
 from hub.observation.latency import Histogram, by_way
 from hub.observation.observers import Observers
 from hub.observation.summary import Progress, Summary
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recorder import RecorderSummary
 from hub.session.clock import Clock
-from hub.transport.refusals import Drops
+from hub.transport.refusals import Refusals
 from schemas.lockstep import Ack
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import Latency, ParticipantStatus, SessionStatus
 
-__all__ = ["Account"]
+__all__ = ["Bookkeeping"]
 
 
-class Account:
-    """The account of one run."""
+class Bookkeeping:
+    """Keeps the phase, the times, and the state hashes of one run."""
 
     def __init__(
         self,
@@ -33,13 +31,10 @@ class Account:
         plan: Plan,
         run: int,
         clock: Clock,
-        drops: Drops,
+        refusals: Refusals,
         observers: Observers,
-        intake: Intake,
+        devices: SessionDevices,
     ) -> None:
-        """Take what is told of: `run` is its number; `drops` counts what the hub refuses beside what
-        `observers` do.
-        """
         self.phase = "starting"
         """`starting`, `running`, `paused`, `done` or `failed`."""
         self.detail = ""
@@ -48,9 +43,9 @@ class Account:
         self._plan = plan
         self._run = run
         self._clock = clock
-        self._drops = drops
+        self._refusals = refusals
         self._observers = observers
-        self._intake = intake
+        self._devices = devices
         self._answers = Histogram()
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
@@ -58,22 +53,20 @@ class Account:
         self._wall_ns: int | None = None
 
     def start(self) -> None:
-        """Count wall time from here: the run begins to step."""
+        """Start to count wall time: the first step begins."""
         self.phase = "running"
         self._started_ns = monotonic_ns()
 
     def stop(self) -> None:
-        """Count wall time no further: the last step is done."""
+        """Stop to count wall time: the last step is done."""
         self._wall_ns = self._wall_so_far_ns
 
     def acknowledged(self, granted_ns: int) -> None:
-        """All steps of a grant that was given at `granted_ns` (monotonic) are done."""
+        """Count the time since a grant was given at `granted_ns` (monotonic): all its steps are done."""
         self._answers.add(monotonic_ns() - granted_ns)
 
     def book(self, planned: PlannedParticipant, ack: Ack) -> int:
-        """Book the hashes and the last step that a participant reports; return the simulated time (ns) at the
-        end of that step.
-        """
+        """Book the hashes and the last step of an ack; return the simulated time (ns) at its end."""
         self._digests[planned.name].update(struct.pack(f"<{len(ack.state_hash)}Q", *ack.state_hash))
         first = ack.step + -ack.step % planned.period
         last = self._last_steps[planned.name] = first + (len(ack.state_hash) - 1) * planned.period
@@ -93,16 +86,16 @@ class Account:
         )
 
     def status(self, pid: Callable[[str], int]) -> SessionStatus:
-        """Return what the session is doing now; `pid` knows the process of a host."""
+        """Return the present status of the session; `pid` returns the process id of a host."""
         participants = [
             ParticipantStatus(
-                name=m.name,
-                role=m.role,
-                host=m.host,
-                pid=pid(m.host),
-                step=self._last_steps.get(m.name, self._clock.step),
+                name=planned.name,
+                role=planned.role,
+                host=planned.host,
+                pid=pid(planned.host),
+                step=self._last_steps.get(planned.name, self._clock.step),
             )
-            for m in self._plan.participants.values()
+            for planned in self._plan.participants.values()
         ]
         progress = self.progress()
         return SessionStatus(
@@ -116,12 +109,12 @@ class Account:
             dropped_messages=self._dropped,
             detail=self.detail,
             participants=participants,
-            devices=self._intake.statuses,
+            devices=self._devices.statuses,
             latencies=self._latencies,
         )
 
     def summary(self, recorded: RecorderSummary | None) -> Summary:
-        """Return what the run was like."""
+        """Return the summary of the run."""
         digest = hashlib.blake2b(digest_size=16)
         for name, part in sorted(self._digests.items()):
             digest.update(name.encode() + part.digest())
@@ -152,8 +145,8 @@ class Account:
     @property
     def _latencies(self) -> list[Latency]:
         answers = [self._answers.message("grant to state", "all participants")] if self._answers.count else []
-        return [*answers, *self._intake.latencies]
+        return [*answers, *self._devices.latencies]
 
     @property
     def _dropped(self) -> int:
-        return self._drops.total + self._observers.drops.total
+        return self._refusals.total + self._observers.refusals.total

@@ -1,6 +1,4 @@
-"""Who belongs to a session: hosts join, report ready or failed, and may be lost; the first failure ends the
-run.
-"""
+"""The hosts that have joined a session: they report to be ready or failed, and may be lost."""
 
 from __future__ import annotations
 
@@ -12,39 +10,24 @@ from pathlib import Path
 from hub.planning.plan import Plan
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.zenoh_session import LEASE_MS
-from schemas.errors import MessageError, ParticipantError
+from schemas.errors import MessageError
 from schemas.ports import BondSide
 from schemas.scenario import Scenario
 
-__all__ = ["Failures", "Membership"]
+__all__ = ["JoinedHosts"]
 
 
-class Failures:
-    """The first failure that any thread reports; `wake` makes the step loop look."""
+class JoinedHosts:
+    """The hosts of a session other than the hub's own.
 
-    def __init__(self, wake: Callable[[], None]) -> None:
-        self._wake = wake
-        self._lock = threading.Lock()
-        self.first: ParticipantError | None = None
-
-    def report(self, participant: str, step: int, cause: str) -> None:
-        """Report that `participant` failed in `step`; only the first report counts, the others are its
-        consequences.
-        """
-        with self._lock:
-            if self.first is not None:
-                return
-            self.first = ParticipantError(participant, step, cause)
-        self._wake()
-
-    def check(self) -> None:
-        """Raise the first failure, if there is one."""
-        if self.first is not None:
-            raise self.first
-
-
-class Membership:
-    """The hosts of a session other than the hub's own."""
+    Args:
+        scenario: The scenario.
+        plan: Its wiring.
+        directory: Where relative paths of the scenario start.
+        run: The number of the run.
+        watched: Outputs of which the hub needs every value.
+        failed: Is called with participant and cause when a host reports a failure.
+    """
 
     def __init__(
         self,
@@ -55,9 +38,6 @@ class Membership:
         watched: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
     ) -> None:
-        """`watched`: outputs that the hub listens to; `failed` is told the participant and the cause that a
-        host reports.
-        """
         self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
@@ -69,7 +49,7 @@ class Membership:
         self._changed = threading.Condition()
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
-        """Answer a host that presents itself, is ready or has failed; raises MessageError to refuse it."""
+        """Answer a host that joins, is ready or has failed; raises MessageError to refuse it."""
         names = [name for name, planned in self._plan.participants.items() if planned.host == request.host]
         if not names or request.host == "hub":
             hosts = (
@@ -78,19 +58,21 @@ class Membership:
             raise MessageError(
                 f"session '{self._scenario.name}' has no host '{request.host}'; it has {hosts}"
             )
+        participant, _, cause = request.failed.partition(": ")
+        if request.failed and participant not in names:
+            raise MessageError(f"host '{request.host}' has no participant '{participant}' that could fail")
         with self._changed:
             known = self._hosts.get(request.host)
             if known is not None and known.pid != request.pid:
                 lease_s = LEASE_MS / 1e3
                 raise MessageError(
-                    f"host '{request.host}' is here already, as process {known.pid}: end that one, or wait"
+                    f"host '{request.host}' has joined already, as process {known.pid}: end that one, or wait"
                     f" {lease_s:g} s if it is cut off"
                 )
             self._hosts[request.host] = request
             self._admissions += 1
             self._changed.notify_all()
         if request.failed:
-            participant, _, cause = request.failed.partition(": ")
             self._failed(participant, cause)
         if request.ready or request.failed:
             return Empty()
@@ -112,7 +94,7 @@ class Membership:
             self._hosts.pop(host, None)
 
     def missing(self, hosts: list[str]) -> list[str]:
-        """Return which of `hosts` are not ready yet, after waiting a moment for a change."""
+        """Return those of `hosts` that are not ready, after waiting a moment for a change."""
         with self._changed:
             waiting = [host for host in hosts if host not in self._hosts or not self._hosts[host].ready]
             if waiting:
@@ -120,9 +102,7 @@ class Membership:
             return waiting
 
     def bonds(self) -> Mapping[str, tuple[BondSide, ...]]:
-        """Return the bonds of all hosts' participants, with the numbers that are known once they are
-        configured.
-        """
+        """Return the bonds of all hosts' participants, with the numbers that `configure` has found."""
         return {name: sides for request in self._hosts.values() for name, sides in request.bonds.items()}
 
     def pid(self, host: str) -> int:

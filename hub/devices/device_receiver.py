@@ -1,0 +1,190 @@
+"""Receives what the simulation sends to a wall-time device, and writes it to the device."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from functools import partial
+from queue import SimpleQueue
+from threading import Thread
+from time import monotonic_ns
+
+import zenoh
+from zenoh.handlers import Callback
+
+from hub.devices.clock_offset import ClockOffset
+from hub.devices.device_thread import DeviceThread
+from hub.devices.network_link import NetworkLink
+from hub.devices.run_info import RunInfo
+from hub.observation.latency import Latencies
+from hub.participant import Value
+from hub.planning.plan import ConnectionToDevice
+from hub.transport.bundle import bundled, unpacked
+from hub.transport.cells import INITIAL
+from hub.transport.envelope import Tag
+from hub.transport.port_codec import PortCodec
+from hub.transport.refusals import Refusals
+from schemas.errors import MessageError
+
+__all__ = ["DeviceReceiver"]
+
+_MOST_WAITING = 8
+"""Bundles of signals: a host that is busy for longer misses the oldest ones, as its values should be new."""
+
+
+class DeviceReceiver:
+    """Receives what the connections to a device bring, until it is closed.
+
+    All in one thread: with one for each of a hundred ports, the simulation would wait for each in turn.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        run: RunInfo,
+        session: zenoh.Session,
+        link: NetworkLink,
+        thread: DeviceThread,
+        refusals: Refusals,
+        offset: ClockOffset | None,
+    ) -> None:
+        self.latencies = Latencies()
+        """From a value to the device."""
+        self._name, self._run, self._link, self._device = name, run, link, thread
+        self._refusals, self._offset = refusals, offset
+        self._inputs: list[_Input] = []
+        self._arrived: SimpleQueue[_Subscription | None] = SimpleQueue()
+        self._thread = Thread(target=self._receive, name=f"receiver {name}", daemon=True)
+        self._thread.start()
+        self._subscribers = [
+            session.declare_subscriber(one.key, Callback(partial(self._put, one), indirect=False))
+            for one in self._subscriptions()
+        ]
+
+    def _subscriptions(self) -> Iterator[_Subscription]:
+        """Yield the keys to receive: the bundle of each participant's signals, and each event port."""
+        plan, keys, name = self._run.plan, self._run.keys, self._name
+        outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
+        for source in dict.fromkeys(outlet.source for outlet in outlets):
+            signals = bundled(plan, source, name)
+            if signals:
+                inputs = [self._input(outlet) for outlet in signals]
+                yield _Subscription(keys.signals(source, name), inputs, whole=False)
+            for outlet in outlets:
+                if outlet.source == source and outlet not in signals:
+                    key = keys.feed(source, outlet.source_port)
+                    yield _Subscription(key, [self._input(outlet)], whole=True)
+
+    def _input(self, outlet: ConnectionToDevice) -> _Input:
+        made = _Input(
+            outlet, self._run, self._link, self._device, self._refusals, self.latencies, self._offset
+        )
+        self._inputs.append(made)
+        return made
+
+    def _put(self, subscription: _Subscription, sample: zenoh.Sample) -> None:
+        subscription.waiting.append(sample)
+        self._arrived.put(subscription)
+
+    def _receive(self) -> None:
+        while (subscription := self._arrived.get()) is not None:
+            if subscription.waiting:  # otherwise newer signals have taken its place
+                sample = subscription.waiting.popleft()
+                try:
+                    subscription.receive(sample, self._run.number)
+                except MessageError as error:
+                    self._refusals.refuse_sample(sample, error)
+
+    def write_arrived(self, t: int) -> None:
+        """Write to the device what has passed the link by `t` (ns since the start of the device's thread)."""
+        for one in self._inputs:
+            one.write_arrived(t)
+
+    def close(self) -> None:
+        """Receive no more."""
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
+        self._arrived.put(None)
+        self._thread.join(timeout=2.0)
+
+
+class _Subscription:
+    """The messages of one key, and the inputs that they are for.
+
+    `whole`: a message is the value of the only input; otherwise it is a bundle.
+    """
+
+    def __init__(self, key: str, inputs: Sequence[_Input], *, whole: bool) -> None:
+        self.key, self._inputs, self._whole = key, inputs, whole
+        self.waiting: deque[zenoh.Sample] = deque(maxlen=None if whole else _MOST_WAITING)
+        """What has arrived and is not yet handled."""
+
+    def receive(self, sample: zenoh.Sample, run: int) -> None:
+        """Give a message's values to the inputs; raises MessageError if it is invalid or of another run."""
+        tag = Tag.of(sample)
+        if tag.run != run:
+            raise MessageError(f"belongs to run {tag.run:x}, this is run {run:x}")
+        if not tag.count:  # no events in this step
+            return
+        payload = sample.payload.to_bytes()
+        for index, value in [(0, payload)] if self._whole else unpacked(payload):
+            if index >= len(self._inputs):
+                raise MessageError(f"a bundle has value {index} of {len(self._inputs)}")
+            self._inputs[index].receive(tag, value)
+
+
+class _Input:
+    """One connection to the device."""
+
+    def __init__(
+        self,
+        outlet: ConnectionToDevice,
+        run: RunInfo,
+        link: NetworkLink,
+        thread: DeviceThread,
+        refusals: Refusals,
+        latencies: Latencies,
+        offset: ClockOffset | None,
+    ) -> None:
+        source = run.plan.participants[outlet.source]
+        target = run.plan.participants[outlet.target].port(outlet.target_port)
+        sent = source.port(outlet.source_port)
+        self._codec = PortCodec(sent.model_copy(update={"variability": target.variability}))
+        self._port = target.name
+        self._stream = f"{outlet.source}.{outlet.source_port} -> {outlet.target}.{target.name}"
+        self._link, self._line = link, link.line(target)
+        self._device, self._refusals, self._latencies, self._offset = thread, refusals, latencies, offset
+        self._timed = not source.host.startswith("remote/")  # the clock of a third machine is not known here
+        self._newest = (INITIAL - 1, 0)
+
+    def receive(self, tag: Tag, payload: bytes) -> None:
+        """Write a value, or send it over the link; raises MessageError if it is invalid."""
+        value = self._codec.decode(payload)
+        if self._link.idle:
+            self._write(tag, value)
+        else:
+            self._line.send(self._device.now_ns, (tag, value))
+
+    def write_arrived(self, t: int) -> None:
+        """Write what has passed the link by `t` (ns since the start of the device's thread)."""
+        for _, (tag, value) in self._line.arrived(t):
+            self._write(tag, value)
+
+    def _write(self, tag: Tag, value: Value) -> None:
+        if (tag.step, tag.index) <= self._newest:
+            if tag.step > INITIAL:  # the value at time 0 is repeated until every host has it
+                self._refusals.refuse(
+                    self._stream,
+                    f"the value of step {tag.step} is late: that of step {self._newest[0]} arrived before it",
+                )
+            return
+        self._newest = tag.step, tag.index
+        try:
+            self._device.write(self._port, value)
+        except MessageError as error:
+            self._refusals.refuse(self._stream, error)
+            return
+        best = None if self._offset is None else self._offset.best
+        if self._timed and (self._offset is None or best is not None):
+            now_ns = monotonic_ns() + (0 if best is None else best.offset_ns)
+            self._latencies.add("state to force", self._stream, now_ns - tag.sent_ns)

@@ -1,0 +1,188 @@
+"""One run of a session in a host process: its participants, stepped as the hub grants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from time import sleep
+
+import zenoh
+from zenoh.handlers import FifoChannel, Handler
+
+from hub.devices.clock_sync import ClockSync
+from hub.devices.device_thread import DeviceThread
+from hub.devices.run_info import RunInfo
+from hub.devices.uplink import DeviceUplink
+from hub.hosting.host import Host
+from hub.participant import Device, Stepped
+from hub.planning.plan import PlannedParticipant
+from hub.planning.registry import make
+from hub.transport.control_client import ask
+from hub.transport.control_messages import Empty, JoinReply, JoinRequest
+from hub.transport.lane import may_spin
+from hub.transport.refusals import Refusals
+from hub.transport.wire import Wire
+from schemas.codec import encode
+from schemas.errors import MessageError, ParticipantError
+from schemas.keys import Keys
+from schemas.lockstep import Ack, Grant, pack_ack, unpack_grant
+from schemas.ros import StringMessage
+
+__all__ = ["HostRun"]
+
+_PRIME_S = 0.01
+_IDLE_S = 0.2
+
+
+class HostRun:
+    """The participants of this process in the run that the hub has described in its `reply`.
+
+    `connect` opens another Zenoh session with the hub; relative paths of the scenario start at `directory`.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        request: JoinRequest,
+        reply: JoinReply,
+        directory: Path,
+        connect: Callable[[], zenoh.Session],
+    ) -> None:
+        self._session, self._request, self._directory = session, request, directory
+        self._keys, self._run, self._step_ns = Keys(reply.session), reply.run, reply.plan.step_ns
+        self._next_step = 0
+        plan, host, keys = reply.plan, request.host, self._keys
+        mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
+        made = {
+            name: make(planned.kind, name, reply.params[name], directory) for name, planned in mine.items()
+        }
+        first = next(iter(mine.values()))
+        refused = session.declare_publisher(
+            keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
+        )
+        self._refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
+        spin = may_spin(len(plan.hosts()))
+        wire = Wire(session, keys, reply.run, self._refusals, host, spin=spin, watched=reply.watched)
+        stepped = {name: p for name, p in made.items() if isinstance(p, Stepped)}
+        self._host = Host(host, plan, stepped, wire=wire)
+        self._acks = {
+            planned.name: session.declare_publisher(
+                keys.ack(planned.name),
+                encoding=zenoh.Encoding.APPLICATION_CDR,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.REAL_TIME,
+                express=True,
+            )
+            for planned in self._host.participants
+        }
+        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256)) if self._acks else None
+        self._stack = ExitStack()
+        devices = {name: device for name, device in made.items() if isinstance(device, Device)}
+        self._threads = self._attach_devices(reply, devices, connect)
+        self._tokens = [
+            session.liveliness().declare_token(keys.alive(planned.key_role, name))
+            for name, planned in mine.items()
+        ]
+
+    def _attach_devices(
+        self, reply: JoinReply, devices: Mapping[str, Device], connect: Callable[[], zenoh.Session]
+    ) -> list[DeviceThread]:
+        """Return a thread for each device, with an uplink that the stack closes; none is started."""
+        if not devices:
+            return []
+        threads: list[DeviceThread] = []
+        clock = self._stack.enter_context(ClockSync(self._session, self._keys))
+        run = RunInfo(reply.plan, self._keys, reply.run, reply.admission)
+        for name, device in devices.items():
+            device.learn_hub(connect)
+            planned = reply.plan.participants[name]
+            thread = DeviceThread(name, device, planned.read_ns, failed=self._report_failure)
+            uplink = DeviceUplink(planned, run, self._session, thread, self._refusals, clock.offset)
+            self._stack.callback(uplink.close)
+            thread.attach(uplink)
+            threads.append(thread)
+        return threads
+
+    def serve(self) -> None:
+        """Configure, report ready, and step as the hub grants until the process is interrupted."""
+        try:
+            bonds = self._host.configure(self._directory)
+            for thread in self._threads:
+                thread.start(self._directory)
+        except ParticipantError as error:
+            self._report_failure(error.participant, error.cause)
+            raise
+        self._send_to_hub(self._request.model_copy(update={"ready": True, "bonds": bonds}))
+        if self._grants is None:  # devices alone, which live in threads of their own
+            while True:
+                sleep(_IDLE_S)
+        grant = self._first_grant(self._grants)
+        while True:
+            try:
+                self._host.run(grant, self._acknowledge)
+            except ParticipantError as error:
+                failed = Ack(self._run, 0, error.step, (), (), (), error.cause)
+                self._acks[error.participant].put(pack_ack(failed))
+                raise
+            grant = self._next_grant(self._grants)
+
+    def _first_grant(self, grants: zenoh.Subscriber[Handler[zenoh.Sample]]) -> Grant:
+        """Repeat the values at time 0 until every connection has carried its own and a grant has arrived."""
+        ready = False
+        while True:
+            self._host.publish_initial()
+            if not ready and self._host.linked():
+                ready = True
+                for planned in self._host.participants:
+                    self._acknowledge(planned, Ack(self._run, 0, -1, (), (), ()))
+            if ready and (sample := grants.try_recv()) is not None:
+                grant = self._accept(sample)
+                if grant is not None:
+                    return grant
+            sleep(_PRIME_S)
+
+    def _next_grant(self, grants: zenoh.Subscriber[Handler[zenoh.Sample]]) -> Grant:
+        while True:
+            grant = self._accept(grants.recv())
+            if grant is not None:
+                return grant
+
+    def _accept(self, sample: zenoh.Sample) -> Grant | None:
+        """Return the grant in `sample`; refuse it and return None if it is not the next one of this run."""
+        try:
+            grant = unpack_grant(sample.payload.to_bytes())
+            if grant.run != self._run:
+                raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
+            if (
+                grant.step != self._next_step
+                or grant.start_ns != grant.step * self._step_ns
+                or grant.horizon_ns <= grant.start_ns
+            ):
+                raise MessageError(
+                    f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step"
+                    f" {self._next_step} is next"
+                )
+        except MessageError as error:
+            self._refusals.refuse_sample(sample, error)
+            return None
+        self._next_step = grant.horizon_ns // self._step_ns
+        return grant
+
+    def _acknowledge(self, planned: PlannedParticipant, ack: Ack) -> None:
+        self._acks[planned.name].put(pack_ack(ack))
+
+    def _report_failure(self, name: str, cause: str) -> None:
+        self._send_to_hub(self._request.model_copy(update={"failed": f"{name}: {cause}"}))
+
+    def _send_to_hub(self, request: JoinRequest) -> None:
+        ask(self._session, self._keys.join(request.host), request, Empty)
+
+    def close(self) -> None:
+        """Close devices, participants and publishers."""
+        for thread in self._threads:
+            thread.close()
+        self._stack.close()
+        self._host.close()
+        for token in self._tokens:
+            token.undeclare()

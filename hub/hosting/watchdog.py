@@ -1,0 +1,84 @@
+"""Watches the host processes of a session, and how long participants take to answer."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from time import monotonic_ns
+
+from hub.hosting.host_processes import HostProcesses
+from hub.planning.plan import Plan
+
+__all__ = ["Watchdog"]
+
+_PERIOD_S = 0.02
+"""Between two checks: the end of a process is reported within 100 ms, with a wide margin."""
+
+
+class Watchdog:
+    """Checks processes and answers in a thread of its own, until the first failure.
+
+    Args:
+        plan: The plan of the session.
+        processes: The processes to watch.
+        answer_limit_ns: How long a participant may take to answer.
+        awaited: Returns the participant for which this process waits, if it is known.
+        failed: Is called once, with a participant's name and the cause.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        processes: HostProcesses,
+        answer_limit_ns: int,
+        awaited: Callable[[], str | None],
+        failed: Callable[[str, str], None],
+    ) -> None:
+        self._plan, self._processes, self._limit_ns = plan, processes, answer_limit_ns
+        self._awaited, self._failed = awaited, failed
+        self._waiting: Sequence[str] = ()
+        self._since_ns = 0
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
+        self._thread.start()
+
+    def wait_for(self, participants: Sequence[str]) -> None:
+        """Watch for the answers of `participants`, in step order, from now on.
+
+        The caller may remove a participant from the list when it has answered.
+        """
+        self._since_ns = monotonic_ns()
+        self._waiting = participants
+
+    def _run(self) -> None:
+        while not self._ending.wait(_PERIOD_S):
+            failure = self._ended_process() or self._late_answer()
+            if failure is not None:
+                self._failed(*failure)
+                return
+
+    def _ended_process(self) -> tuple[str, str] | None:
+        """Return a participant whose process has ended, and how."""
+        for host, how in self._processes.dead().items():
+            names = [name for name in self._plan.participants if self._plan.participants[name].host == host]
+            missing = [name for name in self._waiting if name in names] or names
+            others = ", ".join(name for name in names if name != missing[0])
+            return missing[0], f"{how} (host '{host}' also ran {others})" if others else how
+        return None
+
+    def _late_answer(self) -> tuple[str, str] | None:
+        """Return a participant that has not answered in time, and the cause."""
+        since_ns, waiting = self._since_ns, tuple(self._waiting)
+        if not waiting or monotonic_ns() - since_ns <= self._limit_ns:
+            return None
+        first, *others = waiting
+        cause = f"it has not answered for {self._limit_ns / 1e9:g} s (answer_limit)"
+        awaited = self._awaited()
+        if awaited is None and others:
+            cause += f"; nor have {', '.join(others)}, which may wait for it"
+        return awaited or first, cause
+
+    def end(self) -> None:
+        """Stop watching."""
+        self._ending.set()
+        self._thread.join()

@@ -1,0 +1,86 @@
+"""What other processes report beside acks: that they have come or gone, and that they refused a message."""
+
+from __future__ import annotations
+
+import logging
+
+import zenoh
+from zenoh.handlers import Callback
+
+from hub.devices.session_devices import SessionDevices
+from hub.planning.plan import Plan
+from hub.session.bookkeeping import Bookkeeping
+from hub.session.first_failure import FirstFailure
+from hub.session.joined_hosts import JoinedHosts
+from hub.transport.refusals import Refusals
+from schemas.codec import decode
+from schemas.errors import MessageError
+from schemas.keys import Keys
+from schemas.ros import StringMessage
+
+__all__ = ["RemoteReports"]
+
+log = logging.getLogger(__name__)
+
+
+class RemoteReports:
+    """Subscribes to liveliness tokens and refusals of all hosts of a session.
+
+    A lost engine of another machine ends the run; with a lost device, what it leads holds.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        plan: Plan,
+        devices: SessionDevices,
+        joined_hosts: JoinedHosts,
+        bookkeeping: Bookkeeping,
+        failure: FirstFailure,
+        refusals: Refusals,
+    ) -> None:
+        self._plan, self._devices, self._joined_hosts = plan, devices, joined_hosts
+        self._bookkeeping, self._failure, self._refusals = bookkeeping, failure, refusals
+        self._subscribers = [
+            session.liveliness().declare_subscriber(keys.alive("*", "*"), Callback(self._token)),
+            session.declare_subscriber(keys.refused("*", "*"), Callback(self._refused)),
+        ]
+
+    def _token(self, sample: zenoh.Sample) -> None:
+        """Handle a liveliness token that has appeared or disappeared."""
+        name = str(sample.key_expr).rsplit("/", 1)[1]
+        planned = self._plan.participants.get(name)
+        if planned is None or not planned.host.startswith("remote/"):
+            return
+        if sample.kind != zenoh.SampleKind.DELETE:
+            if planned.role == "device":
+                self._devices.network_links.repeat(name)
+            return
+        self._joined_hosts.lose(planned.host)
+        if planned.role == "device":
+            self._devices.forget(name)
+        if self._bookkeeping.phase not in ("starting", "running", "paused"):
+            return
+        if planned.role != "device":
+            self._failure.report(name, "its host is gone")
+            return
+        log.warning(
+            "device '%s' is gone, what it leads holds: start 'trocar device %s' again, or mend the"
+            " network; a host that still runs joins again",
+            name,
+            name,
+        )
+
+    def _refused(self, sample: zenoh.Sample) -> None:
+        """Count a message that another host has refused; that host has logged the reason."""
+        try:
+            decode(StringMessage, sample.payload.to_bytes())
+            self._refusals.add(str(sample.key_expr))
+        except MessageError as error:
+            self._refusals.refuse_sample(sample, error)
+
+    def undeclare(self) -> None:
+        """Receive no more reports."""
+        for subscriber in self._subscribers:
+            subscriber.undeclare()

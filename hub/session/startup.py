@@ -1,0 +1,73 @@
+"""The start of a run: host processes, joining, configuring, and a first value over every connection."""
+
+from __future__ import annotations
+
+import logging
+from time import monotonic, sleep
+
+from hub.planning.bond_check import check_bonds
+from hub.session.run import Run, SessionSpec
+from schemas.errors import SessionError
+
+__all__ = ["start"]
+
+log = logging.getLogger(__name__)
+
+
+def start(run: Run) -> None:
+    """Start the hosts, and wait until all participants are configured and every connection works.
+
+    Raises SessionError if a host does not join in time, ScenarioError if a bond's step is unstable, and
+    ParticipantError.
+    """
+    spec = run.spec
+    hosts = [host for host in spec.plan.hosts() if host != "hub" and _is_needed(host, spec)]
+    for host in hosts:
+        if not host.startswith("remote/"):
+            run.processes.start(host, spec.endpoint, spec.scenario.name)
+    bonds = run.host.configure(spec.directory)
+    run.devices.open(spec.directory)
+    _wait_for_hosts(run, hosts)
+    check_bonds(spec.plan, {**bonds, **run.joined_hosts.bonds()})
+    _wait_for_connections(run)
+
+
+def _is_needed(host: str, spec: SessionSpec) -> bool:
+    """Return whether a host takes part: one with devices alone does not in a re-simulation."""
+    roles = {planned.role for planned in spec.plan.participants.values() if planned.host == host}
+    return not spec.resimulated or roles != {"device"}
+
+
+def _wait_for_hosts(run: Run, hosts: list[str]) -> None:
+    limit_s = run.spec.scenario.join_limit / 1e9
+    gate = run.spec.gate
+    endpoints = ", ".join((run.spec.endpoint, *(gate.endpoints if gate is not None else ())))
+    deadline = monotonic() + limit_s
+    logged: list[str] = []
+    while missing := run.joined_hosts.missing(hosts):
+        run.failure.check()
+        if run.state.ending:
+            raise SessionError(f"shut down while waiting for {', '.join(missing)} to join")
+        if missing != logged:
+            log.info("waiting for %s to join at %s", ", ".join(missing), endpoints)
+        logged = missing
+        if monotonic() > deadline:
+            raise SessionError(
+                f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {endpoints}"
+            )
+
+
+def _wait_for_connections(run: Run) -> None:
+    """Repeat the values at time 0 until every host has received those that it reads."""
+    plan = run.spec.plan
+    waiting = [name for name in plan.order if plan.participants[name].host != "hub"]
+    run.watchdog.wait_for(waiting)
+    while waiting or not run.host.linked() or not run.observers.linked():
+        run.host.publish_initial()
+        run.failure.check()
+        ready = run.acks.ready(waiting)
+        if ready is None:
+            sleep(0.005)
+        else:
+            waiting.remove(ready)
+    run.watchdog.wait_for(())

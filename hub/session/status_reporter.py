@@ -1,0 +1,47 @@
+"""The status of a session on Zenoh: published at intervals, and the answer to queries."""
+
+from __future__ import annotations
+
+import zenoh
+from zenoh.handlers import Callback
+
+from hub.observation.observers import Observers
+from hub.session.bookkeeping import Bookkeeping
+from hub.session.joined_hosts import JoinedHosts
+from schemas.codec import encode
+from schemas.keys import Keys
+
+__all__ = ["StatusReporter"]
+
+
+class StatusReporter:
+    """Publishes and records the status on demand, and answers queries for it at any time."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        bookkeeping: Bookkeeping,
+        joined_hosts: JoinedHosts,
+        observers: Observers,
+    ) -> None:
+        self._key, self._observers = keys.status, observers
+        self._bookkeeping, self._joined_hosts = bookkeeping, joined_hosts
+        self._publisher = session.declare_publisher(keys.status, encoding=zenoh.Encoding.APPLICATION_CDR)
+        self._queryable = session.declare_queryable(keys.status, Callback(self._answer))
+
+    def _answer(self, query: zenoh.Query) -> None:
+        status = self._bookkeeping.status(self._joined_hosts.pid)
+        with query:
+            query.reply(self._key, encode(status), encoding=zenoh.Encoding.APPLICATION_CDR)
+
+    def publish(self) -> None:
+        """Publish and record the status."""
+        status = self._bookkeeping.status(self._joined_hosts.pid)
+        self._observers.status(status)
+        self._publisher.put(encode(status))
+
+    def undeclare(self) -> None:
+        """Publish and answer no more."""
+        self._queryable.undeclare()
+        self._publisher.undeclare()

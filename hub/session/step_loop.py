@@ -1,0 +1,171 @@
+"""The step loop of the hub: grants steps, takes part in them, and waits for the acks of all others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from time import monotonic, monotonic_ns
+
+import zenoh
+
+from hub.observation.summary import Progress
+from hub.planning.plan import PlannedParticipant
+from hub.session.run import Run
+from schemas.codec import encode
+from schemas.lockstep import Ack, Grant, pack_grant
+from schemas.trocar_msgs import GrantMessage
+
+__all__ = ["OnAck", "StepLoop"]
+
+_PROGRESS_S = 0.1
+_STATUS_S = 0.5
+
+OnAck = Callable[[PlannedParticipant, Ack], None]
+
+
+class StepLoop:
+    """Steps a run to its end.
+
+    `recorded` are the grants of an earlier run, to be given again; `on_ack` is called with every ack.
+    """
+
+    def __init__(self, run: Run, recorded: Iterator[GrantMessage] | None, on_ack: OnAck | None) -> None:
+        plan, session, keys = run.spec.plan, run.session, run.keys
+        self._run, self._recorded, self._on_ack = run, recorded, on_ack
+        self._step_ns = plan.step_ns
+        self._participants = plan.participants
+        self._order = plan.order
+        self._away = {name for name in plan.order if plan.participants[name].host != "hub"}
+        self._common_period = math.lcm(*(plan.participants[name].period for name in plan.order))
+        self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
+        self._unbooked: list[tuple[PlannedParticipant, Ack, bytes | None]] = []
+        self._grants = session.declare_publisher(
+            keys.grant,
+            encoding=zenoh.Encoding.APPLICATION_CDR,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.REAL_TIME,
+            express=True,
+        )
+        self._energy = {
+            bond.bond.name: session.declare_publisher(
+                keys.energy(bond.bond.name), encoding=zenoh.Encoding.APPLICATION_CDR
+            )
+            for bond in plan.bonds
+        }
+
+    def step_to_end(self, progress: Callable[[Progress], None] | None) -> None:
+        """Step until all steps are done or the session is to end; raises the first failure of the run.
+
+        `progress` is called ten times a second, and at the end.
+        """
+        run, clock, state = self._run, self._run.clock, self._run.state
+        run.bookkeeping.start()
+        shown = published = 0.0
+        clock.start()
+        while not clock.done and not state.ending:
+            run.failure.check()
+            budget = state.budget  # read once: control threads may change it at any time
+            if budget == 0:
+                self._wait_while_paused()
+                continue
+            grant = self._next_grant(budget)
+            if grant is None:
+                break
+            self._step(grant)
+            now = monotonic()
+            if progress is not None and now - shown > _PROGRESS_S:
+                shown = now
+                progress(run.bookkeeping.progress())
+            if now - published > _STATUS_S:
+                published = now
+                run.status.publish()
+        run.bookkeeping.stop()
+        run.host.drain()
+        self.book_acks()
+        if progress is not None:
+            progress(run.bookkeeping.progress())
+
+    def _wait_while_paused(self) -> None:
+        run = self._run
+        self.book_acks()
+        run.bookkeeping.phase = "paused"  # after the acks are booked: the status counts the steps taken
+        run.status.publish()
+        while not run.state.wait(0.2):
+            run.failure.check()
+        run.bookkeeping.phase = "running"
+        run.clock.start()
+
+    def _next_grant(self, budget: int | None) -> Grant | None:
+        """Return the next grant, of at most `budget` steps, with the samples that enter there."""
+        run = self._run
+        if self._recorded is not None:
+            then = next(self._recorded, None)
+            if then is None:
+                return None
+            return Grant(run.number, then.epoch, then.step, then.start_ns, then.horizon_ns, then.inlets)
+        step, time_ns = run.clock.step, run.clock.time_ns
+        horizon_ns = time_ns + run.clock.horizon(budget) * self._step_ns
+        return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter(time_ns, step))
+
+    def _step(self, grant: Grant) -> None:
+        """Publish a grant, take part in it, and wait until all others have.
+
+        The acks of the grant before are booked while other processes work on this one.
+        """
+        run = self._run
+        granted_ns = monotonic_ns()
+        payload = pack_grant(grant) if self._away or run.recorded else b""
+        if self._away:
+            self._grants.put(payload)
+        self.book_acks()
+        if run.recorded:
+            run.observers.grant(grant, payload)
+        due, steps = self._schedule(grant)
+        run.watchdog.wait_for(due)
+        run.host.run(grant, self._done_here)
+        self._receive_acks([name for name in due if name in self._away], grant, steps)
+        run.bookkeeping.acknowledged(granted_ns)
+        if run.clock.realtime:
+            self.book_acks()  # now rather than when the next sample of a device waits
+        count = (grant.horizon_ns - grant.start_ns) // self._step_ns
+        run.clock.advance(count)
+        run.state.spend(count)
+
+    def _done_here(self, planned: PlannedParticipant, ack: Ack) -> None:
+        self._unbooked.append((planned, ack, None))
+
+    def _receive_acks(self, waiting: list[str], grant: Grant, steps: dict[str, int]) -> None:
+        run = self._run
+        run.watchdog.wait_for(waiting)
+        while waiting:
+            accepted = run.acks.receive(waiting, grant, steps)
+            if accepted is None:
+                run.failure.check()
+            else:
+                waiting.remove(accepted[0].name)
+                self._unbooked.append(accepted)
+        run.watchdog.wait_for(())
+
+    def _schedule(self, grant: Grant) -> tuple[list[str], dict[str, int]]:
+        """Return the participants that step in a grant, in step order, and their numbers of steps.
+
+        Grants follow few patterns, so each is worked out once.
+        """
+        begin, end = grant.step, grant.horizon_ns // self._step_ns
+        key = begin % self._common_period, end - begin
+        if key not in self._schedules:
+            periods = {name: self._participants[name].period for name in self._order}
+            steps = {name: (end - 1) // period - (begin - 1) // period for name, period in periods.items()}
+            self._schedules[key] = [name for name in self._order if steps[name]], steps
+        return self._schedules[key]
+
+    def book_acks(self) -> None:
+        """Book the acks that have arrived, and publish the energy books when they are due."""
+        observers, bookkeeping = self._run.observers, self._run.bookkeeping
+        for planned, ack, payload in self._unbooked:
+            observers.ack(planned, ack, bookkeeping.book(planned, ack), payload)
+            if self._on_ack is not None:
+                self._on_ack(planned, ack)
+        self._unbooked.clear()
+        for message in observers.books(self._run.clock.time_ns):
+            self._energy[message.bond].put(encode(message))
