@@ -137,7 +137,7 @@ class Console(Stepped):
             self._select(name.data, wish=False)
 
     def _heed_pedals(self, inputs: Inputs) -> None:
-        for pedal in PEDALS.told:
+        for pedal in PEDALS.events:
             for joy in inputs.events(f"pedals/{pedal}"):
                 self._voice.say(f"footpedals/{pedal}", joy)
         for button, pedal in _BUTTONS.items():

@@ -37,11 +37,15 @@ def console_ports(params: ConsoleParams) -> tuple[Port, ...]:
     """Return the ports of a console as `params` say."""
     masters, led = (sorted({name.split("_")[i] for name in params.teleoperations}) for i in (0, 1))
     heard = (
-        _named("console", CONSOLE.heard)
-        | {f"system/{name}": SYSTEM.heard[name] for name in _SYSTEM_HEARD}
-        | _named("pedals", PEDALS.told)
+        _named("console", CONSOLE.commands)
+        | {f"system/{name}": SYSTEM.commands[name] for name in _SYSTEM_HEARD}
+        | _named("pedals", PEDALS.events)
     )
-    told = _named("console", CONSOLE.told) | _named("system", SYSTEM.told) | _named("footpedals", PEDALS.told)
+    told = (
+        _named("console", CONSOLE.events)
+        | _named("system", SYSTEM.events)
+        | _named("footpedals", PEDALS.events)
+    )
     return (
         *_events("input", heard | {f"{arm}/operating_state": _OPERATING_STATE for arm in params.arms}),
         *_events("output", told | {f"{arm}/state_command": _STATE_COMMAND for arm in params.arms}),
@@ -109,9 +113,9 @@ def _teleoperation(name: str, params: ConsoleParams) -> Iterable[Port]:
     return (
         *_events(
             "input",
-            _named(name, TELEOPERATION.heard) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING},
+            _named(name, TELEOPERATION.commands) | {f"{leads}/state": _STRING, f"{leads}/warning": _STRING},
         ),
-        *_events("output", _named(name, TELEOPERATION.told)),
+        *_events("output", _named(name, TELEOPERATION.events)),
         *_events(
             "output",
             {f"{leads}/buttons": BUTTON, f"{leads}/lock_rotation": _BOOL, f"{leads}/lock_translation": _BOOL},

@@ -17,15 +17,10 @@ from controllers.motion.gravity import KnownWeight
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import (
-    CARTESIAN_COMMANDS,
-    COMMANDS,
-    EQUIPMENT_COMMANDS,
-    EVENTS,
-    GRIPPER_COMMANDS,
-)
+from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
 from controllers.motion.telemetry import Telemetry
 from hub.participant import Inputs
+from robots.dvrk import crtk
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import StringStamped
 from schemas.errors import MotionError
@@ -34,12 +29,8 @@ from schemas.vectors import Vector
 
 __all__ = ["Arm"]
 
-_ANY_TIME = (
-    *("use_gravity_compensation", "body/set_cf_orientation_absolute", "set_base_frame"),
-    *(command for commands in EQUIPMENT_COMMANDS.values() for command in commands),
-    *("trajectory_j/set_ratio", "trajectory_j/set_ratio_v", "trajectory_j/set_ratio_a"),
-)
-"""Commands that are heeded whatever the operating state."""
+_ANY_TIME = crtk.SETTINGS.union(*EQUIPMENT_COMMANDS.values())
+"""Commands that are executed in every operating state."""
 _BARE = 2.0
 """What `control_mode` adds to position and effort without gravity compensation."""
 
@@ -56,7 +47,7 @@ class Arm:
         arm = params.arms.driven[name]
         self._name, self._period = name, period
         held = arm.equipment
-        self._messages = Messages(name, (*EVENTS, held[0]))
+        self._messages = Messages(name, event_names(arm))
         self._equipment = Equipment(*held, self._messages)
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
@@ -73,7 +64,7 @@ class Arm:
         )
         heeding = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
         self._state_port = f"{name}/state_command"
-        commands = (*COMMANDS, *self._equipment.handlers)
+        commands = (*crtk.COMMANDS, *self._equipment.handlers)
         self._ports = [
             (command, f"{name}/{command}", heeding[command])
             for command in commands
@@ -83,7 +74,8 @@ class Arm:
         if (gripper := arm.gripper) is not None:
             self._prefixes.append(f"{name}/{gripper.name}")
             grasping = [
-                (f"{gripper.name}/{command}", heeding[f"gripper/{command}"]) for command in GRIPPER_COMMANDS
+                (f"{gripper.name}/{command}", heeding[f"gripper/{command}"])
+                for command in crtk.GRIPPER_COMMANDS
             ]
             self._ports += [(command, f"{name}/{command}", heed) for command, heed in grasping]
         self._started, self._modes = np.zeros(1), np.array(self._drives.modes, np.float64)
@@ -191,7 +183,7 @@ class Arm:
         for command, port, heed in self._ports:
             for message in inputs.events(port):
                 self._heed_one(command, heed, message)
-                awaited |= "move_" in command
+                awaited |= crtk.is_move(command)
         return awaited
 
     def _heed_one(self, command: str, heed: Callable[[Any], None], message: Message) -> None:
@@ -202,12 +194,12 @@ class Arm:
             heed(message)
         except MotionError as error:
             self._messages.refuse(command, str(error), ready=True)
-            if "move_" in command and not self._drives.is_moving:
+            if crtk.is_move(command) and not self._drives.is_moving:
                 # as the real controller does; a move under way goes on
                 self._messages.goal_reached(reached=False)
             return
         self._messages.heeded(command)
-        if command in CARTESIAN_COMMANDS:
+        if command in crtk.CARTESIAN_COMMANDS:
             self._drives.cartesian[0] = 1.0
 
     def _not_ready(self, command: str) -> str:
@@ -215,5 +207,5 @@ class Arm:
         if command in _ANY_TIME:
             return ""
         return self._lifecycle.not_ready() or (
-            self._cartesian.not_ready() if command in CARTESIAN_COMMANDS else ""
+            self._cartesian.not_ready() if command in crtk.CARTESIAN_COMMANDS else ""
         )

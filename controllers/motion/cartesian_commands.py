@@ -15,6 +15,7 @@ from controllers.motion.drives import Drives, WrenchFrame
 from controllers.motion.frames import BaseFrame, turned
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.crtk import tip_frame
 from robots.dvrk.inverse import inverse as inverse_kinematics
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import CartesianImpedance, CartesianState
@@ -104,7 +105,8 @@ class CartesianCommands:
 
     def _body_servo_cf(self, message: WrenchStamped) -> None:
         goals.check_frame(
-            message.header.frame_id, self._base.reference if self._drives.absolute[0] else f"{self._arm}_tip"
+            message.header.frame_id,
+            self._base.reference if self._drives.absolute[0] else tip_frame(self._arm),
         )
         self._drives.press(goals.wrench(message.wrench), WrenchFrame.BODY)
 

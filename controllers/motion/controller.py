@@ -5,11 +5,12 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from controllers.motion.frames import CART_FRAME, base_in_world, reference_frame
+from controllers.motion.frames import base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
-from controllers.motion.setup_joints import SetupJoints, joint_names
+from controllers.motion.setup_joints import SetupJoints
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, restore_arrays, state_hash
+from robots.dvrk.crtk import CART_FRAME
 from schemas.errors import MissingExtraError
 from schemas.ports import Port
 from schemas.vectors import Vector
@@ -51,9 +52,7 @@ class MotionController(Stepped):
         ]
         if params.mounting == "cart":
             ports += [
-                port
-                for name in params.arms.driven
-                for port in setup_joint_ports(name, joint_names(name), CART_FRAME, period)
+                port for name in params.arms.driven for port in setup_joint_ports(name, CART_FRAME, period)
             ]
         return tuple(ports)
 

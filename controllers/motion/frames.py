@@ -1,8 +1,7 @@
 """Poses as (4, 4) matrices and as ROS has them, and the frames in which the world outside speaks of an arm.
 
-On the real system (jhu-dvrk/sawIntuitiveResearchKit) a PSM is seen from the camera: its base frame there is
-inv(cart -> camera) (cart -> RCM), both through the setup joints. The ECM is seen from the cart. Without setup
-joints a client says where an arm stands.
+On the real system (jhu-dvrk/sawIntuitiveResearchKit) the base frame of a PSM in the camera's is inv(cart ->
+camera) (cart -> RCM), both through the setup joints. Without setup joints a client sets where an arm stands.
 """
 
 from __future__ import annotations
@@ -13,15 +12,13 @@ import numpy as np
 
 from controllers.motion.params import MotionParams
 from robots import rotation
-from robots.dvrk import setup_joints
+from robots.dvrk import crtk, setup_joints
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = [
-    "CAMERA_FRAME",
-    "CART_FRAME",
     "BaseFrame",
     "base_in_world",
     "pose",
@@ -29,9 +26,6 @@ __all__ = [
     "setup_positions",
     "turned",
 ]
-
-CAMERA_FRAME, CART_FRAME, _WORLD_FRAME = "ECM", "Cart", "world"
-"""The first two as the da Vinci's own interface and the dVRK call them in `header.frame_id`."""
 
 
 def pose(frame: Vector) -> Vector:
@@ -63,12 +57,7 @@ def base_in_world(arm: CartArm, params: MotionParams) -> Vector:
 
 def reference_frame(arm: CartArm, params: MotionParams) -> str:
     """Return the `frame_id` of the arm's Cartesian ports that are not `local/`."""
-    world = CART_FRAME if params.mounting == "cart" else _WORLD_FRAME
-    if params.reference == "world":
-        return world
-    if params.reference == "base" or "ECM" not in params.arms.driven:
-        return f"{arm}_base"
-    return CART_FRAME if arm == "ECM" else CAMERA_FRAME
+    return crtk.reference_frame(arm, params.arms.driven, params.mounting, params.reference)
 
 
 class BaseFrame:
@@ -78,7 +67,7 @@ class BaseFrame:
         """Take the arm, what the scenario says, and what returns the pose of the ECM's tip in the world,
         shape (4, 4).
         """
-        self.reference, self.local = reference_frame(arm, params), f"{arm}_base"
+        self.reference, self.local = reference_frame(arm, params), crtk.base_frame(arm)
         """`frame_id` of ports that are not `local/`, and of those that are."""
         self._camera, self._carried = camera, params.mounting == "cart"
         self._world = base_in_world(arm, params)
@@ -89,7 +78,7 @@ class BaseFrame:
         """The base frame in its reference, shape (4, 4)."""
         if self.reference == self.local:
             return np.eye(4)
-        camera = self._camera() if self.reference == CAMERA_FRAME else None
+        camera = self._camera() if self.reference == crtk.CAMERA_FRAME else None
         return self._world if camera is None else inverse_pose(camera) @ self._world
 
     def place(self, base: Vector) -> None:
@@ -102,7 +91,7 @@ class BaseFrame:
         """Raise MotionError where something else than a client says where the base frame is."""
         if self._carried:
             raise MotionError("the setup joints say where the arm stands (`setup_joints` of the scenario)")
-        if self.reference != _WORLD_FRAME:
+        if self.reference != crtk.WORLD_FRAME:
             raise MotionError(
                 f"poses of the arm are in frame '{self.reference}'; `reference: world` of the motion"
                 " controller leaves its base frame to clients"

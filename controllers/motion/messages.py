@@ -8,30 +8,18 @@ from zlib import crc32
 import numpy as np
 
 from controllers.motion.operating_state import State
+from robots.dvrk import crtk
 from schemas.crtk import OperatingState
 from schemas.message import Message
 from schemas.ros import BoolMessage, Header, StringMessage, Time
 
 __all__ = ["Messages"]
 
-_STREAMS = (
-    *(
-        "servo_jp",
-        "servo_jr",
-        "servo_cp",
-        "servo_cr",
-        "servo_cs",
-        "servo_ci",
-        "servo_jf",
-        "body/servo_cf",
-        "spatial/servo_cf",
-    ),
-    *("jaw/servo_jp", "jaw/servo_jf", "hand/servo_jp", "hand/servo_jf"),
+_STREAMS = tuple(filter(crtk.is_stream, crtk.COMMANDS)) + tuple(
+    f"{gripper}/{command}"
+    for gripper in ("jaw", "hand")
+    for command in filter(crtk.is_stream, crtk.GRIPPER_COMMANDS)
 )
-_REPEAT = 2.0
-"""s before a refusal of the same words is repeated to a stream (jhu-dvrk/sawIntuitiveResearchKit,
-mtsIntuitiveResearchKitArm.cpp, ArmIsReady).
-"""
 
 
 class Messages:
@@ -112,7 +100,7 @@ class Messages:
             float(crc32(reason.encode())),
             self._now_ns * 1e-9,
         )
-        if row[0] == words and now - row[1] < _REPEAT:
+        if row[0] == words and now - row[1] < crtk.REPEAT_NS * 1e-9:
             row[2] += 1.0
             return 0
         count = int(row[2]) + 1 if row[0] == words else 1

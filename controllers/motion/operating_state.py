@@ -12,6 +12,7 @@ from zlib import crc32
 
 import numpy as np
 
+from robots.dvrk.crtk import REMEMBERED_COMMANDS
 from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 
@@ -61,12 +62,9 @@ class Repeats:
     made anew.
     """
 
-    _KEPT = 8
-    """How many commands are remembered; more clients than that do not command one arm."""
-
     def __init__(self) -> None:
         """Remember none."""
-        self.state = np.zeros((self._KEPT, 3))
+        self.state = np.zeros((REMEMBERED_COMMANDS, 3))
         """Stamps (s, ns) and checksums of the commands heeded last, the newest first."""
 
     def refusal(self, message: StringStamped) -> str | None:

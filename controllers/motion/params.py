@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from controllers.motion.equipment import endoscope_type, tool_type
 from hub.participant import Params
 from robots.dvrk import ecm, psm
+from robots.dvrk.crtk import Mounting, Reference
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
@@ -110,7 +111,7 @@ class MotionParams(Params):
     """Which arms are driven, and in which frame the world outside speaks of them."""
 
     arms: Arms
-    mounting: Literal["free", "cart"] = Field(
+    mounting: Mounting = Field(
         default="free",
         description=(
             "each arm where its position and orientation say, or on the setup joints of the cart, whose frame"
@@ -118,7 +119,7 @@ class MotionParams(Params):
         ),
     )
     setup_joints: SetupJoints = SetupJoints()
-    reference: Literal["camera", "base", "world"] = Field(
+    reference: Reference = Field(
         default="camera",
         description=(
             "frame of measured_cp and of Cartesian commands: the camera view, as on the real system (the ECM"

@@ -1,330 +1,237 @@
-"""The ports of one arm: CRTK's names and types towards the world, `drive/...` and `sense/...` towards the
-robot.
+"""The ports of one arm: CRTK's towards clients, `drive/...` and `sense/...` towards the robot.
 
-Names and types as the dVRK 2.x has them (jhu-dvrk/sawIntuitiveResearchKit, jhu-cisst/cisst-ros), so that a
-ROS face maps them one to one.
+Names and types are those of `robots.dvrk.crtk`, so that a ROS gateway maps them one to one; here stands what
+each of them means to this controller.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 from controllers.motion.params import EcmParams, PsmParams
-from robots.dvrk.setup_joints import CartArm
+from robots.dvrk import crtk
+from robots.dvrk.setup_joints import CartArm, joint_names
 from schemas.ports import Port
+from schemas.ros import Float64Message, JointState, PoseStamped
 
-__all__ = [
-    "CARTESIAN_COMMANDS",
-    "COMMANDS",
-    "EQUIPMENT_COMMANDS",
-    "EVENTS",
-    "GRIPPER_COMMANDS",
-    "SETUP_JOINT_COMMANDS",
-    "SETUP_JOINT_EVENTS",
-    "arm_ports",
-    "setup_joint_ports",
-]
+__all__ = ["EQUIPMENT_COMMANDS", "arm_ports", "event_names", "setup_joint_event_names", "setup_joint_ports"]
 
-_JOINT_STATE, _POSE, _TWIST, _WRENCH = (
-    "sensor_msgs/msg/JointState",
-    "geometry_msgs/msg/PoseStamped",
-    "geometry_msgs/msg/TwistStamped",
-    "geometry_msgs/msg/WrenchStamped",
-)
-_EMPTY, _STRING, _BOOL, _FLOAT = (
-    "std_msgs/msg/Empty",
-    "std_msgs/msg/String",
-    "std_msgs/msg/Bool",
-    "std_msgs/msg/Float64",
-)
-_STATE_COMMAND = ("crtk_msgs/msg/StringStamped", "enable, disable, home, unhome, pause or resume")
-_OPERATING_STATE = (
-    "crtk_msgs/msg/OperatingState",
-    "whenever it changes, with each state command that is heeded, and with each move, heeded or not",
-)
-
-COMMANDS = {
+_STATE_COMMAND = "enable, disable, home, unhome, pause or resume"
+_COMMANDS = {
     "state_command": _STATE_COMMAND,
     "use_gravity_compensation": (
-        _BOOL,
-        "whether the drives bear the weight that the controller knows, the endoscope's; on at time 0",
+        "whether the drives carry the weight that the controller knows, the endoscope's; on at time 0"
     ),
     "trajectory_j/set_ratio": (
-        _FLOAT,
-        "share of the limits of velocity and acceleration that moves from now on use, over 0 to 1",
+        "share of the limits of velocity and acceleration that the next moves use, above 0 and up to 1"
     ),
-    "trajectory_j/set_ratio_v": (_FLOAT, "that share of the velocity alone"),
-    "trajectory_j/set_ratio_a": (_FLOAT, "that share of the acceleration alone"),
+    "trajectory_j/set_ratio_v": "that share of the velocity alone",
+    "trajectory_j/set_ratio_a": "that share of the acceleration alone",
     "body/set_cf_orientation_absolute": (
-        _BOOL,
-        (
-            "whether body wrenches are along the axes of the frame of measured_cp instead of the tip's; off"
-            " at time 0"
-        ),
+        "whether body wrenches are along the axes of the frame of measured_cp instead of the tip's; off at"
+        " time 0"
     ),
     "set_base_frame": (
-        _POSE,
-        (
-            "where the arm's base is to be taken to stand, in the frame of measured_cp, with `reference:"
-            " world` and without setup joints"
-        ),
+        "pose of the arm's base in the frame of measured_cp; only with `reference: world` and without setup"
+        " joints"
     ),
-    "hold": (_EMPTY, "brake, and stay"),
-    "free": (_EMPTY, "let go: no effort but gravity compensation"),
-    "servo_jp": (_JOINT_STATE, "follow these positions, with these velocities where they are stated"),
-    "servo_jr": (
-        _JOINT_STATE,
-        "follow positions relative to the newest goal, or the setpoint if nothing is followed",
-    ),
-    "servo_cp": (_POSE, "follow this pose of the tip"),
+    "hold": "brake and stay",
+    "free": "apply no effort but gravity compensation",
+    "servo_jp": "follow these positions, with these velocities where they are given",
+    "servo_jr": "follow positions relative to the newest goal, or to the setpoint if nothing is followed",
+    "servo_cp": "follow this pose of the tip",
     "servo_cr": (
-        _POSE,
-        (
-            "follow a pose shifted and turned along the axes of the frame that it names, relative to the"
-            " newest goal, or the setpoint"
-        ),
+        "follow a pose displaced and rotated along the axes of the frame that it names, relative to the"
+        " newest goal, or to the setpoint"
     ),
     "servo_cs": (
-        "crtk_msgs/msg/CartesianState",
-        "follow pose and twist of the tip, keep a twist while it is told, or apply a wrench: what is stated",
+        "follow pose and twist of the tip, keep a twist while it is sent, or apply a wrench: whichever is"
+        " marked valid"
     ),
-    "servo_ci": (
-        "crtk_msgs/msg/CartesianImpedance",
-        "hold the tip by springs and dampers, in the frame of measured_cp",
-    ),
-    "servo_jf": (_JOINT_STATE, "apply these efforts, gravity compensated"),
-    "body/servo_cf": (_WRENCH, "apply this wrench at the tip, in the tip's frame"),
-    "spatial/servo_cf": (_WRENCH, "apply this wrench at the base frame's origin, in the arm's base frame"),
-    "move_jp": (_JOINT_STATE, "go to these positions"),
-    "move_jr": (
-        _JOINT_STATE,
-        "go to positions relative to the goal of the move under way, or to the setpoint",
-    ),
-    "move_cp": (_POSE, "go to this pose of the tip, in joint space"),
+    "servo_ci": "hold the tip by springs and dampers, in the frame of measured_cp",
+    "servo_jf": "apply these efforts, gravity compensated",
+    "body/servo_cf": "apply this wrench at the tip, in the tip's frame",
+    "spatial/servo_cf": "apply this wrench at the base frame's origin, in the arm's base frame",
+    "move_jp": "move to these positions",
+    "move_jr": "move to positions relative to the goal of the present move, or to the setpoint",
+    "move_cp": "move to this pose of the tip, in joint space",
 }
-"""Command ports of every arm: type and meaning.
-
-Of commands that come in the same step they are heeded in this order.
-"""
-
-CARTESIAN_COMMANDS = frozenset(
-    {"servo_cp", "servo_cr", "servo_cs", "servo_ci", "body/servo_cf", "spatial/servo_cf", "move_cp"}
+_GRIPPER_COMMANDS = {
+    "servo_jp": "follow this angle of the jaw, these closings of the fingers",
+    "servo_jf": "apply this effort",
+    "move_jp": "move to this angle of the jaw, these closings of the fingers",
+}
+_OPERATING_STATE = (
+    "whenever it changes, with each state command that is executed, and with each move, executed or refused"
 )
-"""Those that are heeded only past the cannula."""
-
-GRIPPER_COMMANDS = {
-    "servo_jp": (_JOINT_STATE, "follow this angle of the jaw, these closings of the fingers"),
-    "servo_jf": (_JOINT_STATE, "apply this effort"),
-    "move_jp": (_JOINT_STATE, "go to this angle of the jaw, these closings of the fingers"),
-}
-"""Command ports under `jaw/` or `hand/` of an arm with an instrument that grasps: type and meaning."""
-
-EVENTS = {
+_EVENTS = {
     "operating_state": _OPERATING_STATE,
     "desired_state": (
-        _STRING,
-        (
-            "where the arm was told to go: DISABLED, ENABLED, HOMED, PAUSED, or FAULT; at time 0, and with"
-            " each state command"
-        ),
+        "the state that was commanded: DISABLED, ENABLED, HOMED, PAUSED, or FAULT; at time 0, and with each"
+        " state command"
     ),
-    "goal_reached": (_BOOL, "a move has arrived, or was given up"),
-    "error": (_STRING, "an order that cannot be carried out, or a fault: what, why, what is allowed"),
-    "warning": (_STRING, "an order that comes at the wrong time"),
-    "status": (_STRING, "what happens"),
+    "goal_reached": "a move has arrived, or was abandoned",
+    "error": "a command that cannot be executed, or a fault: what, why, what is allowed",
+    "warning": "a command that is refused at present",
+    "status": "what happens",
 }
-"""Event ports of every arm: type and meaning."""
-
-_EQUIPMENT = (_STRING, "what the arm holds, in the dVRK's words, at time 0")
-
+_EQUIPMENT = "what the arm holds, in the dVRK's words, at time 0"
 EQUIPMENT_COMMANDS = {
     "tool_type": {
-        "set_tool_type": (_STRING, "refused unless it is what the arm holds"),
-        "emulate_adapter_present": (_BOOL, "refused unless true: the adapter is there"),
-        "emulate_tool_present": (_BOOL, "refused unless true: the instrument is there"),
+        "set_tool_type": "refused unless it is what the arm holds",
+        "emulate_adapter_present": "refused unless true: the adapter is there",
+        "emulate_tool_present": "refused unless true: the instrument is there",
     },
-    "endoscope_type": {"set_endoscope_type": (_STRING, "refused unless it is what the arm holds")},
+    "endoscope_type": {"set_endoscope_type": "refused unless it is what the arm holds"},
 }
-"""Command ports about what an arm holds, by the event that tells it: type and meaning."""
-
-SETUP_JOINT_COMMANDS = {
+"""Commands about what an arm holds, by the event that publishes it: meaning."""
+_SETUP_JOINT_COMMANDS = {
     "state_command": _STATE_COMMAND,
-    "servo_jp": (_JOINT_STATE, "refused: the joints are braked"),
-    "move_jp": (_JOINT_STATE, "refused: the joints are braked"),
+    "servo_jp": "refused: the joints are braked",
+    "move_jp": "refused: the joints are braked",
 }
-"""Command ports of the setup joints that carry an arm: type and meaning."""
-
-SETUP_JOINT_EVENTS = {
+_SETUP_JOINT_EVENTS = {
     "operating_state": _OPERATING_STATE,
-    "warning": (_STRING, "an order that is refused"),
-    "status": (_STRING, "what happens"),
+    "warning": "a command that is refused",
+    "status": "what happens",
 }
-"""Their event ports: type and meaning."""
+_TYPES = (
+    crtk.COMMANDS | crtk.EVENTS | crtk.PSM_COMMANDS | crtk.PSM_EVENTS | crtk.ECM_COMMANDS | crtk.ECM_EVENTS
+)
+
+
+def event_names(params: PsmParams | EcmParams) -> tuple[str, ...]:
+    """Return the names of an arm's event outputs, without the arm's."""
+    return (*_EVENTS, params.equipment[0])
+
+
+def setup_joint_event_names() -> tuple[str, ...]:
+    """Return the names of the event outputs of setup joints, without `SUJ/<arm>/`."""
+    return tuple(_SETUP_JOINT_EVENTS)
 
 
 def arm_ports(arm: str, params: PsmParams | EcmParams, reference: str, period_ns: int) -> Iterator[Port]:
-    """Yield all ports of `arm`; states come every `period_ns`, Cartesian ones in the frame `reference` unless
-    they are `local/`.
+    """Yield all ports of one arm.
+
+    Args:
+        arm: its name, such as `PSM1`.
+        params: what it holds.
+        reference: `frame_id` of Cartesian states that are not `local/`.
+        period_ns: of the states, ns.
     """
-    joints = params.chain.joints
-    names = tuple(joint.name for joint in joints)
-    gripper = params.gripper
-    grasping = (
-        {} if gripper is None else {f"{gripper.name}/{name}": row for name, row in GRIPPER_COMMANDS.items()}
+    joints = tuple(joint.name for joint in params.chain.joints)
+    gripper, held = params.gripper, params.equipment[0]
+    yield from _events(arm, "input", _COMMANDS | EQUIPMENT_COMMANDS[held])
+    if gripper is not None:
+        yield from _events(f"{arm}/{gripper.name}", "input", _GRIPPER_COMMANDS)
+    yield from _events(arm, "output", _EVENTS | {held: _EQUIPMENT})
+    yield from _joint_states(arm, joints, period_ns)
+    yield from _cartesian_states(arm, reference, period_ns)
+    yield from _wrench_states(arm, len(joints), reference, period_ns)
+    yield from _settings(arm, joints, reference, period_ns)
+    yield from _servo(arm, joints)
+    yield Port(
+        name=f"drive/{arm}/control_mode",
+        causality="output",
+        size=2,
+        description=(
+            "of arm and gripper: 0 off, 1 position, 2 effort; 3 and 4: position and effort without gravity"
+            " compensation"
+        ),
     )
-    held = params.equipment[0]
-    yield from _events(arm, COMMANDS | EQUIPMENT_COMMANDS[held] | grasping, EVENTS | {held: _EQUIPMENT})
-    yield from _states(arm, names, reference, period_ns)
-    yield from _robot(arm, names)
     if gripper is not None:
         driven = tuple(joint.name for joint in gripper.joints)
         yield from _joint_states(f"{arm}/{gripper.name}", driven, period_ns)
         yield from _servo(f"{arm}/{gripper.name}", driven)
 
 
-def setup_joint_ports(arm: CartArm, names: tuple[str, ...], cart: str, period_ns: int) -> Iterator[Port]:
-    """Yield the ports of the setup joints `names` that carry `arm` on the cart, whose frame is `cart`."""
-    prefix = f"SUJ/{arm}"
-    yield from _events(prefix, SETUP_JOINT_COMMANDS, SETUP_JOINT_EVENTS)
-    yield Port(
-        name=f"{prefix}/measured_js", causality="output", type=_JOINT_STATE, names=names, period_ns=period_ns
-    )
-    meaning = "of the arm's base frame"
-    yield Port(
+def setup_joint_ports(arm: CartArm, cart: str, period_ns: int) -> Iterator[Port]:
+    """Yield the ports of the setup joints that carry `arm` on the cart, whose frame is `cart`."""
+    prefix, output = f"SUJ/{arm}", partial(Port, causality="output", period_ns=period_ns)
+    yield from _events(prefix, "input", _SETUP_JOINT_COMMANDS)
+    yield from _events(prefix, "output", _SETUP_JOINT_EVENTS)
+    yield output(name=f"{prefix}/measured_js", type=JointState.ros_type, names=joint_names(arm))
+    yield output(
         name=f"{prefix}/local/measured_cp",
-        causality="output",
-        type=_POSE,
+        type=PoseStamped.ros_type,
         frame=cart,
-        period_ns=period_ns,
-        description=meaning,
+        description="of the arm's base frame",
     )
 
 
-def _events(
-    prefix: str, commands: Mapping[str, tuple[str, str]], events: Mapping[str, tuple[str, str]]
-) -> Iterator[Port]:
-    for name, (type_, meaning) in commands.items():
-        yield Port(
-            name=f"{prefix}/{name}", causality="input", type=type_, variability="event", description=meaning
-        )
-    for name, (type_, meaning) in events.items():
-        yield Port(
-            name=f"{prefix}/{name}", causality="output", type=type_, variability="event", description=meaning
-        )
+def _events(prefix: str, causality: str, meanings: Mapping[str, str]) -> Iterator[Port]:
+    for name, meaning in meanings.items():
+        row = {"name": f"{prefix}/{name}", "causality": causality, "type": _TYPES[name]}
+        yield Port.model_validate(row | {"variability": "event", "description": meaning})
 
 
 def _joint_states(prefix: str, names: tuple[str, ...], period_ns: int) -> Iterator[Port]:
     for name in ("measured_js", "setpoint_js"):
-        fields = ("position", "velocity", "effort")
         yield Port(
             name=f"{prefix}/{name}",
             causality="output",
-            type=_JOINT_STATE,
+            type=JointState.ros_type,
             names=names,
-            fields=fields,
+            fields=crtk.MEASURED,
             period_ns=period_ns,
         )
 
 
-def _states(arm: str, names: tuple[str, ...], reference: str, period_ns: int) -> Iterator[Port]:
-    yield from _joint_states(arm, names, period_ns)
-    for kind in ("measured", "setpoint"):
-        for prefix, frame in (("", reference), ("local/", f"{arm}_base")):
+def _cartesian_states(arm: str, reference: str, period_ns: int) -> Iterator[Port]:
+    for prefix in ("", "local/"):
+        for name, type_ in crtk.CARTESIAN_STATES.items():
             yield Port(
-                name=f"{arm}/{prefix}{kind}_cp",
+                name=f"{arm}/{prefix}{name}",
                 causality="output",
-                type=_POSE,
-                frame=frame,
+                type=type_,
+                frame=crtk.frame_of(arm, prefix + name, reference),
                 period_ns=period_ns,
-                description="of the tip",
+                description="of the tip" if name.endswith("_cp") else "of the tip's origin",
             )
-            yield Port(
-                name=f"{arm}/{prefix}{kind}_cv",
-                causality="output",
-                type=_TWIST,
-                frame=frame,
-                period_ns=period_ns,
-                description="of the tip's origin",
-            )
-    for kind, frame in (("body", f"{arm}_tip"), ("spatial", f"{arm}_base")):
-        seen = "" if kind == "body" else frame  # a switch turns it
-        meaning = "that balances the joint efforts" + (
-            "" if seen else f"; in {frame}, or in {reference} with set_cf_orientation_absolute"
-        )
-        yield Port(
-            name=f"{arm}/{kind}/measured_cf",
-            causality="output",
-            type=_WRENCH,
-            frame=seen,
-            period_ns=period_ns,
-            description=meaning,
-        )
-        shape = (6, len(names))
-        meaning = f"twist of the tip in {frame}, linear part first, from joint velocities" + (
-            ", of the point at its origin" if kind == "spatial" else ""
-        )
-        yield Port(
-            name=f"{arm}/{kind}/jacobian",
-            causality="output",
-            size=6 * len(names),
-            shape=shape,
-            period_ns=period_ns,
-            description=meaning,
-        )
-    meaning = "of the arm's base frame: where the setup joints hold it"
-    yield Port(
+
+
+def _wrench_states(arm: str, joints: int, reference: str, period_ns: int) -> Iterator[Port]:
+    output = partial(Port, causality="output", period_ns=period_ns)
+    frames = {"body": crtk.tip_frame(arm), "spatial": crtk.base_frame(arm)}
+    for name, type_ in crtk.WRENCH_STATES.items():
+        kind = name.partition("/")[0]
+        seen = crtk.frame_of(arm, name, reference)
+        meaning = "that balances the joint efforts"
+        if not seen:
+            meaning += f"; in {frames[kind]}, or in {reference} with set_cf_orientation_absolute"
+        yield output(name=f"{arm}/{name}", type=type_, frame=seen, description=meaning)
+        meaning = f"twist of the tip in {frames[kind]}, linear part first, from joint velocities"
+        if kind == "spatial":
+            meaning += ", of the point at its origin"
+        yield output(name=f"{arm}/{kind}/jacobian", size=6 * joints, shape=(6, joints), description=meaning)
+
+
+def _settings(arm: str, joints: tuple[str, ...], reference: str, period_ns: int) -> Iterator[Port]:
+    output = partial(Port, causality="output", period_ns=period_ns)
+    yield output(
         name=f"SUJ/{arm}/measured_cp",
-        causality="output",
-        type=_POSE,
+        type=PoseStamped.ros_type,
         frame=reference,
-        period_ns=period_ns,
-        description=meaning,
+        description="of the arm's base frame: where the setup joints hold it",
     )
     for name, meaning in (
         ("ratio", "of velocity and acceleration; 0 where they differ"),
         ("ratio_v", "of the velocity"),
         ("ratio_a", "of the acceleration"),
     ):
-        yield Port(
-            name=f"{arm}/trajectory_j/{name}",
-            causality="output",
-            type=_FLOAT,
-            period_ns=period_ns,
-            description=meaning,
-        )
-    name, meaning = (
-        f"{arm}/gravity_compensation/setpoint_js",
-        "that bears the weight that the controller knows; 0 while it does not",
-    )
-    yield Port(
-        name=name,
-        causality="output",
-        type=_JOINT_STATE,
-        names=names,
+        yield output(name=f"{arm}/trajectory_j/{name}", type=Float64Message.ros_type, description=meaning)
+    yield output(
+        name=f"{arm}/gravity_compensation/setpoint_js",
+        type=JointState.ros_type,
+        names=joints,
         fields=("effort",),
-        period_ns=period_ns,
-        description=meaning,
+        description="that carries the weight that the controller knows; 0 while it is switched off",
     )
-
-
-def _robot(arm: str, names: tuple[str, ...]) -> Iterator[Port]:
-    yield from _servo(arm, names)
-    meaning = (
-        "of arm and gripper: 0 off, 1 position, 2 effort; 3 and 4 the last two without gravity compensation"
-    )
-    yield Port(name=f"drive/{arm}/control_mode", causality="output", size=2, description=meaning)
 
 
 def _servo(prefix: str, names: tuple[str, ...]) -> Iterator[Port]:
-    fields = ("position", "velocity", "effort")
-    yield Port(
-        name=f"sense/{prefix}/measured_js", causality="input", type=_JOINT_STATE, names=names, fields=fields
-    )
-    yield Port(name=f"drive/{prefix}/servo_jp", causality="output", type=_JOINT_STATE, names=names)
-    yield Port(
-        name=f"drive/{prefix}/servo_jf",
-        causality="output",
-        type=_JOINT_STATE,
-        names=names,
-        fields=("effort",),
-    )
+    port = partial(Port, type=JointState.ros_type, names=names)
+    yield port(name=f"sense/{prefix}/measured_js", causality="input", fields=crtk.MEASURED)
+    yield port(name=f"drive/{prefix}/servo_jp", causality="output")
+    yield port(name=f"drive/{prefix}/servo_jf", causality="output", fields=("effort",))

@@ -16,19 +16,14 @@ from controllers.motion.frames import pose, setup_positions
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import Repeats, State, refusal
 from controllers.motion.params import MotionParams
-from controllers.motion.ports import SETUP_JOINT_COMMANDS, SETUP_JOINT_EVENTS
+from controllers.motion.ports import setup_joint_event_names
 from hub.participant import Inputs
-from robots.dvrk import setup_joints
+from robots.dvrk import crtk, setup_joints
 from schemas.crtk import StringStamped
 
-__all__ = ["SetupJoints", "joint_names"]
+__all__ = ["SetupJoints"]
 
 _BRAKED = "the setup joints are braked; `setup_joints` of the scenario says where they are"
-
-
-def joint_names(arm: str) -> tuple[str, ...]:
-    """Return the names of the setup joints that carry `arm`, as the real system has them."""
-    return tuple(f"SUJ_{arm}_J{index}" for index in range(len(setup_joints.JOINT_NAMES)))
 
 
 class SetupJoints:
@@ -38,7 +33,7 @@ class SetupJoints:
         """Take what the scenario says; without a cart there are none."""
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
-        self._said = {arm: Messages(f"SUJ/{arm}", SETUP_JOINT_EVENTS) for arm in arms}
+        self._said = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names()) for arm in arms}
         self._flags = np.array(
             [State.ENABLED if params.initial_state == "homed" else State.DISABLED, 1.0, 0.0, 0.0]
         )
@@ -66,7 +61,7 @@ class SetupJoints:
                 continue
             for message in inputs.events(f"SUJ/{arm}/state_command"):
                 news |= self._command(said, cast("StringStamped", message))
-            for name in SETUP_JOINT_COMMANDS:
+            for name in crtk.SETUP_JOINT_COMMANDS:
                 if name != "state_command" and inputs.events(f"SUJ/{arm}/{name}"):
                     said.refuse(name, _BRAKED, ready=False)
         if news | self._power(h * 1e-9):

@@ -1,8 +1,9 @@
-"""What the dVRK's console, its system and its teleoperation components say and hear: names of topics without
-those of their parts, and ROS 2 types.
+"""Topics of the dVRK's console, its system, its pedals and its teleoperation components.
 
-Source: jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp); pedals as
-jhu-dvrk/dvrk-readthedocs (53699e4d) names them, and the head sensor.
+Names of topics are those after their part's: `console/clutch` is `clutch`.
+
+Source: jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp); pedals and head
+sensor as jhu-dvrk/dvrk-readthedocs (53699e4d) names them.
 """
 
 from __future__ import annotations
@@ -10,19 +11,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["BUTTON", "CONSOLE", "PEDALS", "SYSTEM", "TELEOPERATION", "Topics"]
+from schemas.crtk import StringStamped
+from schemas.ros import (
+    BoolMessage,
+    EmptyMessage,
+    Float64Message,
+    Float64MultiArray,
+    Joy,
+    QuaternionStamped,
+    StringMessage,
+)
 
-_EMPTY, _STRING, _BOOL, _FLOAT = (f"std_msgs/msg/{name}" for name in ("Empty", "String", "Bool", "Float64"))
-BUTTON = "sensor_msgs/msg/Joy"
+__all__ = ["BUTTON", "CONSOLE", "PARTS", "PEDALS", "SETUP_JOINTS", "SYSTEM", "TELEOPERATION", "Topics"]
+
+BUTTON = Joy.ros_type
 """buttons[0]: 0 released, 1 pressed, 2 a quick tap; no axes."""
+_EMPTY, _STRING, _BOOL, _FLOAT = (
+    EmptyMessage.ros_type,
+    StringMessage.ros_type,
+    BoolMessage.ros_type,
+    Float64Message.ros_type,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """Topics of one part: events, all of them."""
+    """Topics of one part, all of them events: name and ROS 2 type."""
 
-    told: Mapping[str, str]
-    heard: Mapping[str, str] = field(default_factory=dict[str, str])
+    events: Mapping[str, str]
+    """What the part publishes."""
+    commands: Mapping[str, str] = field(default_factory=dict[str, str])
+    """What it subscribes to."""
 
 
 PEDALS = Topics(
@@ -30,19 +49,19 @@ PEDALS = Topics(
 )
 
 SYSTEM = Topics(
-    told={"volume": _FLOAT},
-    heard={
+    events={"volume": _FLOAT},
+    commands={
         "power_off": _EMPTY,
         "power_on": _EMPTY,
         "home": _EMPTY,
         "set_volume": _FLOAT,
-        "beep": "std_msgs/msg/Float64MultiArray",
+        "beep": Float64MultiArray.ros_type,
         "string_to_speech": _STRING,
     },
 )
 
 CONSOLE = Topics(
-    told={
+    events={
         "teleop/enabled": _BOOL,
         "teleop/scale": _FLOAT,
         "teleop/selected": _STRING,
@@ -52,7 +71,7 @@ CONSOLE = Topics(
         "camera": BUTTON,
         "warning": _STRING,
     },
-    heard={
+    commands={
         "teleop/enable": _BOOL,
         "teleop/select": _STRING,
         "teleop/unselect": _STRING,
@@ -63,23 +82,29 @@ CONSOLE = Topics(
     },
 )
 
+SETUP_JOINTS = Topics({}, {"set_reference_arm": _STRING})
+
 TELEOPERATION = Topics(
-    told={
+    events={
         "desired_state": _STRING,
         "current_state": _STRING,
         "following": _BOOL,
         "scale": _FLOAT,
         "align_mtm": _BOOL,
-        "alignment_offset": "geometry_msgs/msg/QuaternionStamped",
+        "alignment_offset": QuaternionStamped.ros_type,
         "rotation_locked": _BOOL,
         "translation_locked": _BOOL,
         "warning": _STRING,
     },
-    heard={
-        "state_command": "crtk_msgs/msg/StringStamped",
+    commands={
+        "state_command": StringStamped.ros_type,
         "set_scale": _FLOAT,
         "lock_rotation": _BOOL,
         "lock_translation": _BOOL,
         "set_align_MTM": _BOOL,
     },
 )
+"""Of one component, such as `MTMR_PSM1`."""
+
+PARTS = {"system": SYSTEM, "console": CONSOLE, "footpedals": PEDALS, "SUJ": SETUP_JOINTS}
+"""What there is once, by the first part of its topics' names."""

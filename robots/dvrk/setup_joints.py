@@ -17,7 +17,7 @@ from typing import Literal
 from robots.serial_chain import Joint, SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["JOINT_NAMES", "SIMULATED", "CartArm", "base_pose", "chain"]
+__all__ = ["JOINT_NAMES", "SIMULATED", "CartArm", "base_pose", "chain", "joint_names"]
 
 CartArm = Literal["PSM1", "PSM2", "PSM3", "ECM"]
 """The arms that the cart carries."""
@@ -100,3 +100,8 @@ def base_pose(arm: CartArm, q: Vector) -> Vector:
     positions (..., 6).
     """
     return chain(arm).forward(q)
+
+
+def joint_names(arm: CartArm) -> tuple[str, ...]:
+    """Return the names of the setup joints that carry `arm` as the real system has them: `SUJ_PSM1_J0`."""
+    return tuple(f"SUJ_{arm}_J{index}" for index in range(len(JOINT_NAMES)))

@@ -123,9 +123,9 @@ def face(params: GatewayParams) -> tuple[Row, ...]:
         rows += _setup_joints(carried, _reference(carried, params) if carried in params.arms.shown else "")
     for part, topics in _PARTS.items():
         if part not in params.listen:
-            rows += _talk(part, topics.told, topics.heard)
+            rows += _talk(part, topics.events, topics.commands)
     for component in params.teleoperations:
-        rows += _talk(component, TELEOPERATION.told, TELEOPERATION.heard)
+        rows += _talk(component, TELEOPERATION.events, TELEOPERATION.commands)
     for camera in params.cameras:
         rows += _camera(camera)
     rows += (
@@ -275,7 +275,7 @@ def _listened(arm: Real) -> Iterator[Row]:
     pedals.
     """
     if arm == "footpedals":
-        yield from _talk(arm, {}, PEDALS.told)
+        yield from _talk(arm, {}, PEDALS.events)
         return
     names = tuple(joint.name for joint in dvrk.chain(arm).joints)
     is_master, is_psm = arm.startswith("MTM"), arm.startswith("PSM")
