@@ -36,6 +36,7 @@ from hub.transport.control_client import ask, present
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Drops
+from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError, TrocarError
@@ -162,7 +163,8 @@ class _JoinedHost:
         self._next_step = 0
         devices = {name: device for name, device in made.items() if isinstance(device, Device)}
         for device in devices.values():
-            device.learn_hub(connect)
+            if isinstance(device, RouterClient):
+                device.learn_hub(connect)
         self._loops = {
             name: DeviceLoop(name, device, plan.participants[name].read_ns, failed=self._device_failed)
             for name, device in devices.items()

@@ -34,6 +34,7 @@ from hub.session.run_state import RunState
 from hub.transport.endpoints import free_endpoint, require_loopback
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Drops
+from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
 from schemas.codec import decode, encode
@@ -222,7 +223,8 @@ class Session:
             else {}
         )
         for device in devices.values():
-            device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
+            if isinstance(device, RouterClient):
+                device.learn_hub(lambda: open_session("client", connect=[self.endpoint]))
         self._intake.lay(session, devices, self._host.feeds, self._observers, self._fail)
 
     def _start(self) -> None:
