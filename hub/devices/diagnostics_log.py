@@ -12,8 +12,8 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.participant.token_bucket import TokenBucket
 from hub.planning.plan import Plan
-from hub.transport.rate_limit import Allowance
 from hub.transport.refusals import Drops
 from schemas.codec import decode
 from schemas.errors import MessageError
@@ -52,7 +52,7 @@ class Complaints:
         ]
 
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
-        allowance = Allowance(_RATE)
+        allowance = TokenBucket(_RATE)
 
         def hear(sample: zenoh.Sample) -> None:
             try:

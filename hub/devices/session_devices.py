@@ -20,9 +20,9 @@ from hub.devices.simulated import SimulatedDevices
 from hub.devices.uplink import DeviceUplink, Run
 from hub.observation.observers import Observers
 from hub.participant import Device, Sample
+from hub.participant.token_bucket import TokenBucket
 from hub.planning.plan import Plan
 from hub.transport.envelope import Stamp
-from hub.transport.rate_limit import Allowance
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Drops
 from schemas.codec import decode
@@ -82,7 +82,7 @@ class Intake:
         self.network_links = NetworkLinkControl(self._plan, session, self._keys, self.simulated.links)
         self._complaints = Complaints(self._plan, self._keys, session, self._drops)
         self._away = [m.name for m in participants.values() if m.role == "device" and m.host != "hub"]
-        self._status_allowance = Allowance(_STATUSES * (1.0 + len(participants)))
+        self._status_allowance = TokenBucket(_STATUSES * (1.0 + len(participants)))
         wall = [
             planned
             for planned in participants.values()
@@ -149,7 +149,7 @@ class Intake:
             self._observers.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
-        allowance = Allowance(self._plan.participants[device].rate_limit)
+        allowance = TokenBucket(self._plan.participants[device].rate_limit)
 
         def take(sample: zenoh.Sample) -> None:
             now_ns = monotonic_ns()
