@@ -1,5 +1,6 @@
-"""How long it takes from a stylus to the robot and back: a hand in a process of its own, read at 1 kHz, leads
-PSM1 in MuJoCo in real time.
+"""The latency from a stylus to the robot and back.
+
+A hand in a process of its own, read at 1 kHz, leads PSM1 in MuJoCo in real time.
 
     python bench/latency.py --json
 
@@ -33,7 +34,11 @@ pace: realtime
 participants:
   hand: {{kind: "tapping:Tapping", host: hand, output: "{output}"}}
   teleop: {{kind: teleoperation}}
-  robot: {{kind: mujoco, host: {host}, publish_period: {step} ms, arms: {{PSM1: {{instrument: palpation-probe}}}}}}
+  robot:
+    kind: mujoco
+    host: {host}
+    publish_period: {step} ms
+    arms: {{PSM1: {{instrument: palpation-probe}}}}
 connections:
   - hand.pose -> teleop.master
   - teleop.servo_jp -> robot.PSM1/servo_jp
