@@ -41,8 +41,9 @@ TABLE = PlaneParams(normal=(0, 0, 1), distance=0.0, stiffness=200.0)
 
 
 class Link:
-    """One direction: messages take `delay` and up to `jitter` longer, and overtake one another; the share
-    `loss` never comes.
+    """One direction of a network: messages take `delay` and up to `jitter` longer, and overtake one another.
+
+    The share `loss` is lost.
     """
 
     def __init__(self, delay: float, jitter: float, loss: float, chance: random.Random) -> None:
@@ -63,8 +64,9 @@ class Link:
 
 
 class Surface:
-    """A contact law of a body below z = 0: the force on a tip, `stiffness` at 3 mm deep, growing with depth
-    to the `power`.
+    """A contact law of a body below z = 0: the force on a tip, growing with depth to the `power`.
+
+    `stiffness` is that at a depth of 3 mm.
     """
 
     def __init__(
@@ -119,9 +121,7 @@ class Tip:
 
 @dataclass
 class Naive:
-    """What comes to mind first: the newest force, as a spring of the largest stiffness allowed, where the
-    hand was then.
-    """
+    """Simplest: the newest force, as a spring of the largest allowed stiffness where the hand was."""
 
     stiffness: float = 400.0
 
@@ -168,7 +168,7 @@ class Trial:
     duration: float = 9.0
 
     def goal(self, t: float) -> tuple[float, float, float]:
-        """Return where the hand wants to be: 20 mm above, from 1.2 s on down at 50 mm/s, from 3 s on aside."""
+        """Return the hand's target: 20 mm above, from 1.2 s on down at 50 mm/s, from 3 s on aside."""
         return (
             0.0,
             self.slide * min(max((t - 3.0) / 1.5, 0.0), 1.0),
@@ -180,7 +180,7 @@ class Trial:
 
 
 def run(trial: Trial, builder: ContactModelBuilder | Naive) -> np.ndarray:
-    """Return rows of hand x, y, z (m), the force on it (N), and the force on the tip (N), one for each tick."""
+    """Return rows of hand x, y, z (m), force on it (N), force on the tip (N), one for each tick."""
     chance = random.Random(1)
     up, down = (
         Link(trial.delay, trial.jitter if trial.delay else 0.0, trial.loss if trial.delay else 0.0, chance)
@@ -276,8 +276,9 @@ def figures(rows: np.ndarray) -> dict[str, float]:
 
 
 def largest_gain(stiffness: float, settling: float) -> float:
-    """Return the largest |1 - tangent / secant| at which the loop is stable whatever the delay, by the
-    small-gain theorem (docs/decisions/0025).
+    """Return the largest |1 - tangent / secant| at which the loop is stable for every delay.
+
+    By the small-gain theorem (docs/decisions/0025).
     """
     s, (mass, grip, damping) = 1j * np.logspace(-1, 4, 200_001), Trial().hand
     damping += ForceParams().damping

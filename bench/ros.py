@@ -1,8 +1,8 @@
-"""What ROS programs get through a gateway: rates, losses and ages, the way of a command to the joint, moves
-and homing without end.
+"""What ROS programs get through a gateway: rates, losses, ages, and the latency of commands.
 
-    python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face servo moves cycles] [--output
-    figures.json]
+Also moves and homing in long repetition.
+
+python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face servo moves cycles] [--output figures.json]
 
 `bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x
 288 at 60 Hz; `session`: the same in a session of motion controller and MuJoCo, H = 2 ms, in real time. The
@@ -156,9 +156,7 @@ def in_session(
     *,
     fast: bool = False,
 ) -> dict[str, Any]:
-    """Run a session, and in it a console with its task; states are published at 100 Hz, or 220 Hz if it is to
-    be `fast`.
-    """
+    """Run a session with a console and its task; states are published at 100 Hz, or 220 Hz if `fast`."""
     scenario = json.loads(json.dumps(SCENARIO))
     scenario["participants"]["ros"] |= {"kind": kind, **place.params}
     if fast:
@@ -217,8 +215,9 @@ def _machine() -> dict[str, Any]:
 
 
 def session(kind: str, place: Place, seconds: float, *, everything: bool = False) -> dict[str, Any]:
-    """Measure rates, losses and ages in a session; `everything`: all states of the arms are published beside,
-    not their joints alone.
+    """Measure rates, losses and ages in a session.
+
+    `everything`: publish all states of the arms, not only their joints.
     """
     parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]

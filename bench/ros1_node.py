@@ -1,5 +1,6 @@
-"""What a node of ROS 1 costs that publishes many topics, ours and rospy's, with a program at the other side
-that reads and does nothing else.
+"""The cost of a ROS 1 node that publishes many topics, ours and rospy's.
+
+The subscriber reads and does nothing else.
 
     python bench/ros1_node.py --topics 60
 
@@ -26,7 +27,8 @@ from devices.ros.ros1.transport import Ros1Transport
 from devices.ros.topics.row import Row
 from schemas.codec import encode
 from schemas.ros import JointState
-from tests.devices.ros.rospy_peer import Ros1, master, until
+from tests.devices.ros.helpers import until
+from tests.devices.ros.rospy_peer import Ros1, master
 
 PERIOD_S = 0.01
 NUMBERS = np.full(6, 0.1)
@@ -39,11 +41,13 @@ import io, rospy, sys, time
 from sensor_msgs.msg import JointState
 topics, seconds, period = int(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3])
 rospy.init_node("publisher", disable_signals=True, disable_rosout=True)
-message = JointState(name=[f"joint_{index}" for index in range(6)], position=[.1] * 6, velocity=[.1] * 6, effort=[.1] * 6)
+names, numbers = [f"joint_{index}" for index in range(6)], [.1] * 6
+message = JointState(name=names, position=numbers, velocity=numbers, effort=numbers)
 ready = io.BytesIO()
 message.serialize(ready)
 Ready = type("Ready", (JointState,), {"serialize": lambda self, buffer: buffer.write(ready.getvalue())})
-message, publishers = Ready(), [rospy.Publisher(f"/topic_{index}", JointState, queue_size=1) for index in range(topics)]
+message = Ready()
+publishers = [rospy.Publisher(f"/topic_{index}", JointState, queue_size=1) for index in range(topics)]
 while not all(publisher.get_num_connections() for publisher in publishers):
     time.sleep(.1)
 begun, used, due = time.monotonic(), time.process_time(), time.monotonic()

@@ -1,5 +1,6 @@
-"""A gateway alone in a process, told as many states and pictures as it is to publish: the one that
-`bench/ros.py` looks at beside a whole session.
+"""A gateway alone in a process, with states and pictures written to it at the given rates.
+
+`bench/ros.py` compares it with a whole session.
 
     python bench/ros_bare.py KIND ENDPOINT '{"...": ...}' SECONDS
 

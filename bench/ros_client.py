@@ -1,5 +1,4 @@
-"""The console of `bench/ros.py`: a ROS program in a process of its own, which prints what it has seen as
-JSON.
+"""The console of `bench/ros.py`: a ROS program in a process of its own, which prints its results as JSON.
 
     python bench/ros_client.py KIND WHERE TASK '{"...": ...}'
 
@@ -129,9 +128,7 @@ class Arm:
             self.news.notify_all()
 
     def await_state(self, after_ns: int, wanted: Any, limit_s: float) -> int | None:
-        """Return the stamp of the first state newer than `after_ns` that is as wanted; None if none has come
-        in time.
-        """
+        """Return the stamp of the first matching state after `after_ns`; None if none arrives in time."""
         at = 0
 
         def found() -> int | None:
@@ -165,9 +162,7 @@ def home(arm: Arm) -> None:
 
 
 def servo(client: Any, arm_name: str, count: int) -> dict[str, Any]:
-    """Tell an arm now and then to go 2 mrad to or fro, and note when its setpoint and its joint are seen to
-    follow.
-    """
+    """Command an arm by 2 mrad to and fro, and record when its setpoint and its joint follow."""
     arm, times, pause = Arm(client, arm_name), {"setpoint_js": [], "measured_js": []}, random.Random(0)
     stamped: dict[str, list[int]] = {"setpoint_js": [], "measured_js": []}
     begin(client)
@@ -217,7 +212,7 @@ def moves(client: Any, arm_name: str, count: int) -> dict[str, Any]:
 
 
 def cycles(client: Any, arm_name: str, count: int) -> dict[str, Any]:
-    """Enable and home from nothing, as a client does in the morning, and let go of all again."""
+    """Enable and home from nothing, as a client does in the morning, and release everything again."""
     arm, took_ns, missed, hung = Arm(client, arm_name), [], 0, 0
     begin(client)
     arm.await_joints()

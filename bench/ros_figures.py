@@ -9,15 +9,13 @@ __all__ = ["cpu_s", "host_process"]
 
 
 def cpu_s(process: int | str = "self") -> float:
-    """Return how long a process has computed so far, with the kernel for it (s): utime and stime of proc(5)."""
+    """Return the CPU time of a process so far, user and kernel (s): utime and stime of proc(5)."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def host_process(host: str) -> int:
-    """Return the process of a session's host among the children of this one. Raises LookupError if there is
-    none.
-    """
+    """Return the process of a session's host among our children. Raises LookupError if there is none."""
     for task in Path("/proc/self/task").iterdir():
         for child in (task / "children").read_text().split():
             if f"--host\0{host}\0" in Path(f"/proc/{child}/cmdline").read_text():

@@ -1,5 +1,6 @@
-"""How the console of `bench/ros.py` speaks each middleware: by a client library of others, which shares
-nothing with the gateways.
+"""The client of each middleware for the console of `bench/ros.py`, on libraries of others.
+
+They share no code with the gateways.
 
 Each runs in the Python that has its library, so nothing but the standard library is imported up here. A
 message is as the library has it; `Take` gets it with its number on its topic, None where the middleware tells
@@ -26,8 +27,9 @@ PATIENCE_S, POLL_S = 20.0, 5e-4
 
 
 class Zenoh:
-    """The program that the tests have, written from rmw_zenoh's design on eclipse-zenoh and rosbags; `where`
-    is the router's endpoint.
+    """The program of the tests, written from rmw_zenoh's design on eclipse-zenoh and rosbags.
+
+    `where`: the router's endpoint.
     """
 
     def __init__(self, where: str) -> None:

@@ -60,8 +60,9 @@ class StopwatchParams(Params):
 
 
 class Stopwatch(Stepped):
-    """Notes, by the wall clock, when a `servo_jp` is heeded, and when the joint that it is for moves: both
-    from the command's stamp, at the end of the step.
+    """Records the wall time until a `servo_jp` is executed, and until its joint moves.
+
+    Both are from the command's stamp to the end of the step.
     """
 
     params_model = StopwatchParams

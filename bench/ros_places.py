@@ -1,6 +1,4 @@
-"""Where the console of `bench/ros.py` meets a gateway of each kind, and the Python that has its client
-library.
-"""
+"""Addresses of each kind of gateway for `bench/ros.py`, and the Python with its client library."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The servo process of the haptic styluses: how well it keeps its time, and what the hand feels when its host
-is killed.
+"""The servo process of the haptic styluses: jitter of its ticks, and the force after its host is killed.
 
     python bench/servo.py [--seconds 20] [--styluses 2] [--planes 4] [--idle]
 

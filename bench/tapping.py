@@ -1,6 +1,4 @@
-"""A hand that jumps to and fro, and looks when the robot's tip starts to follow: the device of
-`bench/latency.py`.
-"""
+"""The device of `bench/latency.py`: a hand that jumps and measures when the robot's tip starts to follow."""
 
 from __future__ import annotations
 
@@ -33,8 +31,9 @@ class TappingParams(Params):
 
 
 class Tapping(Device):
-    """Jumps by 10 mm once the tip moves smoothly, after a pause of any length between 20 and 30 ms, and notes
-    when the tip shows it.
+    """Jumps by 10 mm once the tip moves smoothly, and records when the tip follows.
+
+    The pauses between jumps are random, between 20 and 30 ms.
     """
 
     params_model = TappingParams

@@ -1,1 +1,1 @@
-"""Participants that live in wall time: what a person holds, wears or sits at."""
+"""Devices: what a person holds, wears or sits at, and gateways to programs outside."""

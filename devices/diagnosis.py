@@ -1,13 +1,11 @@
-"""What a piece of hardware has to say of itself: each change of its condition once, on an event port and in
-the log.
-"""
+"""The condition of a piece of hardware: each change is published once on an event port, and logged."""
 
 from __future__ import annotations
 
 import logging
 from enum import IntEnum
-from typing import Literal
 
+from devices.samples import clock_of
 from hub.participant import Sample
 from schemas.ports import Port
 from schemas.ros import DiagnosticStatus
@@ -29,30 +27,31 @@ class Level(IntEnum):
 class Diagnosis:
     """The condition of one piece of hardware."""
 
-    def __init__(
-        self, device: str, port: str = "diagnostics", *, clock: Literal["simulated", "wall"] = "wall"
-    ) -> None:
-        """Take the participant's name, followed by the part of it that has a condition of its own:
-        `touch/right`.
+    def __init__(self, device: str, port: str = "diagnostics", *, simulated_time: bool = False) -> None:
+        """Declare the port.
+
+        Args:
+            device: the participant's name, and the part of it that has a condition of its own: `touch/right`.
+            port: name of the port.
+            simulated_time: whether the device lives in simulated time.
         """
-        said = "each change of the device's condition: what, and what to do"
         self.port = Port(
             name=port,
             causality="output",
             type=DiagnosticStatus.ros_type,
             variability="event",
-            clock=clock,
-            description=said,
+            clock=clock_of(simulated_time=simulated_time),
+            description="each change of the device's condition: what, and what to do",
         )
         self._device = device
         self._last: tuple[Level, str, str] | None = None
 
-    def tell(self, level: Level, message: str, hardware: str = "") -> list[Sample]:
-        """Return the sample that tells of a change, and log it; nothing if this was the last thing told.
+    def report(self, level: Level, message: str, hardware: str = "") -> list[Sample]:
+        """Return the sample of a change, and log it; nothing if the condition is as reported last.
 
         Args:
             level: how bad it is.
-            message: what is the case, and what to do about it.
+            message: the condition, and what to do about it.
             hardware: model and serial number, as far as they are known.
         """
         if (level, message, hardware) == self._last:

@@ -1,8 +1,7 @@
-"""A headset as a device: what its runtime knows of the head, in the axes of REP 103, and a diagnosis when
-that is nothing.
+"""A headset as a device: pose and twist of the head in the axes of REP 103, and a diagnosis.
 
-The libraries differ in where a head comes from; ports, frames, rate, retries and messages are the same and
-stand here.
+Libraries differ in how they give the head's pose; ports, frames, rate, retries and messages are the same
+for all, and are here.
 """
 
 from __future__ import annotations
@@ -16,20 +15,20 @@ import numpy as np
 from pydantic import Field
 
 from devices.diagnosis import Diagnosis, Level
-from devices.pace import Pace
-from devices.samples import pose_sample, twist_sample
+from devices.samples import SampleTimer, pose_sample, twist_sample
 from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
 from hub.participant import Device, Params, Sample
 from robots import rotation
 from schemas.errors import DeviceError
 from schemas.ports import Port
 from schemas.quantity import Duration
+from schemas.ros import PoseStamped, TwistStamped
 
 __all__ = ["HeadState", "Headset", "HeadsetParams", "NoHead", "Runtime"]
 
 
 class HeadsetParams(Params):
-    """What any headset is told."""
+    """Parameters of every headset."""
 
     rate: float = Field(
         default=250.0,
@@ -44,31 +43,32 @@ class HeadsetParams(Params):
 
 @dataclass(frozen=True, slots=True)
 class HeadState:
-    """Pose and velocity of a head as its runtime has them: vendors' axes (x right, y up, z towards the user),
-    m, m/s, rad/s, of the base frame.
+    """Pose and velocity of a head as its runtime has them, in the base frame: m, m/s, rad/s.
+
+    Vendors' axes: x right, y up, z towards the user.
     """
 
     time: float
-    """When this was so, s of the runtime's clock: states of one time are one sample."""
+    """Time of the state, s of the runtime's clock: states of one time are one sample."""
     position: Vector3
     orientation: Quaternion
     linear: Vector3 | None
-    """None where the runtime does not know it: then it is how far the head has come since the state before,
-    over the time between.
+    """None where the runtime does not know it: then it is the displacement since the state before, over the
+    time between.
     """
     angular: Vector3 | None
 
 
 @dataclass(frozen=True, slots=True)
 class NoHead:
-    """Why the runtime, though it answers, knows no head: nobody wears it, it sleeps, it is not tracked."""
+    """Why the runtime answers without a pose: the headset is not worn, asleep or not tracked."""
 
     level: Level
     message: str
 
 
 class Runtime(Protocol):
-    """A runtime that has been connected to."""
+    """A runtime that is connected."""
 
     @property
     def hardware(self) -> str:
@@ -76,11 +76,11 @@ class Runtime(Protocol):
         ...
 
     def locate(self) -> HeadState | NoHead:
-        """Return where the head is now. Raises DeviceError where the runtime or the headset is gone."""
+        """Return the head's present state. Raises DeviceError if the runtime or the headset is lost."""
         ...
 
     def close(self) -> None:
-        """Let go of the runtime."""
+        """Disconnect from the runtime."""
         ...
 
 
@@ -88,12 +88,11 @@ class Headset(Device):
     """Publishes `pose` and `twist` of a head in `<participant>_base`, and `diagnostics`.
 
     The head's own frame has x ahead, y to the left and z up. The twist is the velocity of that frame's origin
-    and its angular velocity, both along the axes of the base frame. Runtimes are connected to and asked in
+    and its angular velocity, both along the axes of the base frame. A runtime is connected and called in
     the thread that reads, as some demand.
     """
 
     def __init__(self, name: str, params: HeadsetParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._rate, self._max_age_ns = params.rate, params.max_age
         self._diagnosis = Diagnosis(name)
@@ -108,18 +107,18 @@ class Headset(Device):
                 description=text,
             )
             for port, type_, text in (
-                ("pose", "geometry_msgs/msg/PoseStamped", "of the head: x ahead, y to the left, z up"),
-                ("twist", "geometry_msgs/msg/TwistStamped", "of the head, along the axes of the base frame"),
+                ("pose", PoseStamped.ros_type, "of the head: x ahead, y to the left, z up"),
+                ("twist", TwistStamped.ros_type, "of the head, along the axes of the base frame"),
             )
         )
         self._runtime: Runtime | None = None
         self._newest: HeadState | None = None
         self._newest_ns = 0
-        self._pace = Pace(self._rate)
+        self._timer = SampleTimer(self._rate)
 
     @abstractmethod
     def connect(self) -> Runtime:
-        """Connect to the runtime. Raises DeviceError where there is none."""
+        """Connect to the runtime. Raises DeviceError if there is none."""
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -127,13 +126,13 @@ class Headset(Device):
         return self._pose, self._twist, self._diagnosis.port
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
-        """Begin anew; the runtime is connected to by the first `read`."""
+        """Start; the first `read` connects to the runtime."""
         self._diagnosis = Diagnosis(self.name)
-        self._pace = Pace(self._rate)
+        self._timer = SampleTimer(self._rate)
 
     def read(self, t: int) -> list[Sample]:
-        """Return pose and twist if they are known and due, and a diagnosis whenever that changes."""
-        if not self._pace.due(t):
+        """Return pose and twist if they are known and due, and the diagnosis whenever it changes."""
+        if not self._timer.due(t):
             return []
         try:
             if self._runtime is None:
@@ -141,18 +140,18 @@ class Headset(Device):
             return self._located(t, self._runtime)
         except DeviceError as error:
             self.close()
-            self._pace.failed(t)
-            return self._diagnosis.tell(Level.ERROR, f"{error}; it is looked for again every second")
+            self._timer.failed(t)
+            return self._diagnosis.report(Level.ERROR, f"{error}; the next try is in a second")
 
     def _located(self, t: int, runtime: Runtime) -> list[Sample]:
         state, before = runtime.locate(), self._newest
         if isinstance(state, NoHead):
             self._newest = None
-            return self._diagnosis.tell(state.level, state.message, runtime.hardware)
+            return self._diagnosis.report(state.level, state.message, runtime.hardware)
         if before is not None and state.time == before.time:
             still = t - self._newest_ns > self._max_age_ns
             return (
-                self._diagnosis.tell(
+                self._diagnosis.report(
                     Level.STALE, "the runtime gives no new poses; look at its own software", runtime.hardware
                 )
                 if still
@@ -164,15 +163,15 @@ class Headset(Device):
             linear, angular = _velocities(before, state)
             if linear is not None and angular is not None:
                 samples.append(twist_sample(self._twist, t, vector(*linear), vector(*angular)))
-        except ValueError as error:  # what is not finite, too
+        except ValueError as error:  # also of numbers that are not finite
             self._newest = None
-            return self._diagnosis.tell(
+            return self._diagnosis.report(
                 Level.ERROR, f"the runtime gives no pose: {error}; look at its own software", runtime.hardware
             )
-        return [*self._diagnosis.tell(Level.OK, "the head is tracked", runtime.hardware), *samples]
+        return [*self._diagnosis.report(Level.OK, "the head is tracked", runtime.hardware), *samples]
 
     def close(self) -> None:
-        """Let go of the runtime."""
+        """Disconnect from the runtime."""
         if self._runtime is not None:
             self._runtime.close()
         self._runtime = None
@@ -180,9 +179,7 @@ class Headset(Device):
 
 
 def _velocities(before: HeadState | None, now: HeadState) -> tuple[Vector3 | None, Vector3 | None]:
-    """Return velocity and angular velocity in the vendors' axes; None where neither the runtime nor two poses
-    tell.
-    """
+    """Return velocity and angular velocity in the vendors' axes; None if they are unknown."""
     if before is None or (now.linear is not None and now.angular is not None):
         return now.linear, now.angular
     dt = now.time - before.time

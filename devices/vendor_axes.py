@@ -1,8 +1,8 @@
-"""From the axes that HDAPI, LibOVR and OpenXR share (x right, y up, z towards the user) to those of REP 103
-(x ahead, y left, z up).
+"""From the axes of HDAPI, LibOVR and OpenXR to those of REP 103.
 
-The same turn takes vectors of the base frame and, as these interfaces give a head's own frame the same axes,
-the head's own ones: (x, y, z) = (-z_v, -x_v, y_v).
+Theirs are x right, y up, z towards the user; those of REP 103 are x ahead, y left, z up.
+The same rotation holds for vectors in the base frame and in the head's own frame, which has the same axes:
+(x, y, z) = (-z_v, -x_v, y_v).
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ def vector(x: float, y: float, z: float) -> Vector3:
 
 
 def quaternion(x: float, y: float, z: float, w: float) -> Quaternion:
-    """Return the unit quaternion (x, y, z, w) of a rotation whose two frames both have the vendors' axes,
-    with those of REP 103.
+    """Return the unit quaternion (x, y, z, w) of a rotation between two frames with the vendors' axes.
 
-    Raises ValueError if it has no direction (all zeros, or not finite): some runtimes give that while they do
-    not track.
+    The result is for the same frames with the axes of REP 103. Raises ValueError if it is no unit
+    quaternion (all zeros, or not finite), as some runtimes return while they do not track.
     """
     norm = sqrt(x * x + y * y + z * z + w * w)
-    if not 0.5 < norm < 2.0:  # of single precision; also false for NaN
+    if not 0.5 < norm < 2.0:  # vendors have single precision; also false for NaN
         raise ValueError(f"({x:g}, {y:g}, {z:g}, {w:g}) is no unit quaternion (x, y, z, w)")
     return -z / norm, -x / norm, y / norm, w / norm

@@ -1,4 +1,4 @@
-"""What a haptic loop knows of a contact model: planes as plain floats, checked once when they arrive."""
+"""Contact models for a haptic loop: planes as plain floats, checked once when they arrive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from devices.vendor_axes import Vector3
 
-if TYPE_CHECKING:  # a servo process has no use for pydantic
+if TYPE_CHECKING:  # a servo process does without pydantic
     from schemas.trocar_msgs import ContactModel
 
 __all__ = ["ZERO", "Plane", "checked", "planes_of"]
@@ -17,9 +17,7 @@ ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 _MOST_PLANES = 4
 _UNIT_TOLERANCE = 1e-3
-"""How far the length of a normal may be from 1: wide for rounding in transit, narrow for a vector that is
-none.
-"""
+"""How far the length of a normal may be from 1: wide enough for rounding, too narrow for any other vector."""
 
 
 class Plane(NamedTuple):
@@ -44,8 +42,10 @@ def planes_of(model: ContactModel) -> tuple[Plane, ...]:
 
 
 def checked(planes: Sequence[Plane]) -> tuple[Plane, ...] | None:
-    """Return `planes` with normals of length 1, or None if one is no plane: too many, not finite, a negative
-    coefficient, a normal that is no direction.
+    """Return `planes` with normals of length 1, or None if they are invalid.
+
+    Invalid are more than four, a number that is not finite, a negative coefficient, a normal that is no
+    direction.
     """
     if len(planes) > _MOST_PLANES:
         return None

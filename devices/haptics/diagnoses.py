@@ -1,4 +1,4 @@
-"""What a haptic device tells of its force, for people: what is the case, and what to do."""
+"""Diagnoses of a haptic device's force, for people: the condition, and what to do."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ FORCE_DIAGNOSES: Mapping[Condition, tuple[Level, str]] = {
     Condition.WAITING: (
         Level.WARN,
         (
-            "no force yet: the stylus is inside of something; move it out of the contact, and the force comes"
-            " in slowly"
+            "no force yet: the stylus is inside an object; move it out of the contact, and the force rises"
+            " slowly"
         ),
     ),
     Condition.SILENT: (
         Level.WARN,
         (
-            "no force: no contact model arrives; see whether the session runs, the link stands and the input"
-            " 'contact' is connected"
+            "no force: no contact model arrives; check that the session runs, that the network is up and that"
+            " the input 'contact' is connected"
         ),
     ),
     Condition.TOO_FAST: (
         Level.WARN,
-        "no force: the hand was too fast; let go of the dead-man, then hold it again",
+        "no force: the hand was too fast; release the dead-man, then hold it again",
     ),
     Condition.INVALID: (
         Level.ERROR,
         (
-            "no force: a position, a velocity or a force is no number; see what the device and the contact"
-            " model say"
+            "no force: a position, a velocity or a force is not a number; check the device and the contact"
+            " model"
         ),
     ),
 }

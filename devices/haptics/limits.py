@@ -1,6 +1,4 @@
-"""The limits of a force on a hand, in SI units: what the chain in `devices.haptics.safety` holds, and what a
-device bears.
-"""
+"""Limits of a force on a hand, in SI units: those of `devices.haptics.safety`, and those of a device."""
 
 from __future__ import annotations
 
@@ -9,15 +7,16 @@ from dataclasses import dataclass, replace
 __all__ = ["TOUCH", "DeviceLimits", "Limits"]
 
 _SHARE_OF_NOMINAL = 0.6
-"""Of a device's nominal maximum force that is used: the nominal force is a peak that the motors hold in the
-best posture only, and not for long.
+"""Share of a device's nominal maximum force that is used: the nominal force is a peak that the motors hold
+in the best posture only, and not for long.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceLimits:
-    """What a device bears, as its maker states it (HDAPI: HD_NOMINAL_MAX_FORCE, _STIFFNESS, _DAMPING in SI
-    units).
+    """Limits of a device, as its maker states them.
+
+    HDAPI: HD_NOMINAL_MAX_FORCE, _STIFFNESS and _DAMPING, here in SI units.
     """
 
     force: float
@@ -29,7 +28,7 @@ class DeviceLimits:
 
     @property
     def usable_force(self) -> float:
-        """The largest force (N) that is asked of the device."""
+        """The largest force (N) that is commanded."""
         return _SHARE_OF_NOMINAL * self.force
 
 
@@ -39,13 +38,11 @@ TOUCH = DeviceLimits(force=3.3, stiffness=400.0, damping=4.0)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one stylus is held to.
+    """The limits of one stylus.
 
-    The defaults are the widest allowed, for a device that states no limits of its own.
-
-    The defaults come from drivers in use: 2 N is the clamp of sawSensablePhantom, waiting for less than 0.2 N
-    is CHAI3D's; 400 N/m never oscillated in a simulated hand, 700 N/m did; the times are ours
-    (docs/decisions/0022).
+    The defaults are the widest allowed, for a device that states no limits of its own. They come from
+    drivers in use: 2 N is the clamp of sawSensablePhantom, waiting for less than 0.2 N is CHAI3D's; 400 N/m
+    never oscillated in a simulated hand, 700 N/m did; the times are ours (docs/decisions/0022).
     """
 
     force: float = 2.0
@@ -55,27 +52,28 @@ class Limits:
     damping: float = 4.0
     """The same, N s/m."""
     slew: float = 0.1
-    """By how much a force may grow or turn in one tick, N. It may fall at once."""
+    """Largest growth or turn of the force in one tick, N. It may fall at once."""
     speed: float = 1.0
-    """A hand that is faster gets no force until the dead-man is let go, m/s."""
+    """A faster hand gets no force until the dead-man is released, m/s."""
     hold: float = 0.1
-    """Silence of the simulation up to which its last contact model counts in full, s."""
+    """Silence of the simulation up to which its last contact model has its full force, s."""
     decay: float = 0.02
     """Time constant of the force's decay after that, s."""
     silence: float = 0.13
     """Silence after which there is no force, s.
 
-    A hub that dies has 150 ms until then, of which its last model and a busy device host may use up 20.
+    After a hub's end the force must be zero within 150 ms, of which its last model and a busy device host
+    may take 20.
     """
     ramp: float = 1.0
-    """Time in which the force comes in after it was off, s."""
+    """Time in which the force rises after it was off, s."""
     calm_force: float = 0.2
-    """The force comes in only after less than this was due ..., N."""
+    """The force rises only after less than this was due ..., N."""
     calm_ticks: int = 4
     """... for this number of ticks."""
 
     def bounded(self, device: DeviceLimits) -> Limits:
-        """Return these limits, nowhere above what `device` bears."""
+        """Return these limits, each no larger than the limit of `device`."""
         return replace(
             self,
             force=min(self.force, device.usable_force),

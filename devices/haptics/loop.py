@@ -1,5 +1,4 @@
-"""The haptic loop of one stylus: newest contact model in, a force that is safe out, at every tick of the
-device.
+"""The haptic loop of one stylus: at every tick of the device a safe force from the newest contact model.
 
 Plain floats and one clock, so that it fits into a servo callback: no numpy, no pydantic, no lock.
 """
@@ -19,8 +18,8 @@ from devices.vendor_axes import Vector3
 __all__ = ["HapticLoop"]
 
 _READ_BEFORE = 0.01
-"""A model may have arrived (s) after the tick's time was read, as another thread takes it; one from farther
-in the future has no true time.
+"""Another thread receives models, so one may have arrived (s) after the tick's time was read; a time
+farther in the future is wrong.
 """
 
 
@@ -31,9 +30,7 @@ class HapticLoop:
     """
 
     def __init__(self, limits: Limits, *, passivity: bool = False) -> None:
-        """Start without contact and without force; `passivity` adds the observer and controller of
-        `devices.haptics.passivity`.
-        """
+        """Start without contact and force; `passivity` adds the controller of `devices.haptics.passivity`."""
         self._limits = limits
         self._renderer = Renderer(limits.stiffness, limits.damping)
         self._chain = SafetyChain(limits)
@@ -55,12 +52,15 @@ class HapticLoop:
         return self._chain.condition
 
     def receive(self, planes: Sequence[Plane], stamp_ns: int, arrived: float) -> bool:
-        """Take a contact model with the stamp `stamp_ns` that arrived here at `arrived` (s, the clock of
-        `tick`); say whether it is used.
+        """Use a contact model from the next tick on; return False if it is ignored.
 
-        Refused, as if it had never come: planes that are none, and a stamp not newer than the newest. After a
-        silence in which the force went to zero any stamp is a new beginning: another session starts at 0
-        again.
+        Ignored are invalid planes, and a stamp that is not newer than the newest. After a silence in which
+        the force went to zero every stamp is accepted, because another session starts at 0 again.
+
+        Args:
+            planes: of the model, base frame.
+            stamp_ns: its stamp, ns.
+            arrived: when it arrived here, s of the clock of `tick`.
         """
         if stamp_ns <= self._stamp_ns and arrived - self._arrived <= self._limits.silence:
             return False
@@ -74,11 +74,14 @@ class HapticLoop:
     def tick(
         self, now: float, position: Vector3, velocity: Vector3, *, permitted: bool, ready: bool = True
     ) -> Vector3:
-        """Return the force (N) on the hand from now, in s of a clock that only goes forward, until the next
-        tick.
+        """Return the force (N) on the hand from this tick to the next.
 
-        `position` (m) and `velocity` (m/s) are the hand's. `permitted`: the dead-man is held. `ready`: the
-        device is calibrated and well.
+        Args:
+            now: time of the tick, s of a clock that only goes forward.
+            position: of the hand, m.
+            velocity: of the hand, m/s.
+            permitted: whether the dead-man is held.
+            ready: whether the device is calibrated and has no fault.
         """
         dt = now - self._now if self._now > -inf else 0.0
         self._now = now
@@ -86,23 +89,20 @@ class HapticLoop:
         if -_READ_BEFORE < age < 0.0:
             age = 0.0
         wanted = self._renderer.force(self._planes, age, position, velocity)
-        if self._appeared:  # perhaps under a hand that has taken up an instrument which presses already
+        if self._appeared:  # perhaps at a hand that has taken an instrument which presses already
             self._appeared = False
             self._chain.soften(hypot(*wanted))
         if self._passivity is not None:
             wanted = self._passivity.correct(wanted, position, velocity, dt)
         given = self._chain.tick(wanted, velocity, age=age, permitted=permitted, dt=dt, ready=ready)
         if self._passivity is not None:
-            self._passivity.gave(given)
+            self._passivity.applied(given)
         if self._chain.condition is Condition.INVALID:
             self._renderer.reset()
         return given
 
     def reset(self) -> None:
-        """Take the force away: what a device does in its last frame, and when it was lost.
-
-        The contact model has to come anew.
-        """
+        """Set the force to zero, as in a device's last frame, and discard the contact model."""
         self._chain.reset()
         self._renderer.reset()
         if self._passivity is not None:

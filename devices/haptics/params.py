@@ -1,4 +1,4 @@
-"""The limits of a force as a scenario states them: it may make each narrower, none wider."""
+"""The limits of a force in a scenario, which may make each narrower, none wider."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HOLD_NS, _DECAY_NS, _SILENCE_NS, _RAMP_NS = (
 class SafetyParams(Params):
     """Limits of the force on one hand.
 
-    The defaults are the widest; the first three are the device's own where it bears less.
+    The defaults are the widest; the first three are the device's own where those are lower.
     """
 
     force: Annotated[Force, Field(gt=0.0, le=_WIDEST.force)] | None = Field(
@@ -46,13 +46,13 @@ class SafetyParams(Params):
         default=_WIDEST.speed,
         gt=0.0,
         le=_WIDEST.speed,
-        description="a faster hand gets no force until it lets go of the dead-man",
+        description="a faster hand gets no force until it releases the dead-man",
     )
     hold: Duration = Field(
         default=_HOLD_NS,
         gt=0,
         le=_HOLD_NS,
-        description="silence up to which the last contact model counts in full",
+        description="silence up to which the last contact model has its full force",
     )
     decay: Duration = Field(
         default=_DECAY_NS, gt=0, le=_DECAY_NS, description="time constant of the force's decay after that"
@@ -61,13 +61,13 @@ class SafetyParams(Params):
         default=_SILENCE_NS, gt=0, le=_SILENCE_NS, description="silence after which there is no force"
     )
     ramp: Duration = Field(
-        default=_RAMP_NS, ge=_RAMP_NS, description="time in which the force comes in after it was off"
+        default=_RAMP_NS, ge=_RAMP_NS, description="time in which the force rises after it was off"
     )
     calm_force: Force = Field(
         default=_WIDEST.calm_force,
         gt=0.0,
         le=_WIDEST.calm_force,
-        description="the force comes in only after less than this was due",
+        description="the force rises only after less than this was due",
     )
     calm_ticks: int = Field(
         default=_WIDEST.calm_ticks,
@@ -76,25 +76,23 @@ class SafetyParams(Params):
     )
     passivity: bool = Field(
         default=False,
-        description=(
-            "whether an observer watches the energy given to the hand, and brakes when it is too much"
-        ),
+        description=("whether an observer sums the energy given to the hand, and damps when it is too much"),
     )
 
     def within(self, device: DeviceLimits) -> Limits:
-        """Return the limits as the haptic loop takes them.
+        """Return the limits for the haptic loop.
 
-        Raises ScenarioError if the scenario asks for more than the device bears.
+        Raises ScenarioError if the scenario states more than the device's limits.
         """
-        for name, asked, borne, unit in (
+        for name, stated, most, unit in (
             ("force", self.force, device.usable_force, "N"),
             ("stiffness", self.stiffness, device.stiffness, "N/m"),
             ("damping", self.damping, device.damping, "N s/m"),
         ):
-            if asked is not None and asked > borne:
+            if stated is not None and stated > most:
                 problem = (
-                    f"safety.{name} is {asked:g} {unit}, but the device bears {borne:g} {unit}. A scenario"
-                    " may only lower a limit."
+                    f"safety.{name} is {stated:g} {unit}, but the device's limit is {most:g} {unit}. A"
+                    " scenario may only lower a limit."
                 )
                 raise ScenarioError(problem, path=("safety", name))
         return Limits(

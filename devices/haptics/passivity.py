@@ -1,10 +1,9 @@
-"""A passivity observer and controller: what is rendered may not give the hand more energy than the hand gave
-it.
+"""A passivity observer and controller: the hand gets back no more energy than it has put in.
 
-After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics and
-Automation 18(1), 2002. Between two ticks a device holds its force, so the work is exactly force times way.
-The book is closed whenever the hand is given no force: what was dissipated in one contact does not pay for
-the next.
+After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics
+and Automation 18(1), 2002. Between two ticks a device holds its force, so the work is exactly force times
+displacement. The sum starts at zero whenever the hand gets no force: energy dissipated in one contact does
+not allow more in the next.
 """
 
 from __future__ import annotations
@@ -16,23 +15,28 @@ __all__ = ["Passivity"]
 
 
 class Passivity:
-    """Books the energy that the hand has put into the contact, and damps as soon as more would come back."""
+    """Sums the energy that the hand has put into the contact, and damps as soon as more would come back."""
 
     def __init__(self, damping: float) -> None:
-        """Take the largest damping (N s/m) with which it may brake."""
+        """`damping`: the largest that it may add, N s/m."""
         self._damping = damping
         self.reset()
 
     def reset(self) -> None:
-        """Close the book."""
+        """Start at zero."""
         self.energy = 0.0
-        """What the hand has put in and not got back, J."""
+        """Energy that the hand has put in and not got back, J."""
         self._given: Vector3 = ZERO
         self._position: Vector3 = ZERO
 
     def correct(self, wanted: Vector3, position: Vector3, velocity: Vector3, dt: float) -> Vector3:
-        """Return `wanted` (N), braked if the hand at `position` (m) with `velocity` (m/s) would get more
-        energy within the next `dt` s than is in the book.
+        """Return the force `wanted` (N), damped if the hand would get more energy than it has put in.
+
+        Args:
+            wanted: force of the contact, N.
+            position: of the hand, m.
+            velocity: of the hand, m/s.
+            dt: time from this tick to the next, s.
         """
         (gx, gy, gz), (x, y, z), (px, py, pz) = self._given, position, self._position
         work = gx * (x - px) + gy * (y - py) + gz * (z - pz)
@@ -46,6 +50,6 @@ class Passivity:
         damping = min(-left / (square * dt), self._damping)
         return fx - damping * vx, fy - damping * vy, fz - damping * vz
 
-    def gave(self, force: Vector3) -> None:
-        """Take note of the force (N) that the hand is given until the next tick."""
+    def applied(self, force: Vector3) -> None:
+        """Remember the force (N) on the hand until the next tick."""
         self._given = force

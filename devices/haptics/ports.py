@@ -1,11 +1,10 @@
-"""The ports of one stylus, the same for every haptic device, so that one may stand for the other in a
-scenario.
-"""
+"""The ports of one stylus, the same for every haptic device, so that a scenario can exchange devices."""
 
 from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from devices.samples import clock_of
 from devices.vendor_axes import Vector3
 from hub.participant import Sample
 from schemas.ports import Port
@@ -26,13 +25,12 @@ class StylusPorts(NamedTuple):
     contact: Port
 
 
-def stylus_ports(
-    participant: str, stylus: str, *, clock: Literal["simulated", "wall"], max_age_ns: int
-) -> StylusPorts:
-    """Return the ports of a stylus; all vectors are along the axes of `<participant>_<stylus>_base` (x ahead,
-    y left, z up).
+def stylus_ports(participant: str, stylus: str, *, simulated_time: bool, max_age_ns: int) -> StylusPorts:
+    """Return the ports of a stylus.
+
+    All vectors are along the axes of `<participant>_<stylus>_base` (x ahead, y left, z up).
     """
-    frame = f"{participant}_{stylus}_base"
+    frame, clock = f"{participant}_{stylus}_base", clock_of(simulated_time=simulated_time)
 
     def output(
         name: str,
@@ -62,20 +60,20 @@ def stylus_ports(
         ),
         output("twist", TwistStamped.ros_type, "of the tip", max_age_ns),
         output("buttons", Joy.ros_type, "each press and release", variability="event"),
-        output("force", WrenchStamped.ros_type, "that the hand is given"),
+        output("force", WrenchStamped.ros_type, "on the hand"),
         Port(
             name=f"{stylus}/contact",
             causality="input",
             type=ContactModel.ros_type,
             frame=frame,
             clock="simulated",
-            description="what the hand is to feel",
+            description="contact that is rendered to the hand",
         ),
     )
 
 
 def force_sample(port: Port, time_ns: int, force: Vector3) -> Sample:
-    """Return the force (N) that a hand is given, in the port's frame at `time_ns` of the port's clock."""
+    """Return the force (N) on a hand, in the port's frame at `time_ns` of the port's clock."""
     x, y, z = force
     header = Header(stamp=Time.from_ns(time_ns), frame_id=port.frame)
     return Sample(port.name, WrenchStamped(header=header, wrench=Wrench(force=Vector3Message(x=x, y=y, z=z))))

@@ -17,34 +17,39 @@ from devices.vendor_axes import Vector3
 __all__ = ["DEAD_RECKONING", "Renderer"]
 
 DEAD_RECKONING = 0.05
-"""A surface goes on with its velocity for at most this time (s) after its model came: more would be a guess.
-"""
+"""A surface moves on with its velocity for at most this time (s) after its model arrived."""
 
 
 class Renderer:
-    """Renders contact models; stiffness and damping are bounded in sum, so that four planes in one place are
-    no stiffer than one.
+    """Renders contact models.
+
+    Stiffness and damping are bounded in sum, so that four planes in one place are no stiffer than one.
     """
 
     def __init__(self, stiffness: float, damping: float) -> None:
-        """Take the largest stiffness (N/m) and damping (N s/m) that may be rendered."""
+        """`stiffness` (N/m) and `damping` (N s/m): the largest that may be rendered."""
         self._stiffness, self._damping = stiffness, damping
         self._anchor: Vector3 | None = None
 
     def reset(self) -> None:
-        """Forget where the hand stuck."""
+        """Discard the anchor of the friction."""
         self._anchor = None
 
     def force(self, planes: Sequence[Plane], age: float, position: Vector3, velocity: Vector3) -> Vector3:
-        """Return the force (N) on a hand at `position` (m) with `velocity` (m/s), all in the base frame, by
-        planes that came `age` s ago.
+        """Return the force (N) on the hand, in the base frame.
+
+        Args:
+            planes: of the contact model.
+            age: time since it arrived, s.
+            position: of the hand, m.
+            velocity: of the hand, m/s.
         """
         x, y, z = position
         ahead = min(age, DEAD_RECKONING)
         touched: list[tuple[Plane, float]] = []
         for plane in planes:
             depth = plane[3] + plane[4] * ahead - (plane[0] * x + plane[1] * y + plane[2] * z)
-            if not depth <= 0.0:  # also what is no number: the safety chain finds it in the force
+            if not depth <= 0.0:  # also NaN, which the safety chain finds in the force
                 touched.append((plane, depth))
         if not touched:
             self._anchor = None
@@ -75,15 +80,13 @@ class Renderer:
         return fx + rx, fy + ry, fz + rz
 
     def _rubbed(self, rubbing: list[_Rubbing], position: Vector3, velocity: Vector3) -> Vector3:
-        """Return the friction of all planes: each at most its cone's radius, against the way from their
-        common anchor.
-        """
+        """Return the friction of all planes, each at most its cone's radius, towards their common anchor."""
         x, y, z = position
         way = _difference(self._anchor or position, position)
         for nx, ny, nz, k, _, most in rubbing:
             across = _across(way, nx, ny, nz)
             shortened = _at_most(across, most / k)
-            # what is normal to one plane lies along another
+            # what is normal to one plane is tangential to another
             along = ZERO if len(rubbing) == 1 else _difference(way, across)
             way = (along[0] + shortened[0], along[1] + shortened[1], along[2] + shortened[2])
         self._anchor = (x + way[0], y + way[1], z + way[2])
@@ -97,7 +100,7 @@ class Renderer:
 
 
 _Rubbing = tuple[float, float, float, float, float, float]
-"""A plane that rubs: normal, stiffness, damping, and the radius of the friction cone (N)."""
+"""A plane with friction: normal, stiffness, damping, and the radius of the friction cone (N)."""
 
 
 def _across(v: Vector3, nx: float, ny: float, nz: float) -> Vector3:
@@ -117,8 +120,9 @@ def _at_most(v: Vector3, most: float) -> Vector3:
 
 
 def _share(planes: list[Plane], index: int, most: float) -> float:
-    """Return by which factor to weaken the coefficients number `index` (each at most `most`) that the sum
-    does not exceed `most` in any direction.
+    """Return the factor for the coefficients number `index` by which their sum stays within `most`.
+
+    Each coefficient is at most `most`, and the bound holds in every direction.
 
     The sum of c n n^T over planes has no eigenvalue above the largest row sum of sqrt(c_i c_j) |n_i . n_j|
     (Gershgorin, on the Gram matrix); a plane with friction acts in every direction, so its coefficient is

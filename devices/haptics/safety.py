@@ -1,9 +1,9 @@
 """The chain that every force passes before it reaches a hand, tick by tick.
 
-In this order: numbers that are none, silence of the simulation, dead-man and calibration, speed of the hand,
-waiting for a small force, norm, ramp, slew. (Stiffness and damping are bounded where planes are rendered.)
-Whatever is not allowed gives zero at once, and after zero for such a reason the force comes in slowly. The
-slew is last, so what it promises holds of the force that the hand feels.
+In this order: numbers that are not finite, silence of the simulation, dead-man and calibration, speed of
+the hand, waiting for a small force, norm, ramp, slew. (Stiffness and damping are bounded where planes are
+rendered.) Every violation gives zero force at once, after which the force rises slowly. The slew is last,
+so its bound holds for the force that the hand feels.
 """
 
 from __future__ import annotations
@@ -19,41 +19,39 @@ __all__ = ["Condition", "SafetyChain"]
 
 
 class Condition(Enum):
-    """Why the hand gets a force, or none."""
+    """Why the hand gets a force, or gets none."""
 
     ON = "force is on"
     OFF = "not permitted: the dead-man is not held, or the device is not ready"
-    WAITING = "a force is due at once: it comes in when the hand has left the contact"
+    WAITING = "a force is due at once: it is on when the hand has left the contact"
     SILENT = "the simulation is silent"
-    TOO_FAST = "the hand was too fast: let go of the dead-man, then hold it again"
-    INVALID = "a number that is none"
+    TOO_FAST = "the hand was too fast: release the dead-man, then hold it again"
+    INVALID = "a number is not finite"
 
 
 class SafetyChain:
-    """Holds the force of one stylus to its limits.
+    """Keeps the force of one stylus within its limits.
 
     After every tick |F| <= limits.force, and F lies within `limits.slew` of the segment between zero and the
     force of the tick before: so |F| grows by `slew` at most, nor does a turn add more in any new direction.
-    It is zero in the same tick as anything forbids it.
+    It is zero in the same tick in which a condition forbids it.
     """
 
     def __init__(self, limits: Limits) -> None:
-        """Start without force."""
+        """Start with zero force."""
         self._limits = limits
         self._too_fast = False
         self.reset()
 
     def reset(self) -> None:
-        """Take the force away; it comes in again as at the start.
+        """Set the force to zero; it rises again as at the start.
 
         For a device that was lost, and for the last frame before it stops.
         """
         self._off(Condition.OFF)
 
     def soften(self, size: float) -> None:
-        """Take note of a contact that is there all at once and asks for the force `size` (N): what is not
-        small comes in by the ramp.
-        """
+        """Let the force of a suddenly new contact rise by the ramp, unless its size (N) is small."""
         limits = self._limits
         if size > limits.calm_force:
             self._gain = min(self._gain, limits.calm_force / min(size, limits.force))
@@ -68,12 +66,16 @@ class SafetyChain:
         dt: float,
         ready: bool = True,
     ) -> Vector3:
-        """Return the force (N) that the hand is given until the next tick.
+        """Return the force (N) on the hand until the next tick.
 
-        `wanted` is the force that the contact asks for (N), `velocity` the hand's (m/s), `age` the time since
-        a contact model arrived (s; infinite if none did), `dt` the time since the last tick (s). `permitted`:
-        the dead-man is held. `ready`: the device is calibrated and well; that it is not is no letting go,
-        which alone ends the lock of a hand that was too fast.
+        Args:
+            wanted: force of the contact, N.
+            velocity: of the hand, m/s.
+            age: time since a contact model arrived, s; infinite if none did.
+            permitted: whether the dead-man is held; only its release ends the lock of a hand that was too
+                fast.
+            dt: time since the last tick, s.
+            ready: whether the device is calibrated and has no fault.
         """
         limits = self._limits
         size = hypot(*wanted)
@@ -120,8 +122,7 @@ class SafetyChain:
 
 
 def _slewed(last: Vector3, wanted: Vector3, slew: float) -> Vector3:
-    """Return the force nearest to `wanted` that is no farther than `slew` from the segment between zero and
-    `last`.
+    """Return the force nearest to `wanted` within `slew` of the segment between zero and `last`.
 
     Let p be the segment's point nearest to `wanted`; the answer is p, moved towards `wanted` by at most
     `slew`: |answer| <= |p| + slew <= |last| + slew. As p and `wanted` are no longer than the norm's limit,

@@ -1,1 +1,1 @@
-"""A stylus for people who have none: moved by keys or a gamepad."""
+"""A virtual stylus or head, moved by keys or a gamepad."""

@@ -1,5 +1,4 @@
-"""Keyboard or gamepad as a stylus or a head (kind `keyboard`), for people who have neither stylus nor
-headset.
+"""Keyboard or gamepad in place of a stylus or a headset (kind `keyboard`).
 
 pygame-ce gives window, keys and gamepads on every desktop. The window is opened in the thread that reads.
 """
@@ -15,13 +14,12 @@ from pydantic import Field
 
 from devices.diagnosis import Diagnosis, Level
 from devices.keyboard.virtual_stylus import VirtualStylus
-from devices.pace import Pace
-from devices.samples import button_sample, pose_sample, twist_sample
+from devices.samples import SampleTimer, button_sample, pose_sample, twist_sample
 from hub.participant import Device, Params, Sample
 from schemas.errors import DeviceError, MissingExtraError
 from schemas.ports import Port
 from schemas.quantity import Duration, Speed
-from schemas.ros import Float64Message
+from schemas.ros import Float64Message, Joy, PoseStamped, TwistStamped
 
 if TYPE_CHECKING:
     from devices.keyboard.window import Window
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Keyboard", "KeyboardParams"]
 
 _LONGEST_NS = 100_000_000
-"""If nobody read for longer, the stylus goes on as if it had been this long: it must not leap."""
+"""After a longer pause between reads the stylus moves for this time only: it must not leap."""
 
 _FRAMES = {
     "stylus": "of the tip; z out of the point, x to the right when it points away from the user",
@@ -38,7 +36,7 @@ _FRAMES = {
 
 
 class KeyboardParams(Params):
-    """What the keys move, and how fast."""
+    """What the keys move, and how fast it moves."""
 
     stands_for: Annotated[
         Literal["stylus", "head"],
@@ -55,18 +53,16 @@ class KeyboardParams(Params):
 
 
 class Keyboard(Device):
-    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus; nothing but the last
-    while its window is not in focus.
+    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus.
 
-    What is moved starts at the origin of `<participant>_base`, pointing level away from the user;
-    devices.keyboard.keys has the keys.
+    While its window is not in focus, only the last. The moved frame starts at the origin of
+    `<participant>_base`, pointing level away from the user; devices.keyboard.keys has the keys.
     """
 
     params_model: ClassVar[type[Params]] = KeyboardParams
     params: KeyboardParams
 
     def __init__(self, name: str, params: KeyboardParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._diagnosis = Diagnosis(name)
         frame = f"{name}_base"
@@ -81,34 +77,33 @@ class Keyboard(Device):
                 description=text,
             )
             for port, type_, text in (
-                ("pose", "geometry_msgs/msg/PoseStamped", _FRAMES[params.stands_for]),
-                ("twist", "geometry_msgs/msg/TwistStamped", "of the same, along the axes of the base frame"),
+                ("pose", PoseStamped.ros_type, _FRAMES[params.stands_for]),
+                ("twist", TwistStamped.ros_type, "of the same, along the axes of the base frame"),
             )
         )
-        told = "each press and release: 0 the dead-man, 1 the jaw"
         self._buttons = Port(
             name="buttons",
             causality="output",
-            type="sensor_msgs/msg/Joy",
+            type=Joy.ros_type,
             variability="event",
             frame=frame,
             clock="wall",
-            description=told,
+            description="each press and release: 0 the dead-man, 1 the jaw",
         )
         self._gripper = Port(
             name="gripper",
             causality="output",
-            type="std_msgs/msg/Float64",
+            type=Float64Message.ros_type,
             clock="wall",
             description="0 closed, 1 open",
         )
         self._window: Window | None = None
-        self._begin()
+        self._reset()
 
-    def _begin(self) -> None:
+    def _reset(self) -> None:
         self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed, self.params.stands_for)
         self._pressed = (False, False)
-        self._pace, self._last_ns = Pace(self.params.rate), 0
+        self._timer, self._last_ns = SampleTimer(self.params.rate), 0
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -116,28 +111,28 @@ class Keyboard(Device):
         return self._pose, self._twist, self._buttons, self._gripper, self._diagnosis.port
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
-        """Begin anew; the window is opened by the first `read`.
+        """Start; the first `read` opens the window.
 
-        Raises MissingExtraError where pygame is not installed.
+        Raises MissingExtraError if pygame is not installed.
         """
         if find_spec("pygame") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind keyboard)", "keyboard", "pygame-ce")
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # which it would print
-        # with its own a SIGTERM would no longer end this process
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # it is printed otherwise
+        # with its own handler SIGTERM would not end this process
         os.environ.setdefault("SDL_NO_SIGNAL_HANDLERS", "1")
         self._diagnosis = Diagnosis(self.name)
-        self._begin()
+        self._reset()
 
     def read(self, t: int) -> list[Sample]:
-        """Return where the stylus is by now, the buttons if they have changed, and a diagnosis if that has."""
-        if not self._pace.due(t):
+        """Return the present pose and twist, the buttons and the diagnosis if they have changed."""
+        if not self._timer.due(t):
             return []
         try:
-            return self._heard(t, self._window or self._opened())
+            return self._samples(t, self._window or self._opened())
         except DeviceError as error:
             self.close()
-            self._pace.failed(t)
-            return self._diagnosis.tell(Level.ERROR, f"{error}; it is tried again every second")
+            self._timer.failed(t)
+            return self._diagnosis.report(Level.ERROR, f"{error}; the next try is in a second")
 
     def _opened(self) -> Window:
         from devices.keyboard.window import Window
@@ -145,7 +140,7 @@ class Keyboard(Device):
         self._window = Window(self.name)
         return self._window
 
-    def _heard(self, t: int, window: Window) -> list[Sample]:
+    def _samples(self, t: int, window: Window) -> list[Sample]:
         wish = window.wish()
         elapsed_ns, self._last_ns = min(t - self._last_ns, _LONGEST_NS), t
         samples: list[Sample] = []
@@ -153,11 +148,11 @@ class Keyboard(Device):
             self._pressed = wish.dead_man, wish.jaw
             samples.append(button_sample(self._buttons, t, self._pressed))
         if not window.focused:
-            return samples + self._diagnosis.tell(
-                Level.WARN, "keys are heard only while the window of this device is in focus; click into it"
+            return samples + self._diagnosis.report(
+                Level.WARN, "keys are read only while the window of this device is in focus; click into it"
             )
         self._stylus.advance(wish, elapsed_ns * 1e-9)
-        samples += self._diagnosis.tell(Level.OK, "keys are heard")
+        samples += self._diagnosis.report(Level.OK, "keys are read")
         samples += [
             pose_sample(self._pose, t, *self._stylus.pose),
             twist_sample(self._twist, t, *self._stylus.twist),

@@ -16,27 +16,27 @@ LAYOUT = (
 )
 _FULL = 32767
 _DEAD_ZONE = 7849 / _FULL
-"""Of a stick that nobody touches (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE of Microsoft's XInput)."""
+"""Of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE of Microsoft's XInput)."""
 
 
 class Gamepad:
-    """Reads the gamepad; it may be plugged in and out at any time."""
+    """Reads the gamepad, which may be plugged in and out at any time."""
 
     def __init__(self) -> None:
-        """Look for a gamepad. pygame's display must have been started, whose events SDL needs for this."""
+        """Look for a gamepad. pygame's display must be initialised, because SDL needs its events."""
         controller.init()
         self._pad: controller.Controller | None = None
         self.find()
 
     def find(self) -> None:
-        """Look again, as one has come or gone."""
+        """Look for a gamepad again, after one was plugged in or out."""
         pads = (number for number in range(controller.get_count()) if controller.is_controller(number))
         first = next(pads, None)
         self._pad = None if first is None else controller.Controller(first)
 
     @staticmethod
     def close() -> None:
-        """Look for gamepads no more."""
+        """Stop reading gamepads."""
         controller.quit()
 
     def wish(self) -> Wish:

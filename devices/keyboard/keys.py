@@ -1,4 +1,4 @@
-"""Which key does what."""
+"""The keys, and what each commands."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ KEYS: dict[str, tuple[str, Wish]] = {
     "c": ("button 1, and close the gripper", Wish(gripper=-1.0, jaw=True)),
     "v": ("open the gripper", Wish(gripper=1.0)),
 }
-"""By the key's name in pygame: what it does in words, and what it asks for."""
+"""By the key's name in pygame: its meaning in words, and its command."""
 
 
 def wish_of(pressed: Collection[str]) -> Wish:
-    """Return what the keys that are held down ask for."""
+    """Return the sum of the commands of the keys that are held down."""
     return sum((wish for key, (_, wish) in KEYS.items() if key in pressed), NOTHING)

@@ -1,6 +1,4 @@
-"""A stylus that exists in numbers only: it moves as fast as keys and sticks ask, and stays where they left
-it.
-"""
+"""A virtual stylus: it moves at the speed that keys and sticks command, and stays where they leave it."""
 
 from __future__ import annotations
 
@@ -18,24 +16,24 @@ __all__ = ["NOTHING", "VirtualStylus", "Wish"]
 _LEVEL = rotation.from_matrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
 """Pointing level away from the user: its z ahead, its x to the right, its y down; in axes of REP 103."""
 _GRIPPER_SPEED = 1.0
-"""1/s; ours: from open to closed takes as long as a hand takes without hurry."""
+"""1/s; ours: from open to closed in the time of an unhurried hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is asked for: shares of the speeds, each from -1 to 1."""
+    """A command of keys or sticks: shares of the speeds, each from -1 to 1."""
 
     linear: Vector3 = (0.0, 0.0, 0.0)
     """Ahead, left, up."""
     angular: Vector3 = (0.0, 0.0, 0.0)
-    """About the stylus' own axes: x (the point goes up), y (it goes right), z (a screw that goes in)."""
+    """About the stylus' own axes: x (the point moves up), y (it moves right), z (as a screw going in)."""
     gripper: float = 0.0
     """1 opens, -1 closes."""
     dead_man: bool = False
     jaw: bool = False
 
     def __add__(self, other: Wish) -> Wish:
-        """Return what two sources ask for together."""
+        """Return the sum of the commands of two sources."""
         return Wish(
             _sum(self.linear, other.linear),
             _sum(self.angular, other.angular),
@@ -64,8 +62,12 @@ class VirtualStylus:
     def __init__(
         self, speed: float, turn_speed: float, stands_for: Literal["stylus", "head"] = "stylus"
     ) -> None:
-        """Take the largest velocity (m/s) and angular velocity (rad/s), and whose axes its own frame is to
-        have: a head's are x ahead, y left, z up.
+        """Start at the origin of the base frame.
+
+        Args:
+            speed: largest velocity, m/s.
+            turn_speed: largest angular velocity, rad/s.
+            stands_for: whose axes the moved frame has; a head's are x ahead, y left, z up.
         """
         self._speed, self._turn_speed = speed, turn_speed
         self._axes = np.array([0.0, 0.0, 0.0, 1.0]) if stands_for == "stylus" else rotation.conjugate(_LEVEL)
@@ -75,7 +77,7 @@ class VirtualStylus:
         """From 0, closed, to 1, open."""
 
     def advance(self, wish: Wish, dt: float) -> None:
-        """Move for `dt` seconds as `wish` says."""
+        """Move for `dt` seconds by the command `wish`."""
         own = _limited(wish.angular, self._turn_speed)
         self._linear, self._angular = (
             _limited(wish.linear, self._speed),

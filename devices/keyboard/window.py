@@ -1,4 +1,4 @@
-"""The small window that hears the keys and shows them."""
+"""The small window that reads the keys and shows them."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["Window"]
 _WIDTH, _LINE, _MARGIN, _COLUMN = 440, 24, 16, 80
 _INK, _PAPER, _MARK, _FAINT = (230, 230, 230), (30, 34, 40), (90, 200, 120), (120, 124, 130)
 _UNSEEN = {"offscreen", "dummy"}
-"""Drivers of SDL that show nothing to anybody."""
+"""Drivers of SDL without a screen."""
 
 
 class Window:
-    """Opened, asked and closed in one thread, as some systems demand."""
+    """For one thread only, as some systems demand."""
 
     def __init__(self, title: str) -> None:
-        """Open it.
+        """Open the window.
 
-        Raises DeviceError where there is no screen, or where another device of this process has it.
+        Raises DeviceError without a screen, or if another device of this process has a window.
         """
         if pygame.display.get_init():
             raise DeviceError(
@@ -50,7 +50,7 @@ class Window:
             pygame.display.quit()
             raise
         self.focused = pygame.key.get_focused()
-        """Whether keys are heard at all."""
+        """Whether the window gets the keys."""
         self._pressed: set[str] = set()
         self._draw()
 
@@ -61,26 +61,23 @@ class Window:
             raise DeviceError("there is no screen to open a window on; log in to a desktop on this machine")
 
     def wish(self) -> Wish:
-        """Heed what has happened since the last time, and return what keys and gamepad ask for."""
+        """Handle the events since the last call, and return the command of keys and gamepad."""
         before = self.focused, set(self._pressed)
         for event in pygame.event.get():
-            self._heed(event)
+            self._handle(event)
         if before != (self.focused, self._pressed):
             self._draw()
         return wish_of(self._pressed) + self._gamepad.wish() if self.focused else Wish()
 
-    def _heed(self, event: pygame.Event) -> None:
-        """Follow one event.
-
-        A wish to close the window is not among them: the session decides how long it lives.
-        """
+    def _handle(self, event: pygame.Event) -> None:
+        """Handle one event; a request to close the window is ignored, as the session ends the device."""
         if event.type == pygame.KEYDOWN:
             self._pressed.add(pygame.key.name(event.key))
         elif event.type == pygame.KEYUP:
             self._pressed.discard(pygame.key.name(event.key))
         elif event.type in (pygame.WINDOWFOCUSGAINED, pygame.WINDOWFOCUSLOST):
             self.focused = event.type == pygame.WINDOWFOCUSGAINED
-            self._pressed.clear()  # whoever lets go of a key elsewhere is not heard here
+            self._pressed.clear()  # a release in another window does not arrive here
         elif event.type in (pygame.CONTROLLERDEVICEADDED, pygame.CONTROLLERDEVICEREMOVED):
             self._gamepad.find()
 
@@ -89,7 +86,7 @@ class Window:
         self._write(
             0,
             0,
-            "Keys are heard" if self.focused else "Keys are not heard: click into this window",
+            "Keys are read" if self.focused else "Keys are not read: click into this window",
             _INK if self.focused else _MARK,
         )
         for row, (key, (meaning, _)) in enumerate(KEYS.items(), start=2):
@@ -104,7 +101,7 @@ class Window:
         self._surface.blit(self._font.render(text, True, colour), (_MARGIN + column, _MARGIN + row * _LINE))
 
     def close(self) -> None:
-        """Close it."""
+        """Close the window."""
         self._gamepad.close()
         pygame.font.quit()
         pygame.display.quit()

@@ -1,5 +1,4 @@
-"""The C interface of LibOVR 1.32, as far as a head is concerned: layouts, functions and values of its public
-header, OVR_CAPI.h.
+"""The C interface of LibOVR 1.32: layouts, functions and values of OVR_CAPI.h that a head's pose needs.
 
 The library is part of the Oculus (Meta Quest Link) application of Windows, is loaded from where that has put
 it, and is 64-bit. What the SDK's own loader adds is done here: the flag RequestVersion and the minor version,
@@ -190,8 +189,7 @@ def default_library() -> str:
 
 @cache
 def load(library: str) -> Api:
-    """Return the library at this path, or of this name where the system looks for libraries; a process loads
-    it once.
+    """Return the library at this path, or of this name in the system's search path; a process loads it once.
 
     Raises DeviceError if it cannot be loaded or is another one.
     """
@@ -206,9 +204,7 @@ def load(library: str) -> Api:
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has the library, which, and what mends it where it has not: for `trocar
-    doctor`. Starts nothing.
-    """
+    """Return whether this machine has the library, its version, and the remedy: for `trocar doctor`."""
     remedy = "install the Oculus (Meta Quest Link) application (Windows)"
     try:
         return (

@@ -1,4 +1,4 @@
-"""A headset of Oculus (kind `libovr`): a client that the wearer does not see, and that takes poses only."""
+"""A headset of Oculus (kind `libovr`): a client that is invisible to the wearer and reads poses only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["LibOvr", "LibOvrParams"]
 
 
 class LibOvrParams(HeadsetParams):
-    """Where the library is, and what it is asked for."""
+    """Where the library is, and what is read."""
 
     library: Annotated[
         Path | None,
@@ -47,7 +47,7 @@ class LibOvrParams(HeadsetParams):
 
 
 class LibOvr(Headset):
-    """Asks LibOVR for the newest state of the head."""
+    """Reads the newest state of the head from LibOVR."""
 
     params_model = LibOvrParams
     params: LibOvrParams
@@ -96,19 +96,20 @@ class _Session:
             self._check(
                 api.ovr_SetTrackingOriginType(self._handle, ovr.ORIGINS[params.origin]),
                 "the origin cannot be set",
-                "look at the Oculus application",
+                "check the Oculus application",
             )
         except DeviceError:
             self.close()
             raise
         found = api.ovr_GetHmdDesc(self._handle)
-        self.hardware = f"{found.ProductName.decode(errors='replace')} {found.SerialNumber.decode(errors='replace')}".strip()
+        model, serial = (text.decode(errors="replace") for text in (found.ProductName, found.SerialNumber))
+        self.hardware = f"{model} {serial}".strip()
 
     def locate(self) -> HeadState | NoHead:
         status = ovr.SessionStatus()
         self._check(
             self._api.ovr_GetSessionStatus(self._handle, byref(status)),
-            "the headset is gone",
+            "the headset is lost",
             "plug it in again",
         )
         if status.DisplayLost or status.ShouldQuit:
@@ -116,12 +117,12 @@ class _Session:
         if not status.HmdPresent:
             return NoHead(Level.ERROR, "the headset is unplugged; plug it in again")
         if not status.HmdMounted:
-            return NoHead(Level.WARN, "nobody wears the headset, it sleeps; put it on")
+            return NoHead(Level.WARN, "the headset is not worn and asleep; put it on")
         state = self._api.ovr_GetTrackingState(self._handle, 0.0, 0)  # time 0: the newest
         needed = ovr.ORIENTATION_TRACKED | ovr.POSITION_TRACKED
         if state.StatusFlags & needed != needed:
             return NoHead(
-                Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light"
+                Level.WARN, "the headset is not tracked; stay in sight of the sensors, with enough light"
             )
         if (self._recenter or status.ShouldRecenter) and self._api.ovr_RecenterTrackingOrigin(
             self._handle
@@ -146,7 +147,7 @@ class _Session:
         return HeadState(head.TimeInSeconds, (p.x, p.y, p.z), orientation, (v.x, v.y, v.z), angular)
 
     def _check(self, result: int, what: str, remedy: str) -> None:
-        """Raise DeviceError if `result` is a failure, as all below 0 are, with what the library says of it."""
+        """Raise DeviceError, with the library's reason, if `result` is a failure (below 0)."""
         if result < 0:
             info = ovr.ErrorInfo()
             self._api.ovr_GetLastErrorInfo(byref(info))

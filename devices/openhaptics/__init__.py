@@ -1,3 +1,1 @@
-"""Haptic styluses behind HDAPI, the C interface of OpenHaptics: a process that holds the SDK and the servo
-callback, and the device that watches it.
-"""
+"""Haptic styluses on OpenHaptics: a servo process that holds HDAPI, and the device that supervises it."""

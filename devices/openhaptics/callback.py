@@ -25,12 +25,13 @@ _LAST_FRAME_S = 0.1
 
 
 class Servo:
-    """All styluses of this host behind one callback: HDAPI has one scheduler thread, and a frame makes its
-    device the current one.
+    """All styluses of this host behind one callback.
+
+    HDAPI has one scheduler thread, and a frame makes its device the current one.
     """
 
     def __init__(self, hd: Hdapi, styluses: list[Stylus]) -> None:
-        """Take the styluses that were opened."""
+        """`styluses`: those that were opened."""
         self._hd, self._styluses = hd, styluses
         self._by_handle = {stylus.handle: [stylus] for stylus in styluses}
         self._ending, self._ended = False, threading.Event()
@@ -47,7 +48,7 @@ class Servo:
         self._hd.hdStartScheduler()
 
     def stop(self) -> None:
-        """Give the hands a last frame without force, and the devices back; nothing if it was not started."""
+        """Give the hands a last frame without force, and release the devices, if it was started."""
         hd = self._hd
         self._ending = True
         if self._schedule is None:  # 0 may be a schedule
@@ -58,41 +59,42 @@ class Servo:
         for stylus in self._styluses:
             hd.hdMakeCurrentDevice(stylus.handle)
             hd.hdDisable(FORCE_OUTPUT)
-            # crashes with FireWire devices (sawSensablePhantom): so it is the last that this process does
+            # crashes with FireWire devices (sawSensablePhantom), so it is the last action of this process
             hd.hdDisableDevice(stylus.handle)
 
     def tick(self, now: float) -> int:
-        """Do the frames of all devices at `now` (s); return what HDAPI wants to know: whether to go on."""
+        """Do the frames of all devices at `now` (s); return whether HDAPI shall call again."""
         try:
             if self._ending:
                 self._release(now)
                 self._ended.set()
                 return CALLBACK_DONE
-            complaints = [complaint for stylus in self._styluses for complaint in stylus.frame(now)]
-            for code, handle in complaints + errors(self._hd):
+            device_errors = [device_error for stylus in self._styluses for device_error in stylus.frame(now)]
+            for code, handle in device_errors + errors(self._hd):
                 for stylus in self._by_handle.get(handle, self._styluses):
-                    stylus.note(code, now)
+                    stylus.on_error(code, now)
             for stylus in self._styluses:
-                stylus.tell(now)
+                stylus.write_state(now)
                 self._ending = self._ending or stylus.phase.is_lost
-        except BaseException as error:  # noqa: BLE001 - what leaves a callback of ctypes is lost, and the force would stay
+        # an exception that leaves a ctypes callback is lost, and the force would stay
+        except BaseException as error:  # noqa: BLE001
             self.failure = f"{type(error).__name__}: {error}"
             for stylus in self._styluses:
                 stylus.phase = Phase.FAULT
-            self._release(now)  # those that have had their frame of this tick get theirs at the next one
+            self._release(now)  # styluses that had their frame of this tick get the last one at the next
             self._ending = True
         return CALLBACK_CONTINUE
 
     def _call(self, _: object) -> int:
         if not self._known:
-            # never released: else Python makes and unmakes its state of this thread at every tick
+            # never released: otherwise Python creates and destroys its thread state at every tick
             ctypes.pythonapi.PyGILState_Ensure()
             self._known = True
         return self.tick(perf_counter())
 
     def _release(self, now: float) -> None:
         for stylus in self._styluses:
-            # one that fails here must not keep the others from their last frame
+            # a failure here must not prevent the last frame of the others
             with contextlib.suppress(Exception):
                 stylus.release()
-                stylus.tell(now)
+                stylus.write_state(now)

@@ -19,7 +19,7 @@ from devices.openhaptics.hdapi import find
 from devices.openhaptics.params import StylusParams, TouchParams
 from devices.openhaptics.process import ServoProcess
 from devices.openhaptics.stylus import Phase
-from devices.openhaptics.watch import Lost, Watch
+from devices.openhaptics.supervisor import Lost, Supervisor
 from devices.samples import button_sample, pose_sample, twist_sample
 from hub.participant import Device, Params, Sample, Value
 from robots import rotation
@@ -32,24 +32,23 @@ __all__ = ["Touch"]
 _BUTTONS = 2
 """A Touch has two; HDAPI has room for four."""
 _SETTLING = 1.0
-"""Time without valid frames that is worth a word, s: the first ones after the start never are."""
+"""Time without valid frames after which it is reported, s: the first frames never are valid."""
 
 
 class Touch(Device):
     """The styluses of this machine.
 
     A stylus that is absent, busy, not calibrated or faulty gives no pose, twist or force; its diagnosis says
-    what to do, and it comes back by itself.
+    what to do, and it is used again as soon as it works.
     """
 
     params_model: ClassVar[type[Params]] = TouchParams
     params: TouchParams
 
     def __init__(self, name: str, params: TouchParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._styluses = self._new()
-        self._watch: Watch | None = None
+        self._supervisor: Supervisor | None = None
         self._writing = threading.Lock()
         self._offset_ns = 0
 
@@ -61,37 +60,35 @@ class Touch(Device):
     def open(self, directory: Path) -> None:
         """Start the servo process.
 
-        Raises DeviceError if there is no library, or it cannot be loaded; a stylus that is not there is
-        looked for.
+        Raises DeviceError if there is no library, or it cannot be loaded; a missing stylus is looked for
+        later.
         """
         library = find(None if self.params.library is None else directory / self.params.library)
         self._styluses = self._new()
         self._offset_ns = -(2**63)
-        self._watch = Watch(
+        self._supervisor = Supervisor(
             library, {name: params.spec(name) for name, params in self.params.styluses.items()}, self._opened
         )
-        self._watch.start(perf_counter())
+        self._supervisor.start(perf_counter())
 
     def read(self, t: int) -> list[Sample]:
-        """Return what the styluses did since the last call: every button, the newest pose, twist and force,
-        and what changed about them.
-        """
-        watch = self._watch
-        if watch is None:
+        """Return every button event, the newest pose, twist and force, and changed diagnoses."""
+        supervisor = self._supervisor
+        if supervisor is None:
             return []
         now = perf_counter()
-        # Both clocks go alike, and `t` was read first: the largest difference is the true one, and stamps
-        # never go back.
+        # Both clocks run at the same rate, and `t` was read first: the largest difference is the true one,
+        # and stamps never go back.
         self._offset_ns = max(self._offset_ns, t - round(now * 1e9))
-        states = watch.poll(now)
+        states = supervisor.poll(now)
         return [
             s
             for name, stylus in self._styluses.items()
-            for s in stylus.read(states.get(name, []), watch.lost.get(name), self._offset_ns)
+            for s in stylus.read(states.get(name, []), supervisor.lost.get(name), self._offset_ns)
         ]
 
     def write(self, port: str, value: Value) -> None:
-        """Take a contact model, which is rendered from the next tick on.
+        """Pass on a contact model, which is rendered from the next tick on.
 
         Raises MessageError for another port or type.
         """
@@ -101,7 +98,7 @@ class Touch(Device):
             raise MessageError(
                 f"'{self.name}' takes a ContactModel on {takes}, not {type(value).__name__} on '{port}'"
             )
-        process = None if self._watch is None else self._watch.process
+        process = None if self._supervisor is None else self._supervisor.process
         if process is not None and name in process.models:
             with self._writing:
                 process.models[name].write(
@@ -109,10 +106,10 @@ class Touch(Device):
                 )
 
     def close(self) -> None:
-        """Give the hands a last frame without force, and the devices back."""
-        if self._watch is not None:
-            self._watch.close()
-        self._watch = None
+        """Give the hands a last frame without force, and release the devices."""
+        if self._supervisor is not None:
+            self._supervisor.close()
+        self._supervisor = None
 
     def _new(self) -> dict[str, _Stylus]:
         return {
@@ -125,11 +122,11 @@ class Touch(Device):
 
 
 class _Stylus:
-    """What is told of one stylus."""
+    """The samples of one stylus."""
 
     def __init__(self, participant: str, stylus: str, params: StylusParams, max_age_ns: int) -> None:
         self._name, self._params = stylus, params
-        self._ports = stylus_ports(participant, stylus, clock="wall", max_age_ns=max_age_ns)
+        self._ports = stylus_ports(participant, stylus, simulated_time=False, max_age_ns=max_age_ns)
         self._diagnosis = Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics")
         self.ports = (*self._ports, self._diagnosis.port)
         self._hardware = self._refusal = ""
@@ -139,12 +136,12 @@ class _Stylus:
         self._settling: float | None = None
 
     def opened(self, process: ServoProcess, hardware: str, stated: dict[str, float]) -> None:
-        """Let `process` give force within the scenario's limits, if the device bears them.
+        """Allow `process` to give force within the scenario's limits, unless they exceed the device's.
 
-        What it does not state is that of a Touch.
+        A limit that the device does not state is that of a Touch.
         """
         self._hardware, self._refusal = hardware, ""
-        bears = DeviceLimits(
+        limits = DeviceLimits(
             *(
                 stated[name] if stated[name] > 0.0 else getattr(TOUCH, name)
                 for name in ("force", "stiffness", "damping")
@@ -152,7 +149,7 @@ class _Stylus:
         )
         try:
             process.allow(
-                self._name, self._params.safety.within(bears), passivity=self._params.safety.passivity
+                self._name, self._params.safety.within(limits), passivity=self._params.safety.passivity
             )
         except ScenarioError as error:
             self._refusal = str(error)
@@ -165,7 +162,7 @@ class _Stylus:
                 if lost.found
                 else diagnoses.lost(lost.phase, lost.code, lost.cause, self._params.device)
             )
-            return [*self._gone(), *self._diagnosis.tell(*diagnosis, self._hardware)]
+            return [*self._last_force(), *self._diagnosis.report(*diagnosis, self._hardware)]
         samples: list[Sample] = []
         for state in states:
             samples += self._buttons(state, offset_ns)
@@ -187,9 +184,11 @@ class _Stylus:
         elif self._settling is None:
             self._settling = state.time
         soon = self._settling is not None and state.time - self._settling < _SETTLING
-        told = [] if soon else self._diagnosis.tell(*diagnoses.present(state, self._refusal), self._hardware)
+        diagnosis = (
+            [] if soon else self._diagnosis.report(*diagnoses.present(state, self._refusal), self._hardware)
+        )
         if not phase.has_pose:
-            return [*self._gone(), *told]
+            return [*self._last_force(), *diagnosis]
         self._posed = True
         time_ns = self._time_ns(state, offset_ns)
         x, y, z, w = rotation.from_matrix(np.array(state.rotation).reshape(3, 3)).tolist()
@@ -197,11 +196,11 @@ class _Stylus:
             pose_sample(self._ports.pose, time_ns, state.position, (x, y, z, w)),
             twist_sample(self._ports.twist, time_ns, state.linear, state.angular),
             force_sample(self._ports.force, time_ns, state.force),
-            *told,
+            *diagnosis,
         ]
 
-    def _gone(self) -> list[Sample]:
-        """Return the last force, which is none, when the stylus has just been lost."""
+    def _last_force(self) -> list[Sample]:
+        """Return a force of zero when the stylus has just been lost."""
         if not self._posed:
             return []
         self._posed = False

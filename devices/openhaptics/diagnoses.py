@@ -1,4 +1,4 @@
-"""What is the case with a stylus, and what to do about it, for people."""
+"""Diagnoses of a stylus, for people: the condition, and what to do about it."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _CALIBRATE: Mapping[int, str] = {
 _CONDITIONS = tuple(Condition)
 
 
-FOUND = Level.WARN, "it is back, and is taken up as soon as no other hand of this host holds its dead-man"
+FOUND = Level.WARN, "it is back, and is used as soon as no other hand of this host holds its dead-man"
 
 
 def lost(phase: Phase, code: int, cause: str, device: str | None) -> tuple[Level, str]:
-    """Return the diagnosis of a stylus that cannot be had; `cause` is what is known beside the error's code."""
+    """Return the diagnosis of a stylus that is lost; `cause` is what is known beside the error's code."""
     why = cause or (Code.text(code) if code else "no cause is known")
     if phase is Phase.ABSENT:
         known = (
@@ -46,9 +46,7 @@ def lost(phase: Phase, code: int, cause: str, device: str | None) -> tuple[Level
 
 
 def present(state: State, refusal: str) -> tuple[Level, str]:
-    """Return the diagnosis of a stylus that is open; `refusal` says why its limits were refused, if they
-    were.
-    """
+    """Return the diagnosis of an open stylus; `refusal`: why its limits were refused, or empty."""
     phase = Phase(state.phase)
     if phase is Phase.SETTLING:
         return Level.STALE, "it gives no valid frames; if that lasts, switch it off and on"

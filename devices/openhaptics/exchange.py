@@ -1,10 +1,9 @@
-"""What a servo process and the device that started it tell each other: records of doubles in shared memory
-that no process can hold up.
+"""Records of doubles in shared memory between a servo process and its device, without locks.
 
-Each way is a ring with one writer and one reader. A slot carries its number and a checksum over number and
-content, so a record that is being overwritten is recognised, on any processor, and a writer that dies
+Each direction is a ring with one writer and one reader. A slot has its number and a checksum over number
+and content, so a record that is being overwritten is recognised, on any processor, and a writer that ends
 half-way leaves the slots before intact: neither side ever waits. The memory has no name that could outlive
-its users: on Linux the reading process inherits the file, on Windows it goes with the last handle.
+its users: on Linux the reading process inherits the file, on Windows it ends with the last handle.
 """
 
 from __future__ import annotations
@@ -39,10 +38,8 @@ _HEAD = struct.Struct("<QI4x")
 _COUNTER = 8
 
 MODEL_SLOTS, STATE_SLOTS = 2, 64
-"""Of models the newest counts.
-
-Of states none should be missed by a reader that stands still for some hundredths of a second: buttons are in
-them.
+"""Only the newest model counts. Of the states, which contain the buttons, none is lost for a reader that
+pauses for some hundredths of a second.
 """
 MOST_PLANES = 4
 MODEL_DOUBLES = 3 + MOST_PLANES * len(Plane._fields)
@@ -72,9 +69,7 @@ class State(NamedTuple):
     phase: int
     """A `devices.openhaptics.stylus.Phase`."""
     code: int
-    """Of HDAPI: the error that goes with the phase, the calibration style while that is what is missing, or
-    0.
-    """
+    """Of HDAPI: the error of the phase, the calibration style of an uncalibrated stylus, or 0."""
     buttons: int
     """Bit 0 is the first."""
     permitted: int
@@ -137,9 +132,7 @@ class RingReader(_Ring):
     _seen = 0
 
     def read(self) -> list[tuple[float, ...]]:
-        """Return the records that were written since the last call, oldest first, without those that are
-        overwritten by now.
-        """
+        """Return the records since the last call, oldest first, without those overwritten by now."""
         newest = self._newest[0]
         if newest == self._seen:
             return []
@@ -164,15 +157,13 @@ STYLUS_BYTES = ring_size(MODEL_SLOTS, MODEL_DOUBLES) + ring_size(STATE_SLOTS, ST
 
 
 def servo_ends(memory: memoryview, index: int) -> tuple[RingReader, RingWriter]:
-    """Return where the servo process reads the contact models of stylus `index`, and where it writes its
-    states.
-    """
+    """Return the servo process' ends for stylus `index`: reader of contact models, writer of states."""
     models, states = _parts(memory, index)
     return RingReader(models, MODEL_SLOTS, MODEL_DOUBLES), RingWriter(states, STATE_SLOTS, STATE_DOUBLES)
 
 
 def device_ends(memory: memoryview, index: int) -> tuple[RingWriter, RingReader]:
-    """Return the other ends: where the device writes contact models, and where it reads states."""
+    """Return the device's ends: writer of contact models, reader of states."""
     models, states = _parts(memory, index)
     return RingWriter(models, MODEL_SLOTS, MODEL_DOUBLES), RingReader(states, STATE_SLOTS, STATE_DOUBLES)
 
@@ -184,8 +175,9 @@ def _parts(memory: memoryview, index: int) -> tuple[memoryview, memoryview]:
 
 
 def create(size: int) -> tuple[mmap.mmap, int | str]:
-    """Return new shared memory, and what `attach` needs in a process that inherits it: a file descriptor,
-    which is to be closed, or on Windows a name.
+    """Return new shared memory, and the handle for `attach` in a process that inherits it.
+
+    The handle is a file descriptor, which the caller closes, or on Windows a name.
     """
     if sys.platform == "win32":
         name = f"trocar-{uuid.uuid4()}"

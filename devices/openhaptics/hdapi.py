@@ -1,9 +1,9 @@
-"""HDAPI, the C interface of 3D Systems' OpenHaptics 3, as far as a stylus is concerned: functions, values and
-errors of its public reference.
+"""HDAPI, the C interface of 3D Systems' OpenHaptics 3: functions, values and errors that a stylus needs.
 
-The library is proprietary, comes with the driver or the SDK, and is loaded from where these have put it. It
-takes a program of its own word size: the driver's hd.dll is 64-bit. A library that was unloaded does not load
-again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and a new process is how to recover.
+They are from its public reference. The library is proprietary, comes with the driver or the SDK, and is
+loaded from where these install it. It needs a program of its own word size: the driver's hd.dll is 64-bit.
+A library that was unloaded does not load again (CHAI3D, CPhantomDevices.cpp): a process loads it once, and
+a new process is how to recover.
 """
 
 from __future__ import annotations
@@ -85,9 +85,7 @@ class Calibration(IntEnum):
 
 
 class Style(IntEnum):
-    """Bits of HD_CALIBRATION_STYLE, those to be preferred first: a Premium that offers two refuses the
-    encoder reset.
-    """
+    """Bits of HD_CALIBRATION_STYLE, by preference: a Premium that offers two refuses the encoder reset."""
 
     AUTO = 2
     INKWELL = 4
@@ -178,10 +176,10 @@ Linux.
 """
 
 _SWITCHES = "hdGetBooleanv"
-"""Only a dead-man that is a switch needs it."""
+"""Needed only for a dead-man that is a switch."""
 
 _MOST_ERRORS = 64
-"""That are taken at a time: a callback may not go on for ever."""
+"""Taken at a time, to bound the duration of a callback."""
 
 Hdapi = Any
 """The loaded library: its functions by name, with their types set."""
@@ -199,14 +197,12 @@ def find(library: Path | None) -> Path:
     looked = ", ".join(f"'{place}'" for place in places)
     raise DeviceError(
         f"no library of OpenHaptics at {looked}. Install the Touch device driver and OpenHaptics of 3D"
-        " Systems, or say 'library: PATH'"
+        " Systems, or set 'library: PATH'"
     )
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has the library, where, and what mends it where it has not: for `trocar
-    doctor`. Loads nothing.
-    """
+    """Return whether this machine has the library, where, and the remedy, for `trocar doctor`."""
     remedy = "install the Touch device driver and OpenHaptics of 3D Systems"
     try:
         return True, f"{find(None)}: haptic styluses of 3D Systems", remedy

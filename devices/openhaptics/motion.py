@@ -1,4 +1,4 @@
-"""From what HDAPI says of a stylus to the motion of its tip, in the base frame of REP 103."""
+"""The motion of a stylus' tip in the base frame of REP 103, from transform and velocity of HDAPI."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ _SMOOTHING = 0.01
 hand turns no faster than some Hz.
 """
 _UNIT = 0.1
-"""How far the length of an axis may be from 1, squared: HDAPI's rotations have small errors, what is no
-rotation has great ones.
+"""How far the squared length of an axis may be from 1: HDAPI's rotations have small errors, other matrices
+large ones.
 """
 
 
 class Tip:
-    """Where the tip of a stylus is.
+    """Pose and twist of a stylus' tip.
 
     Its own frame has z out of the point, x to the right and y down when it points level away from the user.
     """
 
     def __init__(self, offset: float) -> None:
-        """Take the way (m) from the centre of the gimbal, of which HDAPI speaks, to the tip."""
+        """`offset`: from the centre of the gimbal, whose pose HDAPI gives, to the tip, m."""
         self._offset = offset
         self._time = -inf
         self.position: Vector3 = ZERO
@@ -40,8 +40,12 @@ class Tip:
         """rad/s."""
 
     def move(self, t: Sequence[float], velocity: Sequence[float], now: float) -> bool:
-        """Take transform (16 numbers, column after column, mm) and velocity (mm/s) of HDAPI at `now` (s);
-        return False if they are no pose.
+        """Update the motion; return False if the transform is no pose.
+
+        Args:
+            t: transform of HDAPI, 16 numbers, column after column, mm.
+            velocity: of HDAPI, mm/s.
+            now: time of the frame, s.
         """
         # HDAPI's z is towards the user: out of the blunt end
         axes = vector(t[0], t[1], t[2]), vector(-t[4], -t[5], -t[6]), vector(-t[8], -t[9], -t[10])
@@ -61,11 +65,11 @@ class Tip:
         return True
 
     def _turn(self, axes: tuple[Vector3, Vector3, Vector3], now: float) -> Vector3:
-        """Return the smoothed angular velocity: the sum of axis x axis' over the three axes of a turning
-        frame is 2 sin(angle) along the axis of the turn.
+        """Return the smoothed angular velocity.
 
-        HDAPI has one, but in which frame is not said, and a driver in use (Touch, ROS) notes that it does not
-        work well.
+        The sum of axis x axis' over the three axes of a rotating frame is 2 sin(angle) along the axis of
+        rotation. HDAPI has an angular velocity, but does not document its frame, and a driver in use
+        (Touch, ROS) notes that it does not work well.
         """
         dt, self._time = now - self._time, now
         if not 0.0 < dt < inf:

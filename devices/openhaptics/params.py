@@ -1,4 +1,4 @@
-"""What a scenario says of the haptic styluses of one host."""
+"""Parameters of the haptic styluses of one host."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from schemas.quantity import Duration, Length
 
 __all__ = ["StylusParams", "TouchParams"]
 
-_DEAD_MAN = "what is to be held for force: the index of a button, or the safety switch of the stylus"
+_DEAD_MAN = "what must be held for force: the index of a button, or the safety switch of the stylus"
 
 
 class StylusParams(Params):
@@ -36,7 +36,7 @@ class StylusParams(Params):
     safety: SafetyParams = SafetyParams()
 
     def spec(self, name: str) -> Spec:
-        """Return what the servo process is told."""
+        """Return the stylus as the servo process gets it."""
         return Spec(name, self.device, self.dead_man, self.tip_offset)
 
 
@@ -67,7 +67,7 @@ class TouchParams(Params):
             if other != name:
                 what = "the default device" if stylus.device is None else f"'{stylus.device}'"
                 raise ValueError(
-                    f"'{other}' and '{name}' are both {what}; give each a 'device', the name that the"
-                    " vendor's setup program has for it"
+                    f"'{other}' and '{name}' are both {what}; give each a 'device', its name in the vendor's"
+                    " setup program"
                 )
         return self

@@ -1,7 +1,4 @@
-"""A second servo process, which finds out whether styluses that were lost can be had again.
-
-It gives no force.
-"""
+"""A second servo process, which finds out whether lost styluses are available again. It gives no force."""
 
 from __future__ import annotations
 
@@ -19,23 +16,24 @@ _LOOKING, _ENDING = 10.0, 1.0
 
 
 class Finding(NamedTuple):
-    """How a stylus fares."""
+    """The condition of a stylus."""
 
     phase: Phase
     code: int
 
 
 class Probe:
-    """One try."""
+    """One attempt."""
 
     def __init__(self, process: ServoProcess, now: float) -> None:
-        """Take a process that was started at `now` (s)."""
+        """`process` was started at `now` (s)."""
         self._process, self._until = process, now + _LOOKING
         self._found: dict[str, Finding] = {}
 
     def poll(self, now: float) -> dict[str, Finding | None] | None:
-        """Return what was found of each stylus, once all is known, or time is up, and the process has let go
-        of them; before that None.
+        """Return the findings, once the process has released the styluses; None before.
+
+        A stylus without finding after the time limit has None.
         """
         process = self._process
         for message in process.said():
@@ -56,10 +54,10 @@ class Probe:
         return {name: self._found.get(name) for name in process.names}
 
     def close(self) -> None:
-        """End the try."""
+        """End the attempt."""
         self._process.close()
 
 
 def absence(code: int) -> Finding:
-    """Return what it means that a stylus could not be opened, with this error."""
+    """Return the condition of a stylus that could not be opened, by the error's code."""
     return Finding(Phase.BUSY if Code.is_busy(code) else Phase.ABSENT, code)

@@ -1,6 +1,6 @@
-"""A servo process as the device sees it: started, told, listened to, ended.
+"""The servo process, from the device's side: start it, send to it, receive from it, end it.
 
-Nothing here waits for it but `close`.
+Only `close` waits for it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from devices.openhaptics.stylus import Spec
 __all__ = ["ServoProcess"]
 
 _ENVIRONMENT: dict[str, str] = {} if sys.platform == "win32" else {"GTDD_HOME": "/usr/share/3DSystems"}
-"""The Linux driver wants to be told where it keeps configuration and calibration of its devices (TouchDriver
+"""The Linux driver needs to know the directory of its devices' configuration and calibration (TouchDriver
 2019.2.15).
 """
 _PATIENCE_S = 1.0
@@ -34,7 +34,7 @@ class ServoProcess:
     """A process with the devices of `specs`, from its start on."""
 
     def __init__(self, library: Path, specs: Sequence[Spec]) -> None:
-        """Start it; raises OSError if the system has no process left."""
+        """Start it. Raises OSError if the system has no process left."""
         self.names = tuple(spec.name for spec in specs)
         size = STYLUS_BYTES * len(specs)
         shared, handle = create(size)
@@ -67,7 +67,7 @@ class ServoProcess:
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """Its process id."""
         return self._process.pid
 
     @property
@@ -76,7 +76,7 @@ class ServoProcess:
         return self._process.poll() is None
 
     def said(self, timeout_s: float = 0.0) -> list[dict[str, Any]]:
-        """Return what it has said since the last call; wait up to `timeout_s` for something."""
+        """Return its messages since the last call; wait up to `timeout_s` for the first."""
         found: list[dict[str, Any]] = []
         with contextlib.suppress(Empty):
             if timeout_s:
@@ -86,17 +86,17 @@ class ServoProcess:
         return found
 
     def allow(self, stylus: str, limits: Limits, *, passivity: bool) -> None:
-        """Let force be given to the hand at `stylus`."""
+        """Allow force on the hand at `stylus`, within `limits`."""
         self._send({"stylus": stylus, "limits": asdict(limits), "passivity": passivity})
 
     def end(self) -> None:
-        """Tell it to give a last frame without force and to end."""
+        """Make it give a last frame without force and end."""
         with contextlib.suppress(OSError):
             assert self._process.stdin
             self._process.stdin.close()
 
     def kill(self) -> None:
-        """End it, whatever it does. The force ends with it only as far as the driver sees to that."""
+        """End it at once. Whether the force ends with it depends on the driver."""
         self._process.kill()
 
     def close(self) -> None:
@@ -111,9 +111,9 @@ class ServoProcess:
 
     def _send(self, message: dict[str, Any]) -> None:
         assert self._process.stdin
-        if self._process.stdin.closed:  # it was told to end
+        if self._process.stdin.closed:  # it was requested to end
             return
-        with contextlib.suppress(OSError):  # it is gone: `is_alive` says so
+        with contextlib.suppress(OSError):  # it has ended: `is_alive` is False
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()
 

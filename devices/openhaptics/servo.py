@@ -1,9 +1,8 @@
-"""The servo process: it holds HDAPI and the servo callback, and nothing else. `devices.openhaptics.process`
-starts it.
+"""The servo process: HDAPI and the servo callback, and nothing else.
 
-One line of JSON on its standard input says what to open; a second one, per stylus, within which limits force
-may be given. The end of the input is the end of the process: it comes when the device closes it, and when the
-device dies. Then the hand is given one last frame, without force.
+devices.openhaptics.process starts it. One line of JSON on its standard input lists what to open; a second
+one, per stylus, the limits of the force. The process ends with its input, which happens when the device
+closes it and when the device's process ends. Then the hand gets one last frame, without force.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from schemas.errors import DeviceError
 __all__ = ["main"]
 
 _FIFO_PRIORITY = 20
-"""Above all that is not real-time, below the kernel's interrupt threads (50)."""
+"""Above everything that is not real-time, below the kernel's interrupt threads (50)."""
 _HIGH_PRIORITY_CLASS = 0x80
 
 Say = Callable[[Mapping[str, Any]], None]
@@ -39,7 +38,7 @@ Say = Callable[[Mapping[str, Any]], None]
 def _opened(
     hd: Hdapi, config: Mapping[str, Any], memory: memoryview, say: Say
 ) -> Iterator[tuple[str, Stylus]]:
-    """Open the devices; tell of each what it is and bears, or why it cannot be had."""
+    """Open the devices; report model and limits of each, or why it is not available."""
     for index, values in enumerate(config["styluses"]):
         spec = Spec(**values)
         models, states = servo_ends(memory, index)
@@ -69,7 +68,7 @@ def _number(hd: Hdapi, what: int) -> float:
 
 
 def _raise_priority() -> str:
-    """Let this process come first, where the system allows it; return what was reached."""
+    """Raise the priority of this process as far as the system allows; return what was reached."""
     if sys.platform == "win32":
         kernel = ctypes.windll.kernel32
         kernel.GetCurrentProcess.restype = ctypes.c_void_p
@@ -83,9 +82,10 @@ def _raise_priority() -> str:
     return "normal"
 
 
-def _voice() -> Say:
-    """Return what writes a message to the device; the standard output is a library's to write to, and goes
-    where errors go.
+def _output() -> Say:
+    """Return a function that sends a message to the device.
+
+    Libraries may write to the standard output, which is redirected to the standard error.
     """
     stream = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
@@ -103,7 +103,7 @@ def _terminate(_signal: int, _frame: object) -> NoReturn:
 def main() -> NoReturn:
     """Serve until the input ends."""
     signal.signal(signal.SIGTERM, _terminate)
-    say = _voice()
+    say = _output()
     config = json.loads(sys.stdin.readline())
     memory = memoryview(attach(config["memory"], STYLUS_BYTES * len(config["styluses"])))
     try:

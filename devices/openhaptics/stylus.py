@@ -1,5 +1,6 @@
-"""One stylus inside the servo callback: its frames, calibration, errors and force. Runs a thousand times a
-second: plain floats, one clock.
+"""One stylus inside the servo callback: frames, calibration, errors and force.
+
+It runs a thousand times a second: plain floats, one clock.
 """
 
 from __future__ import annotations
@@ -36,16 +37,16 @@ _WARNING = 1.0
 
 
 class Phase(IntEnum):
-    """How a stylus fares."""
+    """The condition of a stylus."""
 
     ABSENT = 0
     """It could not be opened."""
     SETTLING = 1
-    """It has given no frames yet, or no valid ones."""
+    """It has given no valid frames yet."""
     UNCALIBRATED = 2
     READY = 3
     WARNED = 4
-    """It has a pose, and no force: HDAPI complained within the last second."""
+    """It has a pose, and no force: HDAPI has reported an error within the last second."""
     BUSY = 5
     """Another program has it."""
     FAULT = 6
@@ -53,24 +54,24 @@ class Phase(IntEnum):
 
     @property
     def is_lost(self) -> bool:
-        """Whether this process will not get the stylus any more: a new one has to try."""
+        """Whether this process cannot use the stylus any more: only a new one can."""
         return self in _LOST
 
     @property
     def has_pose(self) -> bool:
-        """Whether the stylus is where its states say."""
+        """Whether the pose in its states is valid."""
         return self in _POSED
 
 
 _LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
 _POSED = {Phase.READY, Phase.WARNED}
 _READY, _SETTLING, _CALIBRATED = Phase.READY, Phase.SETTLING, Calibration.OK.value
-"""As plain names: Python 3.11 looks a planned of an enumeration up in a quarter of a microsecond."""
+"""As plain names: Python 3.11 takes 0.25 us to look up a member of an enumeration."""
 
 
 @dataclass(frozen=True)
 class Spec:
-    """What the servo process is told of a stylus."""
+    """A stylus as the servo process gets it."""
 
     name: str
     device: str | None
@@ -78,14 +79,14 @@ class Spec:
     dead_man: int | str
     """Index of a button, or `safety-switch`.
 
-    Not the inkwell's switch: a stylus that was dropped is out of it, too.
+    Not the inkwell's switch: a dropped stylus is out of it, too.
     """
     tip_offset: float
     """From the centre of the gimbal to the tip, m."""
 
 
 class Stylus:
-    """A device of HDAPI that was opened. Its methods are for the servo callback, but for `allow`."""
+    """An open device of HDAPI. All methods but `allow` are for the servo callback."""
 
     def __init__(self, hd: Hdapi, handle: int, spec: Spec, models: RingReader, states: RingWriter) -> None:
         """Start without force; there is none before `allow`."""
@@ -96,7 +97,7 @@ class Stylus:
         self._loop: HapticLoop | None = None
         self._code = self._style = 0
         self._calibrated = False
-        self._clean = self._pretending = 0
+        self._clean = self._placeholders = 0
         self._permitted = False
         self._warned = -inf
         self._transform, self._velocity, self._force = (c_double * 16)(), (c_double * 3)(), (c_double * 3)()
@@ -104,12 +105,13 @@ class Stylus:
         self._buttons, self._switch, self._styles = c_int(), c_ubyte(), c_int()
 
     def allow(self, limits: Limits, *, passivity: bool) -> None:
-        """Let force be given, within `limits`."""
+        """Allow force within `limits`."""
         self._loop = HapticLoop(limits, passivity=passivity)
 
     def frame(self, now: float) -> list[tuple[int, int]]:
-        """Do one frame, which begins at `now` (s of time.perf_counter); return those errors (code, handle) of
-        this tick that HDAPI no longer has.
+        """Do one frame, which begins at `now` (s of time.perf_counter).
+
+        Returns those errors (code, handle) of this tick that are no longer on HDAPI's stack.
         """
         hd = self._hd
         hd.hdBeginFrame(self.handle)
@@ -118,17 +120,17 @@ class Stylus:
         hd.hdGetIntegerv(Get.BUTTONS, self._buttons)
         self._permitted = self._dead_man()
         moved = self._tip.move(self._transform[:], self._velocity[:], now)
-        complaints = self._look()
+        device_errors = self._calibrate()
         self._judge(now, valid=moved)
         self._send(self._render(now))
-        return complaints
+        return device_errors
 
-    def note(self, code: int, now: float) -> None:
-        """Take note of an error that HDAPI has on its stack after the frame at `now`.
+    def on_error(self, code: int, now: float) -> None:
+        """Handle an error that is on HDAPI's stack after the frame at `now`.
 
-        Only a fault of the device (0x3xx) ends its use. Any other takes the force away, and lets it come
-        back: a warning is meant so (0x2xx), and after a complaint about the frame nobody knows what force was
-        sent. A stylus that is not calibrated has none to take away.
+        Only a fault of the device (0x3xx) ends its use. Any other switches the force off for a time: a
+        warning (0x2xx) is meant so, and after an error of the frame it is unknown which force was sent. A
+        stylus that is not calibrated has no force.
         """
         if Code.is_busy(code):
             self.phase, self._code = Phase.BUSY, code
@@ -137,7 +139,7 @@ class Stylus:
         elif self._calibrated:
             self._warned, self._code = now, code
 
-    def tell(self, now: float) -> None:
+    def write_state(self, now: float) -> None:
         """Write the state of the frame at `now`."""
         tip, loop = self._tip, self._loop
         force, cause = (loop.force, _CAUSES[loop.condition]) if loop is not None else (ZERO, _OFF)
@@ -158,9 +160,10 @@ class Stylus:
         self._hd.hdGetBooleanv(Get.SAFETY_SWITCH, self._switch)
         return bool(self._switch.value)
 
-    def _look(self) -> list[tuple[int, int]]:
-        """Look at the calibration, and update it where that can be done; return what HDAPI complained of
-        before. Force output is on only while it stands.
+    def _calibrate(self) -> list[tuple[int, int]]:
+        """Check the calibration, and update it where possible; return the errors of HDAPI from before.
+
+        Force output is enabled only while the stylus is calibrated.
         """
         hd = self._hd
         calibration = hd.hdCheckCalibration()
@@ -170,14 +173,14 @@ class Stylus:
         if self._calibrated:
             return []
         self._style = self._style or self._best_style()
-        # where a person has to put it, the person says so
+        # where a person has to put the stylus in place, a button confirms it
         in_place = self._style != Style.ENCODER_RESET or self._buttons.value
         if not (calibration == Calibration.NEEDS_UPDATE and in_place):
             return []
-        complaints = errors(hd)  # also of the styluses whose frames came before
+        device_errors = errors(hd)  # also of styluses whose frames were earlier
         hd.hdUpdateCalibration(self._style)
-        # the others say that the device does not want it now
-        return complaints + [error for error in errors(hd) if Code.is_fault(error[0])]
+        # other errors mean that the device cannot be calibrated now
+        return device_errors + [error for error in errors(hd) if Code.is_fault(error[0])]
 
     def _best_style(self) -> int:
         self._hd.hdGetIntegerv(Get.CALIBRATION_STYLE, self._styles)
@@ -187,10 +190,10 @@ class Stylus:
         phase = self.phase
         if phase.is_lost:
             return
-        pretends = self._pretends()
-        self._pretending = self._pretending + 1 if pretends else 0
-        self._clean = self._clean + 1 if valid and not pretends else 0
-        if self._pretending >= _CLEAN_FRAMES:
+        placeholder = self._is_placeholder()
+        self._placeholders = self._placeholders + 1 if placeholder else 0
+        self._clean = self._clean + 1 if valid and not placeholder else 0
+        if self._placeholders >= _CLEAN_FRAMES:
             self.phase, self._code = Phase.BUSY, 0
         elif self._clean < _CLEAN_FRAMES:
             self.phase = _SETTLING
@@ -201,8 +204,8 @@ class Stylus:
         elif phase is not _READY:
             self.phase, self._code = _READY, 0
 
-    def _pretends(self) -> bool:
-        """Say whether this is what a process is shown that does not own the device."""
+    def _is_placeholder(self) -> bool:
+        """Return whether the frame is the one for a process that does not own the device."""
         if tuple(self._transform[12:15]) != PLACEHOLDER_MM:
             return False
         self._hd.hdGetDoublev(Get.JOINT_ANGLES, self._joints)

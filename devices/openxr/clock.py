@@ -1,5 +1,6 @@
-"""The runtime's time: OpenXR tells it only by converting a clock of the operating system, by an extension of
-its own for each.
+"""The runtime's time, which OpenXR gives only by converting a clock of the operating system.
+
+Each operating system has an extension of its own for that.
 """
 
 from __future__ import annotations
@@ -34,9 +35,7 @@ class _Timespec(ctypes.Structure):
 
 
 def _now() -> Any:
-    """Return what the system's function gives: a count of the performance counter, or a timespec of the
-    monotonic clock.
-    """
+    """Return the system's clock: a count of the performance counter, or a timespec of the monotonic clock."""
     if sys.platform == "win32":
         count = c_int64()
         ctypes.windll.kernel32.QueryPerformanceCounter(byref(count))
@@ -45,12 +44,10 @@ def _now() -> Any:
 
 
 def runtime_clock(instance: xr.Instance) -> Callable[[], int]:
-    """Return a function that tells the time now as an XrTime, ns.
+    """Return a function that returns the present time as an XrTime, ns.
 
-    The instance must have been made with `EXTENSION`.
-
-    The function raises TimeInvalidError where the runtime does not know the time yet, and DeviceError where
-    it fails.
+    The instance must have been created with `EXTENSION`. The function raises TimeInvalidError if the
+    runtime does not know the time yet, and DeviceError if it fails.
     """
     prototype = CFUNCTYPE(c_int32, c_void_p, c_void_p, POINTER(c_int64))
     convert = prototype(cast(xr.get_instance_proc_addr(instance, _FUNCTION), c_void_p).value or 0)
@@ -62,9 +59,7 @@ def runtime_clock(instance: xr.Instance) -> Callable[[], int]:
         if result == _TIME_INVALID or (not result and found.value <= 0):
             raise xr.TimeInvalidError
         if result:
-            raise DeviceError(
-                f"the OpenXR runtime does not tell the time ({_FUNCTION} returned {result}); restart it"
-            )
+            raise DeviceError(f"the OpenXR runtime gives no time ({_FUNCTION} returned {result}); restart it")
         return found.value
 
     return now

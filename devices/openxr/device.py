@@ -16,7 +16,7 @@ __all__ = ["OpenXr", "OpenXrParams", "check"]
 
 
 class OpenXrParams(HeadsetParams):
-    """What the runtime is asked for; which runtime it is, the system says (on Linux also XR_RUNTIME_JSON)."""
+    """What is read; the system chooses the runtime (on Linux also XR_RUNTIME_JSON)."""
 
     origin: Annotated[
         Literal["eye", "floor"],
@@ -25,17 +25,17 @@ class OpenXrParams(HeadsetParams):
 
 
 class OpenXr(Headset):
-    """Asks the OpenXR runtime where the head is now."""
+    """Reads the present pose of the head from the OpenXR runtime."""
 
     params_model = OpenXrParams
     params: OpenXrParams
 
     def open(self, directory: Path) -> None:
-        """Begin anew. Raises MissingExtraError where pyopenxr is not installed."""
+        """Start. Raises MissingExtraError if pyopenxr is not installed."""
         super().open(directory)
         if find_spec("xr") is None:
             raise MissingExtraError(f"participant '{self.name}' (kind openxr)", "openxr", "pyopenxr")
-        _hush()
+        _silence_loader()
 
     def connect(self) -> Runtime:
         """Connect to the runtime. Raises DeviceError where there is none."""
@@ -44,20 +44,18 @@ class OpenXr(Headset):
         return OpenXrRuntime(self.params.origin)
 
 
-def _hush() -> None:
-    """Keep the loader from printing at every try what the diagnosis says once."""
+def _silence_loader() -> None:
+    """Keep the loader from printing at every attempt what the diagnosis reports once."""
     os.environ.setdefault("XR_LOADER_DEBUG", "none")
 
 
 def check() -> tuple[bool, str, str]:
-    """Return whether this machine has a runtime that can be used, what was found, and what mends it: for
-    `trocar doctor`. Starts nothing.
-    """
+    """Return whether this machine has a usable runtime, which, and the remedy, for `trocar doctor`."""
     if find_spec("xr") is None:
         return False, "pyopenxr is not installed", "pip install 'trocar[openxr]'"
     from devices.openxr.runtime import lacking, offered
 
-    _hush()
+    _silence_loader()
     remedy = "install SteamVR or Monado, and make it the system's active OpenXR runtime"
     try:
         problem = lacking(offered())

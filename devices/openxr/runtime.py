@@ -1,6 +1,4 @@
-"""One session with an OpenXR runtime, without pictures: its states, the user's presence, and where the head
-is.
-"""
+"""One session with an OpenXR runtime, without pictures: states, user presence, and the head's pose."""
 
 from __future__ import annotations
 
@@ -19,9 +17,7 @@ from schemas.errors import DeviceError
 __all__ = ["ORIGINS", "OpenXrRuntime", "lacking", "offered"]
 
 HEADLESS, PRESENCE = "XR_MND_headless", "XR_EXT_user_presence"
-"""A session without graphics, which is needed; being told whether somebody wears the headset, which is
-welcome.
-"""
+"""A session without graphics, which is required; events about whether the headset is worn, optional."""
 ORIGINS = {"eye": xr.ReferenceSpaceType.LOCAL, "floor": xr.ReferenceSpaceType.STAGE}
 _VALID = xr.SpaceLocationFlags.ORIENTATION_VALID_BIT | xr.SpaceLocationFlags.POSITION_VALID_BIT
 """Not those that say `tracked`: some runtimes, among them those of simulated headsets, never set that of the
@@ -44,11 +40,11 @@ def offered() -> set[str]:
 
 
 def lacking(found: set[str]) -> str:
-    """Return what is wrong with a runtime that offers `found`; nothing if it can be asked for a head."""
+    """Return what is missing of a runtime that offers `found`; empty if it can give the head's pose."""
     missing = [name for name in (HEADLESS, clock.EXTENSION) if name not in found]
     return (
-        f"this OpenXR runtime does not offer {' and '.join(missing)}, without which a head cannot be asked"
-        " for; take one that does, such as SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
+        f"this OpenXR runtime does not offer {' and '.join(missing)}, without which it cannot give a"
+        " head's pose; use one that does, such as SteamVR or Monado, or kind 'libovr' for a headset of Oculus"
         if missing
         else ""
     )
@@ -60,7 +56,7 @@ class OpenXrRuntime:
     def __init__(self, origin: str) -> None:
         """Connect to the runtime that the system has chosen.
 
-        Raises DeviceError where there is none, or no headset.
+        Raises DeviceError if there is none, or no headset.
         """
         self._session: xr.Session | None = None
         self._instance = self._make_instance()
@@ -83,8 +79,8 @@ class OpenXrRuntime:
         except xr.exception.XrException as error:
             self.close()
             raise DeviceError(
-                f"there is no headset, or the OpenXR runtime refuses a session ({_said(error)}); plug it in"
-                " and look at the runtime"
+                f"there is no headset, or the OpenXR runtime refuses a session ({_described(error)}); plug it"
+                " in and check the runtime"
             ) from error
         except DeviceError:
             self.close()
@@ -106,25 +102,27 @@ class OpenXrRuntime:
             return xr.create_instance(
                 xr.InstanceCreateInfo(application_info=about, enabled_extension_names=enabled)
             )
-        except xr.exception.XrException as error:  # also if it lacks something: only a failure makes the loader look for the active runtime anew
+        # missing extensions are checked after the failure, because only a failure makes the loader look for
+        # the active runtime again
+        except xr.exception.XrException as error:
             raise DeviceError(lacking(found)) if lacking(found) else _unanswered(error) from error
 
     def locate(self) -> HeadState | NoHead:
-        """Return where the head is now. Raises DeviceError where the runtime or the session is gone."""
+        """Return the head's present state. Raises DeviceError if the runtime or the session is lost."""
         try:
-            self._heed_events()
+            self._handle_events()
             if not self._running:
                 return NoHead(
                     Level.WARN, "the OpenXR runtime has put the session to sleep; put the headset on"
                 )
             if not self._present:
-                return NoHead(Level.WARN, "nobody wears the headset; put it on")
+                return NoHead(Level.WARN, "the headset is not worn; put it on")
             return self._located(self._now())
         except xr.TimeInvalidError:  # SteamVR, at the start (cmbruns/pyopenxr_examples, issue 12)
-            return NoHead(Level.WARN, "the OpenXR runtime does not tell the time yet; wait, or restart it")
+            return NoHead(Level.WARN, "the OpenXR runtime gives no time yet; wait, or restart it")
         except xr.exception.XrException as error:
             raise DeviceError(
-                f"the OpenXR runtime or the headset is gone ({_said(error)}); start it, plug it in"
+                f"the OpenXR runtime or the headset is lost ({_described(error)}); start it, plug it in"
             ) from error
 
     def _located(self, now: int) -> HeadState | NoHead:
@@ -135,7 +133,7 @@ class OpenXrRuntime:
             raise result
         if location.location_flags & _VALID != _VALID:
             return NoHead(
-                Level.WARN, "the headset is not tracked; stay in sight of the sensors and let there be light"
+                Level.WARN, "the headset is not tracked; stay in sight of the sensors, with enough light"
             )
         p, q = location.pose.position, location.pose.orientation
         linear = (
@@ -150,7 +148,7 @@ class OpenXrRuntime:
         )
         return HeadState(now * 1e-9, (p.x, p.y, p.z), (q.x, q.y, q.z, q.w), linear, angular)
 
-    def _heed_events(self) -> None:
+    def _handle_events(self) -> None:
         while True:
             try:
                 event = xr.poll_event(self._instance)
@@ -164,7 +162,7 @@ class OpenXrRuntime:
                 raise DeviceError("the OpenXR runtime ends; start it again")
 
     def _change_to(self, state: xr.SessionState) -> None:
-        """Follow the session's states; of those that are not named here the session runs on."""
+        """Handle a change of the session's state; in states that are not named here it continues."""
         assert self._session is not None
         if state == xr.SessionState.READY:
             xr.begin_session(self._session, xr.SessionBeginInfo())
@@ -174,11 +172,11 @@ class OpenXrRuntime:
             self._running = False
         elif state in (xr.SessionState.LOSS_PENDING, xr.SessionState.EXITING):
             raise DeviceError(
-                "the OpenXR runtime has ended the session; plug the headset in and look at the runtime"
+                "the OpenXR runtime has ended the session; plug the headset in and check the runtime"
             )
 
     def close(self) -> None:
-        """Destroy session and instance; what is gone already is left."""
+        """Destroy session and instance, as far as they still exist."""
         with suppress(xr.exception.XrException):
             if self._session is not None:
                 xr.destroy_session(self._session)
@@ -196,9 +194,9 @@ def _vector(v: xr.Vector3f) -> Vector3:
 
 def _unanswered(error: xr.exception.XrException) -> DeviceError:
     return DeviceError(
-        f"no OpenXR runtime answers ({_said(error)}); start one, and make it the system's active one"
+        f"no OpenXR runtime answers ({_described(error)}); start one, and make it the system's active one"
     )
 
 
-def _said(error: Exception) -> str:
+def _described(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"

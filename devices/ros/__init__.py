@@ -1,1 +1,1 @@
-"""Gateways to ROS: the simulated arms, consoles and cameras as programs of the real system know them."""
+"""Gateways to ROS: programs of the real system see the simulated arms, consoles and cameras as theirs."""

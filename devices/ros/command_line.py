@@ -1,6 +1,4 @@
-"""The commands `trocar ros`: which gateways run, who is connected to them, and what goes through; and `trocar
-ros bag`.
-"""
+"""The commands `trocar ros` (gateways that run, their clients and rates) and `trocar ros bag`."""
 
 from __future__ import annotations
 
@@ -21,6 +19,8 @@ from schemas.trocar_msgs import GatewayStatus
 
 __all__ = ["app"]
 
+_DIRECTIONS = {"publish": "published", "subscribe": "received", "serve": "answered"}
+
 app = typer.Typer()
 
 
@@ -36,12 +36,10 @@ def ros(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Show which gateways to ROS run in which session, which programs are connected to them, and the rates of
-    all topics.
-    """
+    """Show the gateways to ROS of all sessions: connected programs, and the rates of all topics."""
     if context.invoked_subcommand is not None:
         return
-    from devices.ros.watch import running_gateways
+    from devices.ros.running_gateways import running_gateways
     from hub.transport.endpoints import listening_endpoints
 
     gateways = running_gateways(connect or listening_endpoints())
@@ -79,9 +77,7 @@ def bag(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write what a recorded session has told ROS programs, and heard from them, as a bag with ROS names, for
-    `ros2 bag play`.
-    """
+    """Write what a recorded session exchanged with ROS programs as a bag, for `ros2 bag play`."""
     from devices.ros.bags.export import export
     from hub.recording.recording import Recording
 
@@ -97,23 +93,22 @@ def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None
         f"{client.name}{f' ({client.address})' if client.address else ''}" for client in status.clients
     )
     out.print(
-        f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'nobody'}",
+        f"[bold]{name}[/] ({status.kind}) in session '{session}', connected: {escape(clients) or 'none'}",
         soft_wrap=True,
     )
     shown = table(
         _rows(status), "topic", "direction", "per second", "messages", "refused", "why the last one"
     )
-    # nobody can read half a name
+    # names are shown in full: half a name cannot be read
     shown.columns[0].min_width = max((len(topic.topic) for topic in status.topics), default=0)
     out.print(shown)
 
 
 def _rows(status: GatewayStatus) -> Iterable[tuple[Any, ...]]:
-    words = {"publish": "told", "subscribe": "heard", "serve": "answered"}
     for topic in sorted(status.topics, key=lambda topic: topic.topic):
         yield (
             topic.topic,
-            words[topic.way],
+            _DIRECTIONS[topic.way],
             f"{topic.rate:.1f}",
             topic.messages,
             topic.refused or "",

@@ -9,11 +9,12 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from hub.participant import Params
+from robots.dvrk.crtk import Mounting, Reference
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.quantity import Duration
 
-__all__ = ["Arms", "GatewayParams", "HeardParams", "Real"]
+__all__ = ["Arms", "GatewayParams", "Real", "TopicParams"]
 
 Real = Literal["PSM1", "PSM2", "PSM3", "ECM", "MTML", "MTMR", "footpedals"]
 
@@ -28,7 +29,7 @@ class Arms(Params):
 
     @property
     def shown(self) -> Mapping[CartArm, MountedPsm | MountedEcm]:
-        """Those that are there, by name."""
+        """The arms of the scenario, by name."""
         named: dict[CartArm, MountedPsm | MountedEcm | None] = {
             "PSM1": self.PSM1,
             "PSM2": self.PSM2,
@@ -38,8 +39,8 @@ class Arms(Params):
         return {name: arm for name, arm in named.items() if arm is not None}
 
 
-class HeardParams(Params):
-    """Whose commands are heard, and which real arms."""
+class TopicParams(Params):
+    """Which topics exist: those of simulated arms, real arms and teleoperation components."""
 
     profile: Literal["dvrk", "paper"] = Field(
         default="dvrk",
@@ -48,14 +49,12 @@ class HeardParams(Params):
             " `paper` stands"
         ),
     )
-    arms: Arms = Field(
-        default=Arms(), description="the simulated arms, as the motion controller is told them"
-    )
+    arms: Arms = Field(default=Arms(), description="the simulated arms, as in the motion controller")
     listen: tuple[Real, ...] = Field(
         default=(),
         description=(
-            "real arms: their states come in, and commands to them go out; `footpedals`: what is pressed"
-            " comes in, instead of going out"
+            "real arms: their states are received, and commands to them are sent; `footpedals`: the pedals"
+            " are received instead of sent"
         ),
     )
     teleoperations: tuple[Annotated[str, Field(pattern=r"^MTM[LR]_(PSM[123]|ECM)$")], ...] = Field(
@@ -64,7 +63,7 @@ class HeardParams(Params):
     namespace: Annotated[str, Field(pattern=r"^([A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*)?$")] = Field(
         default="",
         description=(
-            "put before every topic that is not of a real arm, so that simulation and real system share one"
+            "prefix of every topic that is not of a real arm, so that simulation and real system share one"
             " graph"
         ),
     )
@@ -80,15 +79,11 @@ class HeardParams(Params):
         return self
 
 
-class GatewayParams(HeardParams):
-    """Which part of the dVRK is shown, and which real one is listened to."""
+class GatewayParams(TopicParams):
+    """Which part of the dVRK is simulated, which is real, and how it is published."""
 
-    mounting: Literal["free", "cart"] = Field(
-        default="free", description="as the motion controller is told it"
-    )
-    reference: Literal["camera", "base", "world"] = Field(
-        default="camera", description="as the motion controller is told it"
-    )
+    mounting: Mounting = Field(default="free", description="as in the motion controller")
+    reference: Reference = Field(default="camera", description="as in the motion controller")
     cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(
         default=("endoscope",), description="names of stereo cameras"
     )

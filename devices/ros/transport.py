@@ -1,7 +1,6 @@
-"""What a gateway needs of a middleware. A gateway for another one is another transport.
+"""What a gateway needs of a middleware: a gateway for another middleware is another transport.
 
-Everything that crosses here is CDR, little-endian, with its encapsulation header, whatever the middleware has
-on its own wire.
+All payloads are CDR, little-endian, with their encapsulation header, whatever the middleware's own wire has.
 """
 
 from __future__ import annotations
@@ -13,34 +12,37 @@ from typing import Protocol
 
 from devices.ros.topics.row import Row
 
-__all__ = ["NODE", "Client", "Handler", "Publisher", "Taker", "Transport"]
+__all__ = ["NODE", "Client", "MessageHandler", "Publisher", "ServiceHandler", "Transport"]
 
 NODE = "/dvrk"
-"""Name of the node of ROS 2 that all belongs to, as on the real one: jhu-dvrk/sawIntuitiveResearchKit,
-ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7).
+"""Name of the node of ROS 2 that all topics belong to, as on the real system:
+jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7).
 """
 
 Publisher = Callable[[bytes], None]
-"""Sends one message (CDR). Never blocks: where a reader does not keep up, older messages are dropped for it.
+"""Publishes one message (CDR). Never blocks: where a reader is too slow, older messages are dropped for it.
 
-One thread at a time per publisher.
+For one thread at a time.
 """
 
 
-class Taker(Protocol):
-    """Takes messages of one topic. Never raises, never blocks; may be called from any thread."""
+class MessageHandler(Protocol):
+    """Receives the messages of one topic. Never raises, never blocks; may be called from any thread."""
 
-    def __call__(self, payload: bytes, client: str, /, *, linked_ns: int = 0) -> None:
-        """Take one message (CDR) and the name of the client that sent it.
+    def __call__(self, payload: bytes, client: str, /, *, connected_ns: int = 0) -> None:
+        """Receive one message.
 
-        `linked_ns`: wall time at which the client was connected, where this may be a message from before that
-        the client has kept; else 0.
+        Args:
+            payload: the message (CDR).
+            client: name of the program that sent it.
+            connected_ns: wall time at which the client was connected, where this may be an older message that
+                the client has kept; else 0.
         """
         ...
 
 
-Handler = Callable[[bytes], bytes]
-"""Takes a request and returns the response (both CDR).
+ServiceHandler = Callable[[bytes], bytes]
+"""Returns the response to a request (both CDR).
 
 Raises MessageError if the bytes are no such request: then there is no response.
 """
@@ -51,8 +53,9 @@ class Client:
     """A program at the other side, as its middleware knows it."""
 
     name: str
-    """The same that a `Taker` is given: one for all publishers of a program, different for two programs, such
-    as `/console`.
+    """As a `MessageHandler` gets it: `/console`.
+
+    One for all publishers of a program, different for two programs.
     """
     address: str = ""
     """Where it runs, or an id of the middleware; empty where that is not known."""
@@ -63,25 +66,27 @@ class Transport(ABC):
 
     @abstractmethod
     def advertise(self, row: Row) -> Publisher:
-        """Begin to publish `row.topic`, reliable; late joiners get the last message of a latched row (ROS 2:
-        transient local, depth 1).
+        """Start to publish `row.topic`, reliable.
+
+        Late joiners get the last message of a latched row (ROS 2: transient local, depth 1).
         """
 
     @abstractmethod
-    def subscribe(self, row: Row, take: Taker) -> None:
-        """Begin to listen to `row.topic`, reliable and volatile: only what is sent from now on, in order,
-        nothing dropped up to 10 messages.
+    def subscribe(self, row: Row, receive: MessageHandler) -> None:
+        """Subscribe to `row.topic`, reliable and volatile.
+
+        `receive` gets the messages from now on, in order, none dropped up to 10 at once.
         """
 
     @abstractmethod
-    def serve(self, row: Row, handle: Handler) -> None:
-        """Begin to answer the service `row.topic` of type `row.type` (`crtk_msgs/srv/...`)."""
+    def serve(self, row: Row, handle: ServiceHandler) -> None:
+        """Offer the service `row.topic` of type `row.type` (`crtk_msgs/srv/...`)."""
 
     @abstractmethod
     def clients(self) -> tuple[Client, ...]:
-        """Return the programs that read or write any of our topics now, without ourselves.
+        """Return the programs that publish or subscribe to any of our topics now, without ourselves.
 
-        Cheap: it is asked once a second.
+        Called once a second, so it must be cheap.
         """
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Plays a recording of device samples as if somebody held the device.
+"""Plays a recording of device samples as if a person held the device.
 
 Time 0 is the first message of the recording, and log times give the pace (as in `ros2 bag play`). The stamps
 in the headers become the times at which the samples are played, in the port's clock.
@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from devices.playback import Playback
+from devices.samples import Playback, clock_of, stamped
 from hub.participant import Device, Params, Sample
 from hub.recording.bag import Bag, BagMessage, output_port
 from schemas.codec import decode, message_type
@@ -21,7 +21,6 @@ from schemas.errors import MessageError, RecordingError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.quantity import Duration
-from schemas.ros import Header, Time
 
 __all__ = ["ScriptedDevice", "ScriptedParams"]
 
@@ -55,7 +54,7 @@ class ScriptedParams(Params):
         context: dict[str, Any] = info.context or {}
         path = Path(context.get("directory", Path.cwd())) / samples
         try:
-            _ports(Bag(path), "simulated", 0)
+            _ports(Bag(path), simulated_time=True, max_age_ns=0)
         except (RecordingError, MessageError) as error:
             raise ValueError(str(error)) from error
         return path.resolve()
@@ -68,8 +67,8 @@ class ScriptedDevice(Device):
     params: ScriptedParams
 
     def __init__(self, name: str, params: ScriptedParams) -> None:
-        """Take the participant's name and what is to be played."""
         super().__init__(name, params)
+        self.simulated_time = params.time == "simulated"
         self._playback = Playback()
 
     @property
@@ -79,10 +78,15 @@ class ScriptedDevice(Device):
 
     @cached_property
     def _ports(self) -> tuple[Port, ...]:
-        return _ports(Bag(self.params.samples), self.params.time, self.params.max_age or 0)
+        return _ports(
+            Bag(self.params.samples),
+            simulated_time=self.simulated_time,
+            max_age_ns=self.params.max_age or 0,
+        )
 
-    def open(self, directory: Path) -> None:  # noqa: ARG002 - the samples were found when the parameters were validated
-        """Read and check all samples. Raises RecordingError if one of them is no valid message."""
+    # the validated parameters have the samples' whole path
+    def open(self, directory: Path) -> None:  # noqa: ARG002
+        """Read and validate all samples. Raises RecordingError if one of them is no valid message."""
         bag = Bag(self.params.samples)
         played = sorted(bag.messages(), key=lambda message: message.time_ns)
         try:
@@ -96,25 +100,25 @@ class ScriptedDevice(Device):
         return self._playback.due(t)
 
     def close(self) -> None:
-        """Forget the samples."""
+        """Discard the samples."""
         self._playback = Playback()
 
     def _play(self, played: list[BagMessage], messages: list[Message]) -> Iterator[tuple[int, Sample]]:
-        """Yield (time in ns, sample) in order, for ever if `loop` is set."""
+        """Yield (time in ns, sample) in order, endlessly if `loop` is set."""
         start, end = played[0].time_ns, played[-1].time_ns
-        # one mean interval between last and first
+        # between the last sample and the first of the next round: one mean interval
         lap = end - start + max(1, (end - start) // max(1, len(played) - 1))
         offset = 0
         while True:
             for source, message in zip(played, messages, strict=True):
                 time_ns = round((source.time_ns - start + offset) / self.params.rate)
-                yield time_ns, Sample(_port_name(source.topic), _stamped(message, time_ns))
+                yield time_ns, Sample(_port_name(source.topic), stamped(message, time_ns))
             if not self.params.loop:
                 return
             offset += lap
 
 
-def _ports(bag: Bag, clock: Literal["simulated", "wall"], max_age_ns: int) -> tuple[Port, ...]:
+def _ports(bag: Bag, *, simulated_time: bool, max_age_ns: int) -> tuple[Port, ...]:
     if not sum(bag.counts.values()):
         raise RecordingError(f"'{bag.file}' holds no messages, so there is nothing to play")
     first: dict[str, BagMessage] = {}
@@ -127,7 +131,10 @@ def _ports(bag: Bag, clock: Literal["simulated", "wall"], max_age_ns: int) -> tu
     )
     return tuple(
         port.model_copy(
-            update={"clock": clock, "max_age_ns": max_age_ns if port.variability == "signal" else 0}
+            update={
+                "clock": clock_of(simulated_time=simulated_time),
+                "max_age_ns": max_age_ns if port.variability == "signal" else 0,
+            }
         )
         for port in ports
     )
@@ -135,11 +142,3 @@ def _ports(bag: Bag, clock: Literal["simulated", "wall"], max_age_ns: int) -> tu
 
 def _port_name(topic: str) -> str:
     return topic.lstrip("/")
-
-
-def _stamped(message: Message, time_ns: int) -> Message:
-    """Return `message` with the stamp `time_ns`, if its type has one."""
-    header = getattr(message, "header", None)
-    if not isinstance(header, Header):
-        return message
-    return message.model_copy(update={"header": header.model_copy(update={"stamp": Time.from_ns(time_ns)})})

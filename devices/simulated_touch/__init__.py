@@ -1,3 +1,1 @@
-"""A haptic device with a hand behind it, both simulated: where no stylus stands, and for studies that are to
-give the same bits again.
-"""
+"""A simulated haptic device and hand: for machines without a stylus, and for reproducible studies."""

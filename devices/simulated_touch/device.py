@@ -1,5 +1,6 @@
-"""Kind `simulated-touch`: the ports of a haptic stylus, the same renderer and safety chain at 1 kHz, and a
-simulated hand in simulated time.
+"""Kind `simulated-touch`: a haptic stylus and a hand in simulated time.
+
+Ports, renderer and safety chain at 1 kHz are those of a real stylus.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from schemas.trocar_msgs import ContactModel
 __all__ = ["SimulatedTouch"]
 
 _TICK_NS = 1_000_000
-"""The servo period of the devices that this one stands for."""
+"""The servo period of real devices."""
 
 
 class SimulatedTouch(Device):
@@ -37,12 +38,12 @@ class SimulatedTouch(Device):
 
     params_model: ClassVar[type[Params]] = SimulatedTouchParams
     params: SimulatedTouchParams
+    simulated_time = True
 
     def __init__(self, name: str, params: SimulatedTouchParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._ports = {
-            stylus: stylus_ports(name, stylus, clock="simulated", max_age_ns=params.max_age)
+            stylus: stylus_ports(name, stylus, simulated_time=self.simulated_time, max_age_ns=params.max_age)
             for stylus in params.styluses
         }
         self._styluses: dict[str, _Stylus] = {}
@@ -57,18 +58,18 @@ class SimulatedTouch(Device):
         )
 
     def open(self, directory: Path) -> None:  # noqa: ARG002
-        """Put the hands where their paths begin. Raises RecordingError if a path is a recording without one."""
+        """Put the hands at the starts of their paths. Raises RecordingError if a recording has no path."""
         self._styluses = {
             stylus: _Stylus(self.name, stylus, self.params.styluses[stylus], ports)
             for stylus, ports in self._ports.items()
         }
 
     def read(self, t: int) -> list[Sample]:
-        """Let the hands move up to `t` (ns), and return what is new."""
+        """Move the hands up to `t` (ns), and return the new samples."""
         return [sample for stylus in self._styluses.values() for sample in stylus.read(t)]
 
     def write(self, port: str, value: Value) -> None:
-        """Take a contact model. It is felt from the next `read` on.
+        """Pass on a contact model, which is rendered from the next `read` on.
 
         Raises MessageError for another port or type.
         """
@@ -79,19 +80,19 @@ class SimulatedTouch(Device):
                 f"'{self.name}' takes a ContactModel on {known}; this is a {type(value).__name__} on '{port}'"
             )
         if name in self._styluses:
-            self._styluses[name].take(value)
+            self._styluses[name].receive(value)
 
     def close(self) -> None:
-        """Let go of the styluses."""
+        """Discard the styluses."""
         self._styluses = {}
 
 
 def _diagnosis(participant: str, stylus: str) -> Diagnosis:
-    return Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics", clock="simulated")
+    return Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics", simulated_time=True)
 
 
 class _Stylus:
-    """One stylus: at every tick the force follows from where the hand is, and then both go on together."""
+    """One stylus: at every tick the force follows from the hand's position, and the hand moves under it."""
 
     def __init__(
         self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts
@@ -115,16 +116,12 @@ class _Stylus:
         self._pressed: tuple[bool, bool] | None = None
         self._condition: Condition | None = None
 
-    def take(self, model: ContactModel) -> None:
-        """Keep a contact model until `read` has come to the time at which it was written, which is the one
-        that `read` is called with.
-        """
+    def receive(self, model: ContactModel) -> None:
+        """Keep a contact model until the tick at which it was written, the time of the next `read`."""
         self._written, self._written_ns = (planes_of(model), model.header.stamp.ns), None
 
     def read(self, t: int) -> list[Sample]:
-        """Go on to the last tick up to `t`, and return the samples: events of every tick, the state of the
-        last one.
-        """
+        """Advance to the last tick up to `t` (ns); return events of every tick and the state of the last."""
         if self._written_ns is None:
             self._written_ns = t
         due = t // _TICK_NS + 1 - self._ticks
@@ -143,7 +140,7 @@ class _Stylus:
         ]
 
     def _tick(self) -> list[Sample]:
-        """Move to the next tick, and take the force that holds from there."""
+        """Advance to the next tick, and compute the force that holds from there."""
         time_ns = self._ticks * _TICK_NS
         now = time_ns * 1e-9
         if self._ticks:
@@ -160,5 +157,5 @@ class _Stylus:
             samples.append(button_sample(self._ports.buttons, time_ns, pressed))
         if self._loop.condition is not self._condition:
             self._condition = self._loop.condition
-            samples += self._diagnosis.tell(*FORCE_DIAGNOSES[self._condition])
+            samples += self._diagnosis.report(*FORCE_DIAGNOSES[self._condition])
         return samples

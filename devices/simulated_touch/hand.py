@@ -11,9 +11,9 @@ __all__ = ["Hand"]
 
 
 class Hand:
-    """Moves exactly as the differential equation says while force and target are held for a tick.
+    """Follows the exact solution of its differential equation while force and target are held for a tick.
 
-    The exact motion matters: a force that is held while the hand goes on is what makes sampled walls active,
+    The exact motion matters: a force that is held while the hand moves is what makes sampled walls active,
     and a step of semi-implicit Euler would hide just that.
     """
 
@@ -37,9 +37,7 @@ class Hand:
         self._step = e * (c + a * s), e * s, -e * s * stiffness / mass, e * (c - a * s)
 
     def move(self, force: Vector3, target: Vector3, velocity: Vector3) -> None:
-        """Go on for a tick under `force` (N), with the grip's spring to `target` (m) and its damper to
-        `velocity` (m/s).
-        """
+        """Move for a tick under `force` (N), with spring and damper to `target` (m) and `velocity` (m/s)."""
         one = [
             self._axis(*axis)
             for axis in zip(self.position, self.velocity, force, target, velocity, strict=True)

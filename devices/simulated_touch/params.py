@@ -1,4 +1,4 @@
-"""What a scenario says of simulated styluses and of the hands that hold them."""
+"""Parameters of simulated styluses and of the hands that hold them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ its x along -y, its y along -z.
 
 
 class Waypoint(Params):
-    """Where the hand wants to be at a time, and at rest. What is left out is as before."""
+    """Target of the hand at a time, at rest. Omitted fields are as in the waypoint before."""
 
     at: Duration = Field(ge=0, description="time since the start")
     position: tuple[Length, Length, Length] | None = Field(
@@ -35,7 +35,7 @@ class Waypoint(Params):
         default=None, description="of the stylus in its base frame: quaternion x, y, z, w"
     )
     buttons: Annotated[tuple[int, ...], Field(max_length=2)] | None = Field(
-        default=None, description="the buttons that are held from here on: 0, 1"
+        default=None, description="the buttons that are held from this time on: 0, 1"
     )
 
     @field_validator("buttons")
@@ -47,7 +47,7 @@ class Waypoint(Params):
 
 
 class HandParams(Params):
-    """A hand with the stylus in it: a mass that spring and damper pull to where the hand wants to be.
+    """A hand with the stylus: a mass that spring and damper pull to the target.
 
     The defaults are those of the study that chose the limits of the force (docs/decisions/0022).
     """
@@ -65,19 +65,19 @@ class SimulatedStylusParams(Params):
         Discriminator(lambda path: "recording" if isinstance(path, str | Path) else "waypoints"),
     ] = Field(
         description=(
-            "where the hand wants to be: waypoints, with least jerk from one to the next; or a recording of"
+            "targets of the hand: waypoints, with least jerk from one to the next; or a recording of"
             " poses and buttons, an .mcap file or a rosbag2 directory relative to the scenario, in which a"
             " hand without buttons holds the dead-man"
         )
     )
-    dead_man: Annotated[int, Field(ge=0, le=1, description="the button that is to be held for force")] = 0
+    dead_man: Annotated[int, Field(ge=0, le=1, description="the button that must be held for force")] = 0
     hand: HandParams = HandParams()
     safety: SafetyParams = SafetyParams()
 
     @field_validator("path")
     @classmethod
     def _sound(cls, path: tuple[Waypoint, ...] | Path, info: ValidationInfo) -> tuple[Waypoint, ...] | Path:
-        """Hold the times in order, and find the recording."""
+        """Check the order of the times, and find the recording."""
         if isinstance(path, Path):
             context: dict[str, Any] = info.context or {}
             file = (Path(context.get("directory", Path.cwd())) / path).resolve()

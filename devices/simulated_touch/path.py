@@ -1,8 +1,8 @@
-"""Where a simulated hand wants to be: on a path of waypoints, or where a recorded hand was.
+"""Targets of a simulated hand: on a path of waypoints, or of a recorded hand.
 
 Between two waypoints it moves as people reach: along a straight line, with the least jerk and at rest at both
 ends (Flash and Hogan, The coordination of arm movements, Journal of Neuroscience 5(7), 1985). Between two
-recorded poses it moves evenly. It turns about one axis, with the same course in time.
+recorded poses it moves evenly. It rotates about one axis, with the same course in time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class _Press(NamedTuple):
 class HandPath:
     """A path in the stylus' base frame, m and rad, over time in s.
 
-    Before its first stop the hand is there already, without a button.
+    Before the time of the first stop the hand is at its pose, without a button.
     """
 
     def __init__(
@@ -52,15 +52,13 @@ class HandPath:
         presses: Sequence[_Press],
         course: Callable[[float], tuple[float, float]],
     ) -> None:
-        """`course` gives the share of the way between two stops that is done at a share of the time, and its
-        derivative.
-        """
+        """`course`: share of the way between two stops, and its derivative, at a share of the time."""
         self._stops, self._presses, self._course = stops, presses, course
         self._times = [stop.time for stop in stops]
         self._pressed_at = [press.time for press in presses]
 
     def position(self, t: float) -> tuple[Vector3, Vector3]:
-        """Return where the hand wants to be (m), and with which velocity (m/s)."""
+        """Return the target's position (m) and velocity (m/s)."""
         before, after, share, rate = self._between(t)
         (ax, ay, az), (bx, by, bz) = before.position, after.position
         x, y, z = bx - ax, by - ay, bz - az
@@ -106,11 +104,10 @@ def scripted(waypoints: Sequence[Waypoint]) -> HandPath:
 
 
 def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
-    """Return the path of the hand in a recording, from its first pose on; without recorded buttons it holds
-    the dead-man.
+    """Return the path of the hand in a recording, from its first pose on.
 
-    Of several topics with poses (and of those with buttons) the one of this stylus counts:
-    `.../<stylus>/pose`. Raises RecordingError if there is none.
+    Without recorded buttons the hand holds the dead-man. Of several topics with poses (or with buttons) the
+    one of this stylus is used: `.../<stylus>/pose`. Raises RecordingError if there is none.
     """
     bag = Bag(file)
     poses, joys = (
@@ -119,12 +116,12 @@ def recorded(file: Path, stylus: str, dead_man: int) -> HandPath:
     )
     if poses is None:
         raise RecordingError(
-            f"'{bag.file}' has not one topic of poses, nor one that ends in '{stylus}/pose', for the hand to"
-            " follow"
+            f"'{bag.file}' has neither exactly one topic of poses nor one that ends in '{stylus}/pose', for"
+            " the hand to follow"
         )
     moves = [(m.time_ns, decode(PoseStamped, m.payload).pose) for m in bag.messages(poses)]
     if not moves:
-        raise RecordingError(f"'{bag.file}' has no pose on '{poses}', so the hand has no place to be")
+        raise RecordingError(f"'{bag.file}' has no pose on '{poses}' for the hand to follow")
     start_ns = min(time_ns for time_ns, _ in moves)
     stops: list[_Stop] = []
     for time_ns, pose in sorted(moves, key=lambda move: move[0]):

@@ -8,8 +8,8 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hub.devices.inlets import Inlets
+from hub.participant.token_bucket import TokenBucket
 from hub.planning.plan import Plan
-from hub.transport.rate_limit import RateLimit
 from hub.transport.refusals import Refusals
 from schemas.codec import decode
 from schemas.errors import MessageError
@@ -32,7 +32,7 @@ class DeviceStatuses:
         self._statuses: dict[str, DeviceStatus] = {}
         self._latencies: dict[str, list[Latency]] = {}
         """The last ones of each device, also of one that is gone."""
-        self._limit = RateLimit(_RATE * (1.0 + len(plan.participants)))
+        self._limit = TokenBucket(_RATE * (1.0 + len(plan.participants)))
         self._subscriber = session.declare_subscriber(
             keys.device_status("*"), Callback(self._receive, indirect=False)
         )
@@ -49,7 +49,7 @@ class DeviceStatuses:
 
     def _receive(self, sample: zenoh.Sample) -> None:
         try:
-            if not self._limit.allow(monotonic_ns()):
+            if not self._limit.spend(monotonic_ns()):
                 raise MessageError("devices report their status more often than they may")
             status = decode(DeviceStatus, sample.payload.to_bytes())
             if (

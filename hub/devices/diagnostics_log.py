@@ -11,8 +11,8 @@ from time import monotonic_ns
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.participant.token_bucket import TokenBucket
 from hub.planning.plan import Plan
-from hub.transport.rate_limit import RateLimit
 from hub.transport.refusals import Refusals
 from schemas.codec import decode
 from schemas.errors import MessageError
@@ -50,11 +50,11 @@ class DiagnosticsLog:
         ]
 
     def _listener(self, source: str) -> Callback[zenoh.Sample]:
-        limit = RateLimit(_RATE)
+        limit = TokenBucket(_RATE)
 
         def receive(sample: zenoh.Sample) -> None:
             try:
-                if not limit.allow(monotonic_ns()):
+                if not limit.spend(monotonic_ns()):
                     raise MessageError(f"more than {_RATE:g} diagnoses/s")
                 status = decode(DiagnosticStatus, sample.payload.to_bytes())
             except MessageError as error:

@@ -20,8 +20,8 @@ from hub.devices.simulated_devices import SimulatedDevices
 from hub.devices.uplink import DeviceUplink
 from hub.observation.observers import Observers
 from hub.participant import Device, Sample
+from hub.participant.token_bucket import TokenBucket
 from hub.transport.envelope import Stamp
-from hub.transport.rate_limit import RateLimit
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
 from schemas.errors import LateError, MessageError
@@ -141,12 +141,12 @@ class SessionDevices:
             self._observers.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
-        limit = RateLimit(self._plan.participants[device].rate_limit)
+        limit = TokenBucket(self._plan.participants[device].rate_limit)
 
         def take(sample: zenoh.Sample) -> None:
             now_ns = monotonic_ns()
             try:
-                if not limit.allow(now_ns):
+                if not limit.spend(now_ns):
                     raise MessageError(
                         f"device '{device}' sends more than {limit.rate:g} messages/s on port '{port}'"
                         " (rate_limit)"

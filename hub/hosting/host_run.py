@@ -22,6 +22,7 @@ from hub.transport.control_client import ask
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
+from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
@@ -95,7 +96,8 @@ class HostRun:
         clock = self._stack.enter_context(ClockSync(self._session, self._keys))
         run = RunInfo(reply.plan, self._keys, reply.run, reply.admission)
         for name, device in devices.items():
-            device.learn_hub(connect)
+            if isinstance(device, RouterClient):
+                device.learn_hub(connect)
             planned = reply.plan.participants[name]
             thread = DeviceThread(name, device, planned.read_ns, failed=self._report_failure)
             uplink = DeviceUplink(planned, run, self._session, thread, self._refusals, clock.offset)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from time import sleep
 from typing import ClassVar
-
-import zenoh
 
 from hub.participant.base import Participant, Value
 from schemas.message import Message
@@ -51,19 +49,6 @@ class Device(Participant):
     """How often it is read in wall time where the scenario does not say; a haptic stylus moves and is felt at
     1 kHz.
     """
-
-    @property
-    def foreign_keys(self) -> tuple[str, ...]:
-        """Zenoh keys, none of Trocar's own, that programs and this device share at the hub's router: who has
-        the certificate `console` may use them.
-        """
-        return ()
-
-    def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
-        """Take, before `open`, what opens a Zenoh session of one's own with the hub.
-
-        Only a device with foreign keys needs one.
-        """
 
     @abstractmethod
     def open(self, directory: Path) -> None:

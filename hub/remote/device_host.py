@@ -24,6 +24,7 @@ from hub.planning.registry import make
 from hub.transport.control_client import ask, join_session
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.refusals import Refusals
+from hub.transport.router_client import RouterClient
 from schemas.codec import encode
 from schemas.errors import ConnectError, MessageError, ParticipantError
 from schemas.keys import Keys
@@ -151,7 +152,8 @@ class DeviceHost:
             device = make(planned.kind, self._name, params, directory)
             if not isinstance(device, Device):
                 raise ParticipantError(self._name, -1, f"'{planned.kind}' is no device here")
-            device.learn_hub(self._connect)
+            if isinstance(device, RouterClient):
+                device.learn_hub(self._connect)
             self._loop, self._held = (
                 DeviceThread(self._name, device, planned.read_ns, failed=self._device_failed),
                 wanted,

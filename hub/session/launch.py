@@ -20,6 +20,7 @@ from hub.security.access import access_settings
 from hub.security.credentials import HUB, examine, load
 from hub.security.gate import Gate
 from hub.session.session import Session
+from hub.transport.router_client import RouterClient
 from schemas.scenario import Scenario
 
 __all__ = ["in_one_host", "launch", "plan_of"]
@@ -62,9 +63,7 @@ def launch(
     here = {name: p for name, p in participants.items() if plan.participants[name].host == "hub"}
     directory = loaded.source.directory
     attachments = {} if record is None else _attachments(scenario, plan, loaded)
-    foreign = {
-        name: p.foreign_keys for name, p in participants.items() if isinstance(p, Device) and p.foreign_keys
-    }
+    foreign = {name: p.foreign_keys for name, p in participants.items() if isinstance(p, RouterClient)}
     gate = _gate(outside, certificates, access_settings(plan, scenario.name, foreign)) if outside else None
     return Session(
         scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments

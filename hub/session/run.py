@@ -34,6 +34,7 @@ from hub.session.run_state import RunState
 from hub.session.status_reporter import StatusReporter
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
+from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
 from hub.transport.zenoh_session import open_session
 from schemas.keys import Keys
@@ -136,7 +137,8 @@ class Run:
         """Return the devices of the session, those of this process not yet open."""
         endpoint, devices = self.spec.endpoint, self.spec.devices
         for device in devices.values():
-            device.learn_hub(lambda: open_session("client", connect=[endpoint]))
+            if isinstance(device, RouterClient):
+                device.learn_hub(lambda: open_session("client", connect=[endpoint]))
         return SessionDevices(
             RunInfo(self.spec.plan, self.keys, self.number),
             self.session,

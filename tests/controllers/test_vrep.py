@@ -7,7 +7,7 @@ import pytest
 
 from controllers.vrep import VrepScene, VrepSceneParams
 from devices.ros.params import GatewayParams
-from devices.ros.topics.vrep import paper_face
+from devices.ros.topics.vrep_table import vrep_table
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from robots.dvrk import setup_joints
@@ -49,7 +49,7 @@ def jp(*values):
 def test_every_topic_of_the_table_is_a_port_of_the_same_type_and_size():
     there = {port.name: port for port in Rig().paper.ports}
     heard_only = ("stereo/", "suture_planner/", "dvrk/setup_joint/robot_state")
-    for row in paper_face(GatewayParams.model_validate({"profile": "paper", "arms": ARMS})):
+    for row in vrep_table(GatewayParams.model_validate({"profile": "paper", "arms": ARMS})):
         if not row.port.name.startswith(heard_only):
             port = there[row.port.name]
             assert (port.type, port.variability, port.size, port.fields) == (

@@ -7,7 +7,7 @@ def test_each_change_is_told_once(caplog):
     caplog.set_level(logging.INFO)
     diagnosis = Diagnosis("head")
     told = [
-        diagnosis.tell(*what)
+        diagnosis.report(*what)
         for what in [
             (Level.ERROR, "absent"),
             (Level.ERROR, "absent"),

@@ -83,9 +83,9 @@ def test_a_headset_asleep_holds_the_camera_and_comes_back(tmp_path):
     assert (asleep == 0.0).all()
     assert np.median(speed[round(300 / 4) : round(390 / 4)]) == pytest.approx(0.2, rel=0.05)
     assert np.median(speed[round(1200 / 4) :]) == pytest.approx(0.2, rel=0.05)
-    assert [message.split(";")[0] for message in wearer.told if "tracked" in message or "wears" in message][
+    assert [message.split(";")[0] for message in wearer.told if "tracked" in message or "worn" in message][
         -2:
     ] == [
-        "nobody wears the headset, it sleeps",
+        "the headset is not worn and asleep",
         "the head is tracked",
     ]

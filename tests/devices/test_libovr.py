@@ -135,13 +135,13 @@ def test_the_angular_velocity_may_be_along_either_frame(make, head, frame):
 
 
 NOT_SEEN = {
-    "worn": ({"status.mounted": 0}, "nobody wears"),
+    "worn": ({"status.mounted": 0}, "is not worn"),
     "unplugged": ({"status.present": 0}, "unplugged"),
     "untracked": ({"tracked": 1}, "not tracked"),
     "dark": ({"tracked": 0}, "not tracked"),
     "lost": ({"status.lost": 1}, "ended the session"),
     "quit": ({"status.quit": 1}, "ended the session"),
-    "dead": ({"session": -1002}, "gone"),
+    "dead": ({"session": -1002}, "lost"),
     "no quaternion": ({"orientation": (0, 0, 0, 0)}, "no unit quaternion"),
     "not a number": ({"position": (float("nan"), 0, 0)}, "no pose"),
 }

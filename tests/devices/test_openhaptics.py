@@ -172,7 +172,7 @@ def test_a_stylus_that_is_unplugged_and_plugged_in_again(world: HdWorld, hands: 
     one.forget()
     one.until(lambda: one.gives("left") and one.force("left") == 0.0)  # its process was replaced
     world.devices[0].plugged = 1
-    one.until(lambda: one.has_told("it is back, and is taken up as soon as no other hand"))
+    one.until(lambda: one.has_told("it is back, and is used as soon as no other hand"))
     one.forget()
     one.until(lambda: len(one.samples["left/pose"]) > 100)
     assert not one.gives()  # as long as the other hand holds its dead-man it is not disturbed
@@ -326,7 +326,8 @@ def test_limits_above_those_of_the_device_are_refused(world: HdWorld, hands: Cal
     one = hands(right={"safety": {"force": "1.5 N"}}, left={"device": "left"})
     one.until(
         lambda: one.has_told(
-            "no force: safety.force is 1.5 N, but the device bears 0.6 N. A scenario may only lower a limit."
+            "no force: safety.force is 1.5 N, but the device's limit is 0.6 N."
+            " A scenario may only lower a limit."
         )
     )
     assert one.gives()

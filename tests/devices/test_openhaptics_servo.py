@@ -125,7 +125,7 @@ class Rig:
         return self._last[stylus]
 
     def press(self, ticks: int = 2000) -> State:
-        """Bring both hands into the contact, from above and with the dead-man held, until the force is there."""
+        """Bring both hands into the contact from above, with the dead-man held, until there is force."""
         self.allow()
         for device in self.world.devices:
             device.buttons, device.target[1] = 1, 0.03

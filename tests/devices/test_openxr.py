@@ -195,7 +195,7 @@ def test_a_headset_that_is_taken_off(read, runtime, offered):
     runtime.event(USER_PRESENCE, 0)
     ports, got = read(3)
     assert ports == ["diagnostics"]
-    assert "nobody wears" in got["diagnostics"].message
+    assert "is not worn" in got["diagnostics"].message
     runtime.event(USER_PRESENCE, 1)
     assert read()[0] == ["diagnostics", "pose", "twist"]
 
@@ -232,9 +232,9 @@ def test_a_runtime_that_ends_is_looked_for_until_it_is_back(read, runtime, end):
         ("get_system", -35, "FormFactorUnavailable"),
         ("create_session", -2, "refuses a session"),
         ("create_space", -31, "refuses a session"),
-        ("locate", -17, "is gone"),
-        ("locate", -13, "is gone"),
-        ("convert", -2, "does not tell the time"),
+        ("locate", -17, "is lost"),
+        ("locate", -13, "is lost"),
+        ("convert", -2, "gives no time"),
     ],
 )
 def test_whatever_fails_is_told_and_tried_again(read, runtime, call, code, message):
@@ -252,7 +252,7 @@ def test_a_runtime_that_does_not_know_the_time_yet_is_waited_for(read, runtime, 
     setattr(runtime, call, -30)
     ports, got = read(3)
     assert ports == ["diagnostics"]
-    assert "does not tell the time yet" in got["diagnostics"].message
+    assert "gives no time yet" in got["diagnostics"].message
     assert (runtime.instances, runtime.sessions) == (1, 1)
     setattr(runtime, call, 0)
     assert read()[0] == ["diagnostics", "pose", "twist"]

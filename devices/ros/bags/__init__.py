@@ -1,1 +1,1 @@
-"""ROS bags: played into a session, and made of its recording."""
+"""ROS bags: played into a session, and written from a session's recording."""

@@ -1,5 +1,6 @@
-"""ROS bags of any kind, read through `rosbags`: rosbag2 directories, bare .mcap and .db3 files, .bag files of
-ROS 1. Nothing in them is trusted.
+"""ROS bags, read through `rosbags`: rosbag2 directories, .mcap and .db3 files, .bag files of ROS 1.
+
+Their contents are untrusted: damaged bytes raise RecordingError, or are returned as the error of one message.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ class BagTopic(NamedTuple):
 
 
 class RosBag:
-    """A bag that is open for reading; its messages are read with the definitions that it brings, or, if it
-    brings none, with ours.
+    """A bag that is open for reading.
+
+    Messages are read with the definitions that the bag contains, or with ours if it contains none.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open a bag. Raises RecordingError if it is none."""
+        """Open a bag. Raises RecordingError if it cannot be read."""
         self.path = path
         with _reading(path):
             self._reader = AnyReader([path], default_typestore=typestore())
@@ -49,20 +51,22 @@ class RosBag:
         """Wall time (ns) of the first message."""
 
     def messages(self, topics: Collection[str], start_ns: int) -> Iterator[tuple[str, int, object]]:
-        """Yield topic, time (ns) and the message as `rosbags` has it, or the error that it makes, of all
-        since `start_ns`, by time. Raises RecordingError.
+        """Yield topic, time (ns) and message since `start_ns`, in the order of time.
+
+        The message is as `rosbags` has it, or the exception that decoding it raised. Raises RecordingError.
         """
-        wanted: list[Connection] = [one for one in self._reader.connections if one.topic in topics]
-        if not wanted:
+        connections: list[Connection] = [one for one in self._reader.connections if one.topic in topics]
+        if not connections:
             return
         with _reading(self.path):
-            for connection, time_ns, payload in self._reader.messages(wanted, start=start_ns):
+            for connection, time_ns, payload in self._reader.messages(connections, start=start_ns):
                 yield connection.topic, time_ns, self._decoded(payload, connection.msgtype)
 
     def _decoded(self, payload: bytes, type_name: str) -> object:
         try:
             return self._reader.deserialize(payload, type_name)
-        except Exception as error:  # noqa: BLE001 - rosbags lets struct.error, IndexError, UnicodeDecodeError and more through
+        # rosbags lets struct.error, IndexError, UnicodeDecodeError and more through
+        except Exception as error:  # noqa: BLE001
             return error
 
     def close(self) -> None:
@@ -79,14 +83,13 @@ class RosBag:
 
 @contextmanager
 def _reading(path: Path) -> Generator[None]:
-    """Turn whatever damaged bytes make the parsers raise into a RecordingError that names the bag."""
+    """Turn every exception that damaged bytes raise in the parsers into a RecordingError."""
     try:
         yield
     except (RecordingError, GeneratorExit):
         raise
-    except (
-        Exception
-    ) as error:  # rosbags raises errors of its own, KeyError, struct.error, sqlite3's and zstd's
+    # rosbags raises errors of its own, KeyError, struct.error, sqlite3's and zstd's
+    except Exception as error:
         raise RecordingError(
             f"cannot read the bag '{path}' ({type(error).__name__}: {error}); a rosbag2 directory, an .mcap,"
             " .db3 or .bag file is expected"

@@ -1,5 +1,4 @@
-"""A session's recording as a bag with ROS names: what its gateway has published and heard, for `ros2 bag
-play`.
+"""Writes a session's recording as a bag with ROS names: what its gateway has published and received.
 
 Times are the session's start by the wall clock plus simulated time, in stamps too: a bag plays at the pace of
 the simulation, however fast that ran (docs/decisions/0033-bags.md).
@@ -14,18 +13,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from devices.ros.gateway import Gateway
-from devices.ros.topics.description import description
-from devices.ros.topics.outgoing import Source, State
+from devices.ros.topics.publications import MessageSource, State
 from devices.ros.topics.row import Row
-from devices.ros.topics.scenery import scenery, stride
+from devices.ros.topics.stamps import Stamps
+from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
+from devices.samples import stamped
 from hub.planning import registry
 from hub.planning.plan import Plan
 from hub.recording.recording import Recording
 from hub.recording.ros_bag_writer import BagWriter
 from hub.transport.port_codec import PortCodec
-from schemas.codec import decode, message_type
+from schemas.codec import decode, encode, message_type
 from schemas.errors import DeviceError, MessageError, RecordingError, did_you_mean
 from schemas.keys import Keys, topic
+from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import StringMessage
 from schemas.vectors import Vector
@@ -36,7 +37,7 @@ log = logging.getLogger(__name__)
 
 _KEYS = Keys("any")
 _Routes = Mapping[str, Sequence[tuple[Row, Port]]]
-"""By the topics of a recording: the rows that are fed by it, each with the port that has written it."""
+"""By the topics of a recording: the rows that get its values, each with the port that has written them."""
 
 
 @dataclass(frozen=True)
@@ -51,33 +52,39 @@ class ExportSummary:
 
 
 def export(recording: Recording, directory: Path, gateway: str | None = None) -> ExportSummary:
-    """Write what gateway `gateway` of a recorded session, by default its only one, has published and heard,
-    to a new `directory`.
+    """Write what a gateway of a recorded session has published and received to a new `directory`.
 
-    Raises RecordingError if the session has no such gateway, if the directory exists or cannot be written, or
-    if the recording is damaged; ScenarioError if the gateway's kind is not installed.
+    Args:
+        recording: the recording of the session.
+        directory: the bag, which must not exist yet.
+        gateway: the gateway's name; by default the session's only one.
+
+    Raises:
+        RecordingError: if the session has no such gateway, if the directory exists or cannot be written,
+            or if the recording is damaged.
+        ScenarioError: if the gateway's kind is not installed.
     """
     plan = recording.plan()
     shown = _gateway(recording, plan, gateway)
     routes = {name: rows for name, rows in _routes(plan, shown).items() if name in recording.topics}
-    with BagWriter(directory, recording.started_ns()) as bag:
-        retold, last_ns = _Retold(shown, routes, bag), -1
+    with BagWriter(directory) as bag:
+        replay, last_ns = _Replay(shown, routes, _RowWriter(bag, recording.started_ns())), -1
         for message in recording.messages(*routes):
             last_ns = max(last_ns, message.time_ns)
             try:
-                retold.publish_before(message.time_ns)
+                replay.publish_before(message.time_ns)
                 for row, source in routes[message.topic]:
-                    retold.take(row, source, message.time_ns, message.payload)
+                    replay.write(row, source, message.time_ns, message.payload)
             except MessageError as error:
                 raise RecordingError(
                     f"'{recording.file}': topic '{message.topic}' at {message.time_ns} ns: {error}"
                 ) from error
-        retold.publish_before(last_ns + 1)
+        replay.publish_before(last_ns + 1)
     return ExportSummary(str(directory), shown.name, bag.topics, bag.messages, recording.duration_ns * 1e-9)
 
 
 def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
-    """Return the gateway that is meant, as the scenario declares it."""
+    """Return the gateway with this name, or the only one, as the scenario declares it."""
     kinds = {
         planned.name: registry.load(planned.kind)
         for planned in plan.participants.values()
@@ -86,7 +93,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
     there = [device for device, kind in kinds.items() if issubclass(kind, Gateway)]
     if name is None and len(there) != 1:
         none = (
-            "no gateway to ROS, which would say what its topics are: put one into the scenario, with"
+            "no gateway to ROS, which would define its topics: add one to the scenario, with"
             " `motion.* -> ros.*`, and record again"
         )
         found = (
@@ -106,7 +113,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
         recording.directory(),
     )
     if not isinstance(made, Gateway):
-        raise TypeError(f"{made} is of a kind of gateways, and none itself")
+        raise TypeError(f"{made} is not a gateway, though its kind is one of gateways")
     return made
 
 
@@ -129,7 +136,7 @@ class _Recorded(State):
     """The newest recorded value of a state."""
 
     def __init__(self, port: Port, source: Port) -> None:
-        """Take the gateway's port, and the one that has written the values."""
+        """`port` is the gateway's, `source` the one that has written the values."""
         super().__init__(port)
         self._reader = PortCodec(port.filled_from(source))
         self.payload: bytes | None = None
@@ -140,45 +147,63 @@ class _Recorded(State):
         return None if self.payload is None else self._reader.accept(self.payload)
 
 
-class _Retold:
-    """What a gateway would publish, at its own period in simulated time, and its events when they come."""
+class _RowWriter:
+    """Writes messages of a gateway's rows to a bag, with simulated times as times of the wall clock."""
 
-    def __init__(self, gateway: Gateway, routes: _Routes, bag: BagWriter) -> None:
-        """Take the gateway, what feeds it, and where all is written."""
+    def __init__(self, bag: BagWriter, start_ns: int) -> None:
+        """`start_ns`: wall time of simulated time 0."""
+        self._bag, self._start_ns = bag, start_ns
+        self._stamps: defaultdict[str, Stamps] = defaultdict(Stamps)
+
+    def stamp_ns(self, row: Row, time_ns: int) -> int:
+        """Return the stamp of a message at simulated time `time_ns`."""
+        return self._stamps[row.topic].after(self._start_ns + time_ns)
+
+    def write(self, row: Row, time_ns: int, message: Message) -> None:
+        """Stamp and write a message. Raises RecordingError if the bag cannot be written."""
+        self.write_cdr(row, time_ns, encode(stamped(message, self.stamp_ns(row, time_ns))))
+
+    def write_cdr(self, row: Row, time_ns: int, payload: bytes) -> None:
+        """Write a message that is stamped and encoded already."""
+        self._bag.write(row.topic, row.type, self._start_ns + time_ns, payload, latched=row.latched)
+
+
+class _Replay:
+    """Publishes recorded states at the gateway's period in simulated time, and events at their times."""
+
+    def __init__(self, gateway: Gateway, routes: _Routes, bag: _RowWriter) -> None:
         self._bag, self._period_ns, self._due_ns = bag, gateway.params.publish_period, 0
-        fed = {row.topic: source for rows in routes.values() for row, source in rows}
+        sources = {row.topic: source for rows in routes.values() for row, source in rows}
         periodic = [(row, row.port) for row in gateway.rows if row.periodic and row.port is not None]
         self._recorded = {
-            row.topic: _Recorded(port, fed[row.topic]) for row, port in periodic if row.topic in fed
+            row.topic: _Recorded(port, sources[row.topic]) for row, port in periodic if row.topic in sources
         }
         states: dict[str, State] = {
             port.name: self._recorded.get(row.topic) or State(port) for row, port in periodic
         }
-        whole: Mapping[str, Source] = (
-            scenery(gateway.params, states) if gateway.params.profile == "dvrk" else {}
-        )
-        self._periodic: list[tuple[Row, Source, int]] = [
-            (row, states[port.name], 1) for row, port in periodic if row.topic in fed
+        whole_robot = whole_robot_sources(gateway.params, states)
+        self._periodic: list[tuple[Row, MessageSource, int]] = [
+            (row, states[port.name], 1) for row, port in periodic if row.topic in sources
         ]
         for row in gateway.rows:
-            if row.name in whole:
-                self._periodic.append((row, whole[row.name], stride(row.name, self._period_ns)))
+            if row.name in whole_robot:
+                every = periods_between(row.name, self._period_ns)
+                self._periodic.append((row, whole_robot[row.name], every))
             elif row.name == "robot_description" and gateway.params.robot_description is not None:
                 self._describe(row, gateway.params.robot_description)
 
     def _describe(self, row: Row, file: Path) -> None:
         try:
-            self._bag.write(row, 0, StringMessage(data=description(file)))
+            self._bag.write(row, 0, StringMessage(data=robot_description(file)))
         except DeviceError as error:
             log.warning("the bag is without %s: %s", row.topic, error)
 
-    def take(self, row: Row, source: Port, time_ns: int, payload: bytes) -> None:
-        """Take a recorded value. Raises MessageError if it is none of its port."""
+    def write(self, row: Row, source: Port, time_ns: int, payload: bytes) -> None:
+        """Set a state's newest value, or write an event. Raises MessageError if it is invalid."""
         if row.topic in self._recorded:
             self._recorded[row.topic].payload = payload
-        elif (
-            row.way == "subscribe" or source.variability == "event" or time_ns > 0
-        ):  # a signal's value at time 0 is no message
+        # a signal's value at time 0 is its initial value, and no message
+        elif row.way == "subscribe" or source.variability == "event" or time_ns > 0:
             self._bag.write(row, time_ns, decode(message_type(row.type), payload))
 
     def publish_before(self, time_ns: int) -> None:
@@ -190,5 +215,5 @@ class _Retold:
                     period % every == 0
                     and (payload := source.cdr(self._bag.stamp_ns(row, self._due_ns))) is not None
                 ):
-                    self._bag.write(row, self._due_ns, payload)
+                    self._bag.write_cdr(row, self._due_ns, payload)
             self._due_ns += self._period_ns

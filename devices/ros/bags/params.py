@@ -9,21 +9,21 @@ from typing import Any, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from devices.ros.bags.bag import BagTopic, RosBag
-from devices.ros.params import GatewayParams, HeardParams
-from devices.ros.topics.face import face
+from devices.ros.params import GatewayParams, TopicParams
+from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.row import Row
-from devices.ros.topics.vrep import paper_face
+from devices.ros.topics.vrep_table import vrep_table
 from schemas.errors import RecordingError, did_you_mean
 from schemas.quantity import Duration
 
 __all__ = ["BagParams", "listed"]
 
 _NAMED = 6
-"""Topics that are named in one message."""
+"""Topics that one message names."""
 
 
-class BagParams(HeardParams):
-    """Which bag is played, how, and what of it."""
+class BagParams(TopicParams):
+    """Which bag is played, how, and which of its topics."""
 
     bag: Path = Field(
         description="rosbag2 directory, .mcap, .db3, or .bag of ROS 1, relative to the scenario"
@@ -59,28 +59,31 @@ class BagParams(HeardParams):
         if unknown is not None:
             raise ValueError(f"rename: '{self.bag}' has no topic '{unknown}'.{did_you_mean(unknown, topics)}")
         if not self.played(topics):
-            hearable = (
-                ", ".join(row.topic for row in self.heard.values()) or "none: `arms` and `listen` are empty"
+            subscribed = (
+                ", ".join(row.topic for row in self.subscribed.values())
+                or "none: `arms` and `listen` are empty"
             )
             raise ValueError(
                 f"'{self.bag}' has nothing that could be played here. Its topics: {listed(topics) or 'none'}."
-                f" Topics that are heard: {hearable}"
+                f" Topics that are subscribed to: {subscribed}"
             )
         return self
 
     @property
-    def heard(self) -> Mapping[str, Row]:
-        """What a gateway would subscribe to, by topic."""
-        shared = {name: getattr(self, name) for name in HeardParams.model_fields}
+    def subscribed(self) -> Mapping[str, Row]:
+        """The rows that a gateway would subscribe to, by topic."""
+        shared = {name: getattr(self, name) for name in TopicParams.model_fields}
         params = GatewayParams(**shared)
-        rows = face(params) if self.profile == "dvrk" else paper_face(params)
+        rows = dvrk_table(params) if self.profile == "dvrk" else vrep_table(params)
         return {row.topic: row for row in rows if row.way == "subscribe" and row.port is not None}
 
     def played(self, topics: Mapping[str, BagTopic]) -> Mapping[str, Row]:
-        """Return which topics of a bag are played, and as what."""
-        heard = self.heard
+        """Return the topics of a bag that are played, each with the row that it is played as."""
+        subscribed = self.subscribed
         rows = {
-            topic: heard.get(self.rename.get(topic, topic)) for topic, told in topics.items() if told.messages
+            topic: subscribed.get(self.rename.get(topic, topic))
+            for topic, recorded in topics.items()
+            if recorded.messages
         }
         return {
             topic: row for topic, row in rows.items() if row is not None and row.type == topics[topic].type
@@ -88,6 +91,6 @@ class BagParams(HeardParams):
 
 
 def listed(topics: Mapping[str, BagTopic]) -> str:
-    """Return topics with their types and numbers of messages; of many, the first."""
-    named = [f"{topic} ({told.type}, {told.messages})" for topic, told in sorted(topics.items())]
+    """Return a list of topics with their types and numbers of messages, cut after the first six."""
+    named = [f"{topic} ({its.type}, {its.messages})" for topic, its in sorted(topics.items())]
     return ", ".join(named[:_NAMED]) + (f" and {len(named) - _NAMED} more" if len(named) > _NAMED else "")

@@ -1,24 +1,23 @@
-"""Plays what a ROS bag holds of an operator's commands, and of a real dVRK's states: the kind `ros-bag`.
+"""Plays an operator's commands and a real dVRK's states from a ROS bag: the kind `ros-bag`.
 
 Time 0 is the first message of the bag, whatever its topic, and the times of recording give the pace, as in
-`ros2 bag play`. What is played comes out of ports that are named as those of a gateway, and is refused by the
-same rules; stamps become the times of playing. docs/decisions/0033-bags.md.
+`ros2 bag play`. Ports are named as those of a gateway, and messages are refused by the same rules; stamps
+become the times of playing. docs/decisions/0033-bags.md.
 """
 
 from __future__ import annotations
 
 import logging
-from collections import deque
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
-from devices.playback import Playback
 from devices.ros.bags.bag import RosBag
 from devices.ros.bags.params import BagParams, listed
 from devices.ros.topics.row import Row
-from devices.ros.topics.rules import as_signal, check
-from devices.ros.topics.stamps import stamp_of, stamped
+from devices.ros.topics.state_commands import RepeatedStateCommands
+from devices.ros.topics.validation import as_signal, validate
+from devices.samples import Playback, clock_of, stamp_of, stamped
 from hub.participant import Device, Sample
 from hub.transport.refusals import Refusals
 from schemas.codec import message_type, validated
@@ -31,11 +30,9 @@ __all__ = ["BagPlayer"]
 log = logging.getLogger(__name__)
 
 _LATCHED_NS = 1_000_000_000
-"""A state command that is older when it is recorded came by a late recorder's connection; a CRTK client takes
-a connection for lost after as long.
+"""A state command that is older when it is recorded was delivered, latched, to a late recorder; a CRTK
+client takes a connection for lost after as long.
 """
-_REMEMBERED = 8
-"""State commands, as a gateway remembers them."""
 
 
 class BagPlayer(Device):
@@ -43,9 +40,9 @@ class BagPlayer(Device):
 
     params_model = BagParams
     params: BagParams
+    simulated_time = True
 
     def __init__(self, name: str, params: BagParams) -> None:
-        """Take the participant's name and what is to be played."""
         super().__init__(name, params)
         self._bag: RosBag | None = None
         self._refusals = Refusals()
@@ -61,27 +58,33 @@ class BagPlayer(Device):
         with RosBag(self.params.bag) as bag:
             topics = {row.topic for row in self.params.played(bag.topics).values()}
         ports = [
-            row.port for row in self.params.heard.values() if row.topic in topics and row.port is not None
+            row.port
+            for row in self.params.subscribed.values()
+            if row.topic in topics and row.port is not None
         ]
         return tuple(
             port.model_copy(
-                update={"clock": "simulated", "max_age_ns": round(port.max_age_ns / self.params.rate)}
+                update={
+                    "clock": clock_of(simulated_time=self.simulated_time),
+                    "max_age_ns": round(port.max_age_ns / self.params.rate),
+                }
             )
             for port in ports
         )
 
-    def open(self, directory: Path) -> None:  # noqa: ARG002 - the bag was found when the parameters were validated
-        """Open the bag, and say what of it is not played. Raises RecordingError if it cannot be read."""
+    # the validated parameters have the bag's whole path
+    def open(self, directory: Path) -> None:  # noqa: ARG002
+        """Open the bag, and log which topics are not played. Raises RecordingError if it cannot be read."""
         self.close()
         self._bag = bag = RosBag(self.params.bag)
         played = self.params.played(bag.topics)
-        passed_over = {topic: told for topic, told in bag.topics.items() if topic not in played}
-        if passed_over:
+        ignored = {topic: its for topic, its in bag.topics.items() if topic not in played}
+        if ignored:
             log.info(
-                "device '%s': passed over of '%s', as nothing here hears them: %s",
+                "device '%s': topics of '%s' that no port here takes are ignored: %s",
                 self.name,
                 bag.path,
-                listed(passed_over),
+                listed(ignored),
             )
         self._refusals = Refusals()
         self._playback = Playback(self._play(bag, played))
@@ -98,13 +101,13 @@ class BagPlayer(Device):
         self._bag = None
 
     def _play(self, bag: RosBag, played: Mapping[str, Row]) -> Iterator[tuple[int, Sample]]:
-        """Yield (time in ns, sample) of all that is heeded, in order."""
+        """Yield (time in ns, sample) of all that is not refused, in order."""
         start_ns = bag.start_ns + self.params.start
-        rules = {row.topic: _Rule(row) for row in played.values()}
+        filters = {row.topic: _Filter(row) for row in played.values()}
         for topic, recorded_ns, raw in bag.messages(played, start_ns):
             row, time_ns = played[topic], round((recorded_ns - start_ns) / self.params.rate)
             try:
-                message = rules[row.topic].heeded(raw, recorded_ns)
+                message = filters[row.topic].accepted(raw, recorded_ns)
             except MessageError as error:
                 self._refusals.refuse(f"'{self.name}': {topic}", f"{error} (at {time_ns / 1e9:g} s)")
                 continue
@@ -112,37 +115,36 @@ class BagPlayer(Device):
                 yield time_ns, Sample(row.port.name, stamped(message, time_ns))
 
 
-class _Rule:
-    """What a gateway refuses, too."""
+class _Filter:
+    """Refuses what a gateway refuses, for one row."""
 
     def __init__(self, row: Row) -> None:
-        """Take what is played."""
         self._row, self._model = row, message_type(row.type)
-        self._heeded: deque[int] = deque(maxlen=_REMEMBERED)
+        self._repeated = RepeatedStateCommands()
 
-    def heeded(self, raw: object, recorded_ns: int) -> Message:
-        """Return what was recorded as the row's message. Raises MessageError where it is not heeded."""
+    def accepted(self, raw: object, recorded_ns: int) -> Message:
+        """Return what was recorded as the row's message. Raises MessageError where it is refused."""
         if isinstance(raw, Exception):
             raise MessageError(f"no such message ({type(raw).__name__}: {raw})")
         message = validated(self._model, raw)
-        check(message, self._row)
+        validate(message, self._row)
         stamp_ns, port = stamp_of(message), self._row.port
         if self._row.name == "state_command" and stamp_ns:
-            self._be_new(stamp_ns, recorded_ns)
+            self._check_latched(stamp_ns, recorded_ns)
         if port is None or port.variability == "event":
             return message
         if stamp_ns == 0:
             raise MessageError("marked invalid (stamp 0)")
         return as_signal(message, port)
 
-    def _be_new(self, stamp_ns: int, recorded_ns: int) -> None:
-        """Raise MessageError for a state command that a connection has brought, though nobody gave it then."""
+    def _check_latched(self, stamp_ns: int, recorded_ns: int) -> None:
+        """Raise MessageError for an old state command that a new connection has delivered."""
         ago_ns = recorded_ns - stamp_ns
         if ago_ns > _LATCHED_NS:
             raise MessageError(
-                f"given {ago_ns / 1e9:.1f} s before it was recorded, so it came by a connection (latched):"
-                " nobody gave it then"
+                f"published {ago_ns / 1e9:.1f} s before it was recorded: a latched command, delivered when"
+                " the recorder connected"
             )
-        if stamp_ns in self._heeded:
-            raise MessageError(f"heeded before, with the same stamp, {stamp_ns / 1e9:.9f} s")
-        self._heeded.append(stamp_ns)
+        refusal = self._repeated.refusal(stamp_ns)
+        if refusal is not None:
+            raise MessageError(refusal)

@@ -1,4 +1,4 @@
-"""Where on the network a gateway looks for ROS programs on DDS."""
+"""The DDS domain of a gateway: where on the network ROS programs are discovered, and who can reach it."""
 
 from __future__ import annotations
 
@@ -14,101 +14,111 @@ from xml.sax.saxutils import quoteattr
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain
 
+from devices.ros.dds.rtps_discovery import multicast_port
 from schemas.errors import DeviceError
 
-__all__ = ["Discovery", "configuration", "domain"]
+__all__ = ["DiscoveryRange", "configuration", "domain"]
 
-Discovery = Literal["localhost", "subnet"]
+DiscoveryRange = Literal["localhost", "subnet"]
+
+_OPEN_FILES = Path("/proc/self/fd")
 
 _LOOPBACK_ONLY = (
-    "<Interfaces><NetworkInterface"
-    ' address="127.0.0.1"/></Interfaces><MaxMessageSize>65000B</MaxMessageSize><FragmentSize>64000B</FragmentSize>'
+    '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
+    "<MaxMessageSize>65000B</MaxMessageSize><FragmentSize>64000B</FragmentSize>"
 )
-"""Packets as large as UDP takes, as nothing on the way is smaller."""
+"""Packets as large as UDP allows, because the loopback interface splits none."""
 
-_ANNOUNCED = "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><SPDPInterval>1s</SPDPInterval>"
-"""Participants on one machine that are looked for where there is no multicast, as many as rmw_fastrtps and
-rmw_cyclonedds look for, and how often: a program with the default range does not look for others in this way,
-and waits for that.
+_SPDP = (
+    "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+    "<SPDPInterval>1s</SPDPInterval>"
+)
+"""Participants on one machine that are announced to without multicast, as many as with rmw_fastrtps and
+rmw_cyclonedds, and how often: a program with the default range announces itself by multicast only, and waits
+for these announcements.
 """
 
 _NEVER_WAIT = (
     "<Watermarks><WhcHigh>1GB</WhcHigh><WhcHighInit>1GB</WhcHighInit><WhcAdaptive>false</WhcAdaptive></Watermarks>"
     "<WriterLingerDuration>0s</WriterLingerDuration>"
 )
-"""Cyclone DDS makes a writer wait for slow readers by how many bytes they have not acknowledged; ours keep
-only the last messages, which is limit enough. And a writer that is deleted waits for them, one after the
-other.
+"""Cyclone DDS blocks a writer while slow readers have not acknowledged too many bytes; ours keep only the
+last messages, which is limit enough. And a writer that is deleted waits for its readers, each writer in
+turn.
 """
 
 
-class _Settled(Domain):
-    """A domain that remembers how it was made."""
+class _ConfiguredDomain(Domain):
+    """A domain that remembers its configuration."""
 
     def __init__(self, number: int, settings: str) -> None:
         super().__init__(number, settings)
         self.settings = settings
 
 
-_domains: WeakValueDictionary[int, _Settled] = WeakValueDictionary()
-"""Cyclone DDS has one of a number in a process; it goes with the last gateway that holds it."""
+_domains: WeakValueDictionary[int, _ConfiguredDomain] = WeakValueDictionary()
+"""By number: Cyclone DDS has one of each in a process; it ends with the last gateway that holds it."""
 
 
 def domain(number: int, settings: str) -> Domain:
     """Return the domain of this process with this number.
 
-    Raises DeviceError if there is one with other settings, or none can be made.
+    Raises DeviceError if it exists with another configuration, or cannot be created.
     """
     found = _domains.get(number)
     if found is not None and found.settings != settings:
         raise DeviceError(
-            f"two gateways of one process in domain {number} have to say the same of `discovery` and `peers`;"
-            " give one a `host` of its own"
+            f"two gateways of one process in domain {number} must have the same `discovery` and `peers`; give"
+            " one a `host` of its own"
         )
     if found is None:
         try:
-            found = _domains[number] = _Settled(number, settings)
+            found = _domains[number] = _ConfiguredDomain(number, settings)
             if _LOOPBACK_ONLY in settings:
                 _confine(number)
         except DDSException as error:
             raise DeviceError(f"DDS cannot take part in domain {number}: {error.msg}") from error
-        except PermissionError as error:  # before Linux 5.7 that is root's
-            why = f"this system does not let its sockets be bound to the loopback interface ({error})"
+        except PermissionError as error:  # before Linux 5.7 only root may
+            why = f"this system does not allow its sockets to be bound to the loopback interface ({error})"
             raise DeviceError(
                 f"DDS cannot take part in domain {number}: {why}; `discovery: subnet` opens it to the network"
             ) from error
     return found
 
 
-def configuration(discovery: Discovery, peers: Sequence[str]) -> str:
-    """Return the settings (XML, of Eclipse Cyclone DDS's docs/manual/config) for what
-    ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_STATIC_PEERS say to ROS programs.
+def configuration(discovery: DiscoveryRange, peers: Sequence[str]) -> str:
+    """Return the XML configuration of Cyclone DDS (its docs/manual/config).
 
-    Nothing leaves the loopback interface unless `discovery` or `peers` ask for it.
+    Nothing leaves the loopback interface unless `discovery` or `peers` demand it.
+
+    Args:
+        discovery: as ROS_AUTOMATIC_DISCOVERY_RANGE of ROS programs.
+        peers: as ROS_STATIC_PEERS.
     """
     general = f"<AllowMulticast>{'true' if discovery == 'subnet' else 'false'}</AllowMulticast>"
     if discovery == "localhost" and not peers:
         general += _LOOPBACK_ONLY
-    sought = [*(["localhost"] if discovery == "localhost" else []), *peers]
-    found = (
-        f"<Peers>{''.join(f'<Peer address={quoteattr(peer)}/>' for peer in sought)}</Peers>" if sought else ""
+    targets = [*(["localhost"] if discovery == "localhost" else []), *peers]
+    listed = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in targets)
+    spdp = _SPDP + (f"<Peers>{listed}</Peers>" if targets else "")
+    return (
+        f"<CycloneDDS><Domain><General>{general}</General><Discovery>{spdp}</Discovery>"
+        f"<Internal>{_NEVER_WAIT}</Internal></Domain></CycloneDDS>"
     )
-    return f"<CycloneDDS><Domain><General>{general}</General><Discovery>{_ANNOUNCED}{found}</Discovery><Internal>{_NEVER_WAIT}</Internal></Domain></CycloneDDS>"
 
 
 def _confine(number: int) -> None:
-    """Let nothing reach the domain's sockets but what comes over the loopback interface: Cyclone DDS binds
-    them to all, whatever it is told to use.
+    """Bind the domain's sockets to the loopback interface: Cyclone DDS binds them to all, however configured.
 
     Linux only (SO_BINDTODEVICE); elsewhere a firewall has to do it.
     """
-    ports = range(_FIRST_PORT + number * _PORTS, _FIRST_PORT + (number + 1) * _PORTS)
+    ports = range(multicast_port(number), multicast_port(number + 1))
     for entry in _OPEN_FILES.iterdir() if _OPEN_FILES.is_dir() else ():
         try:
             if not stat.S_ISSOCK(entry.stat().st_mode):
                 continue
             ours = socket.socket(fileno=os.dup(int(entry.name)))
-        except OSError:  # closed meanwhile
+        except OSError:  # closed in the meantime
             continue
         with ours:
             if (
@@ -117,8 +127,3 @@ def _confine(number: int) -> None:
                 and ours.getsockname()[1] in ports
             ):
                 ours.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo\0")
-
-
-_OPEN_FILES = Path("/proc/self/fd")
-_FIRST_PORT, _PORTS = 7400, 250
-"""UDP ports of a domain: OMG DDSI-RTPS 2.5, 9.6.2.3."""

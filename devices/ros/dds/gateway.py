@@ -17,7 +17,7 @@ __all__ = ["DdsGateway", "DdsParams"]
 
 
 class DdsParams(GatewayParams):
-    """Which part of the dVRK is shown, and to whom."""
+    """Which part of the dVRK is shown, and in which domain."""
 
     domain: int = Field(
         default=0,
@@ -29,7 +29,7 @@ class DdsParams(GatewayParams):
         default="localhost",
         description=(
             "as ROS_AUTOMATIC_DISCOVERY_RANGE: programs on this machine, or on its network as well, where"
-            " anybody may then read and command, as no certificate is asked for on DDS"
+            " every program may then read and command, as DDS here checks no certificate"
         ),
     )
     peers: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.:-]+$")], ...] = Field(
@@ -48,7 +48,6 @@ class DdsGateway(Gateway):
     params_model = DdsParams
 
     def __init__(self, name: str, params: DdsParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._where = params
 
@@ -58,23 +57,22 @@ class DdsGateway(Gateway):
         Raises MissingExtraError without Cyclone DDS, DeviceError if the domain cannot be joined.
         """
         try:
-            from devices.ros.dds.calls import Calls
             from devices.ros.dds.domain import configuration, domain
+            from devices.ros.dds.services import ServiceParticipant
             from devices.ros.dds.transport import DdsTransport
         except ModuleNotFoundError as error:
             raise MissingExtraError(f"device '{self.name}'", "ros2-dds", "cyclonedds") from error
         where = self._where
-        # of a name that it does not know Cyclone DDS ends the process
+        # resolved here, because Cyclone DDS ends the process for a name that it cannot resolve
         peers = [_address(peer) for peer in where.peers]
         joined = domain(where.domain, configuration(where.discovery, peers))
         hosts = ["127.0.0.1", *peers] if where.discovery == "localhost" else peers
-        return DdsTransport(
-            joined, where.domain, Calls(where.domain, multicast=where.discovery == "subnet", hosts=hosts)
-        )
+        services = ServiceParticipant(where.domain, multicast=where.discovery == "subnet", hosts=hosts)
+        return DdsTransport(joined, where.domain, services)
 
 
 def _address(peer: str) -> str:
-    """Return the address of another machine. Raises DeviceError if it is not known here."""
+    """Return the address of another machine. Raises DeviceError if its name cannot be resolved."""
     try:
         return socket.gethostbyname(peer)
     except (OSError, UnicodeError) as error:

@@ -1,5 +1,4 @@
-"""Who is in a ROS graph on DDS: what participants write and read, as DDS tells, and how their nodes are
-called, as they tell on `ros_discovery_info`.
+"""The ROS graph on DDS: endpoints of participants, and names of their nodes from `ros_discovery_info`.
 
 Source: ros2/rmw_dds_common, its README and msg/ParticipantEntitiesInfo.msg.
 """
@@ -23,10 +22,15 @@ _CDR_LE = b"\x00\x01\x00\x00"
 
 
 def entities_info(participant: bytes, node: str, readers: Sequence[bytes], writers: Sequence[bytes]) -> bytes:
-    """Return the message (CDR) in which a participant tells that all its readers and writers, given by their
-    ids of 16 bytes, are those of `node`.
+    """Return the message (CDR) that assigns all readers and writers of a participant to one node.
 
-    It is made for each of some hundred of them: hence not by the codec.
+    It is encoded for each of some hundred endpoints, hence not by the codec.
+
+    Args:
+        participant: its GUID, 16 bytes.
+        node: name of the node with namespace.
+        readers: GUIDs.
+        writers: GUIDs.
     """
     namespace, _, name = node.rpartition("/")
     body = participant + struct.pack("<I", 1)
@@ -34,43 +38,45 @@ def entities_info(participant: bytes, node: str, readers: Sequence[bytes], write
         body += b"\x00" * (-len(body) % 4) + struct.pack("<I", len(text) + 1) + text.encode() + b"\x00"
     body += b"\x00" * (-len(body) % 4)
     return (
-        _CDR_LE + body + b"".join(struct.pack("<I", len(ids)) + b"".join(ids) for ids in (readers, writers))
+        _CDR_LE
+        + body
+        + b"".join(struct.pack("<I", len(guids)) + b"".join(guids) for guids in (readers, writers))
     )
 
 
 class Graph:
-    """The other participants.
+    """The other participants of the domain; for use from any thread.
 
-    A program is a participant, and is called like its first node; may be used from any thread.
+    A program is a participant, and has the name of its first node. All GUIDs have 16 bytes.
     """
 
     def __init__(self, own: bytes) -> None:
-        """`own`: the id of the participant that is not looked at."""
+        """`own`: GUID of the participant that is ignored."""
         self._own = own
         self._changing = threading.Lock()
         self._endpoints: dict[bytes, tuple[bytes, str]] = {}
-        """Participant and topic of DDS by endpoint, all ids with 16 bytes."""
+        """Participant and DDS topic by endpoint."""
         self._nodes: dict[bytes, str] = {}
-        """First node by participant, as told."""
+        """First node by participant."""
         self._names: dict[bytes, str] = {}
-        """What a participant is called since it sent something."""
+        """Name of a participant, fixed from its first message on."""
 
-    def came(self, endpoint: bytes, participant: bytes, topic: str) -> None:
-        """Take note of a reader or a writer."""
+    def add_endpoint(self, endpoint: bytes, participant: bytes, topic: str) -> None:
+        """Add a reader or a writer."""
         if participant != self._own:
             with self._changing:
                 self._endpoints[endpoint] = participant, topic
 
-    def went(self, endpoint: bytes) -> None:
-        """Forget a reader or a writer, and its participant with the last one."""
+    def remove_endpoint(self, endpoint: bytes) -> None:
+        """Remove a reader or a writer, and its participant with the last one."""
         with self._changing:
             participant, _ = self._endpoints.pop(endpoint, (b"", ""))
             if all(other != participant for other, _ in self._endpoints.values()):
                 self._nodes.pop(participant, None)
                 self._names.pop(participant, None)
 
-    def told(self, info: bytes) -> None:
-        """Take what a participant tells of its nodes (CDR).
+    def set_nodes(self, info: bytes) -> None:
+        """Set the nodes of a participant from its ParticipantEntitiesInfo (CDR).
 
         Raises MessageError if the bytes are no such message.
         """
@@ -87,30 +93,28 @@ class Graph:
                 self._nodes[participant] = f"{first.node_namespace.rstrip('/')}/{first.node_name}"
 
     def sender(self, participant: bytes) -> str:
-        """Return what the program of a participant is called, from now on: who commands an arm does not
-        become another one when its name is known.
+        """Return the name of a participant, and keep it from now on.
+
+        So a program that commands an arm does not become another one when the name of its node is discovered.
         """
         with self._changing:
             return self._names.setdefault(participant, self._name(participant))
 
     def _name(self, participant: bytes) -> str:
-        """Like its first node, with its id behind it if another one is called so."""
+        """Return the name of its first node, with its id where another participant has the same name."""
         identity, node = participant[:12].hex(), self._nodes.get(participant)
         if node is None:
             return f"participant {identity}"
-        return (
-            f"{node} ({identity})"
-            if any(name == node for other, name in self._names.items() if other != participant)
-            else node
-        )
+        is_taken = any(name == node for other, name in self._names.items() if other != participant)
+        return f"{node} ({identity})" if is_taken else node
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
-        """Return the programs that have to do with any of `topics`, given as DDS calls them."""
+        """Return the programs that read or write any of `topics`, which are names of DDS topics."""
         with self._changing:
-            there = dict.fromkeys(
+            found = dict.fromkeys(
                 participant for participant, topic in self._endpoints.values() if topic in topics
             )
             return tuple(
                 Client(self._names.get(participant) or self._name(participant), participant[:12].hex())
-                for participant in there
+                for participant in found
             )

@@ -1,8 +1,8 @@
-"""The part of DDS's wire protocol that `dds_calls` speaks: messages, submessages and parameter lists,
-little-endian.
+"""The RTPS messages that `devices.ros.dds.services` sends and receives, little-endian only.
 
-Source: OMG DDSI-RTPS 2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters); the identity of a request
-is a parameter of DDS-RPC 1.0, 7.8.2.
+Message, submessages (DATA, HEARTBEAT, ACKNACK, GAP, INFO_DST) and parameter lists. Source: OMG DDSI-RTPS
+2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters). INFO_TS and fragments are skipped: services
+need neither.
 """
 
 from __future__ import annotations
@@ -16,145 +16,151 @@ from schemas.errors import MessageError
 
 __all__ = [
     "PL_CDR_LE",
-    "Acknack",
+    "AckNack",
     "Data",
     "Gap",
     "Heartbeat",
-    "Received",
-    "acknack",
-    "data",
-    "heartbeat",
-    "message",
-    "parameters",
-    "read_parameters",
-    "received",
-    "sequence_number",
-    "text",
+    "Message",
+    "Submessage",
+    "encode_acknack",
+    "encode_data",
+    "encode_heartbeat",
+    "encode_message",
+    "encode_parameters",
+    "encode_sequence_number",
+    "encode_string",
+    "parse_message",
+    "parse_parameters",
 ]
 
 PL_CDR_LE = b"\x00\x03\x00\x00"
-_SENTINEL = struct.pack("<HH", 1, 0)
-_LITTLE, _INLINE_QOS, _FINAL, _PAYLOAD, _KEY = 1, 2, 2, 4, 8
-_ACKNACK, _HEARTBEAT, _GAP, _INFO_DESTINATION, _DATA = 0x06, 0x07, 0x08, 0x0E, 0x15
-_WINDOW = 256
-"""Numbers in a set."""
+"""Encapsulation header of a parameter list, as discovery data has it."""
+_PID_SENTINEL = struct.pack("<HH", 1, 0)
+_LITTLE_ENDIAN, _INLINE_QOS, _FINAL, _DATA_PRESENT, _KEY_PRESENT = 1, 2, 2, 4, 8
+"""Flags of submessages: of all; DATA; HEARTBEAT and ACKNACK; DATA; DATA."""
+_ACKNACK, _HEARTBEAT, _GAP, _INFO_DST, _DATA = 0x06, 0x07, 0x08, 0x0E, 0x15
+_MOST_IN_SET = 256
+"""Sequence numbers in one SequenceNumberSet."""
 
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """A sample; `writer` and `reader` are ids of 4 bytes, here and below."""
+    """DATA: one sample. `writer_id` and `reader_id` are EntityIds, 4 bytes, here and below."""
 
-    writer: bytes
-    reader: bytes
-    number: int
-    qos: Mapping[int, bytes]
-    """Parameters beside it."""
+    writer_id: bytes
+    reader_id: bytes
+    sequence_number: int
+    inline_qos: Mapping[int, bytes]
+    """Parameters beside the payload, by id."""
     payload: bytes
-    """With its encapsulation header; if it only says that something is gone, the key of that or nothing."""
+    """With its encapsulation header; of a disposed instance the key, or nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """What a writer has: samples `first` to `last`."""
+    """HEARTBEAT: the samples that a writer has, `first` to `last`."""
 
-    writer: bytes
-    reader: bytes
+    writer_id: bytes
+    reader_id: bytes
     first: int
     last: int
     is_final: bool
-    """Nobody has to answer who has all."""
+    """A reader that has all samples need not answer."""
 
 
 @dataclass(frozen=True, slots=True)
-class Acknack:
-    """What a reader has: all before `base`; and what it asks for."""
+class AckNack:
+    """ACKNACK: a reader has all samples before `base`, and requests those that are `missing`."""
 
-    writer: bytes
-    reader: bytes
+    writer_id: bytes
+    reader_id: bytes
     base: int
     missing: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples that a reader will never get: from `start` until before `base`, and `others`."""
+    """GAP: samples that are irrelevant to the reader, from `start` until before `base`, and `others`."""
 
-    writer: bytes
-    reader: bytes
+    writer_id: bytes
+    reader_id: bytes
     start: int
     base: int
     others: tuple[int, ...]
 
 
-Submessage: TypeAlias = Data | Heartbeat | Acknack | Gap
+Submessage: TypeAlias = Data | Heartbeat | AckNack | Gap
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
-    """A message for us."""
+class Message:
+    """The submessages of a datagram that are addressed to one participant."""
 
-    source: bytes
-    """GUID prefix of its sender, 12 bytes, of which the first two are its vendor."""
+    guid_prefix: bytes
+    """Of the sending participant: 12 bytes, of which the first two are its vendor."""
     submessages: tuple[Submessage, ...]
 
 
-def message(source: bytes, destination: bytes, submessages: Iterable[bytes]) -> bytes:
-    """Return a message from one participant to another, given by their GUID prefixes."""
-    head = b"RTPS\x02\x03" + source[:2] + source
-    return head + _submessage(_INFO_DESTINATION, 0, destination) + b"".join(submessages)
+def encode_message(source: bytes, destination: bytes, submessages: Iterable[bytes]) -> bytes:
+    """Return a message with INFO_DST; `source` and `destination` are GUID prefixes, the latter 0 for all."""
+    header = b"RTPS\x02\x03" + source[:2] + source
+    return header + _submessage(_INFO_DST, 0, destination) + b"".join(submessages)
 
 
 def _submessage(kind: int, flags: int, content: bytes) -> bytes:
     content += bytes(-len(content) % 4)
-    return struct.pack("<BBH", kind, flags | _LITTLE, len(content)) + content
+    return struct.pack("<BBH", kind, flags | _LITTLE_ENDIAN, len(content)) + content
 
 
-def sequence_number(value: int) -> bytes:
-    """Return a sequence number as it goes over the wire."""
+def encode_sequence_number(value: int) -> bytes:
+    """Return a SequenceNumber, 8 bytes."""
     return struct.pack("<iI", value >> 32, value & 0xFFFFFFFF)
 
 
-def data(
-    writer: bytes, reader: bytes, number: int, payload: bytes, qos: Mapping[int, bytes] | None = None
+def encode_data(
+    writer_id: bytes,
+    reader_id: bytes,
+    sequence_number: int,
+    payload: bytes,
+    inline_qos: Mapping[int, bytes] | None = None,
 ) -> bytes:
-    """Return a DATA submessage; `qos`: parameters beside the payload. Without one it says only what they say."""
-    beside = parameters(qos) if qos else b""
-    flags = (_PAYLOAD if payload else 0) | (_INLINE_QOS if qos else 0)
-    return _submessage(
-        _DATA, flags, struct.pack("<HH", 0, 16) + reader + writer + sequence_number(number) + beside + payload
-    )
+    """Return a DATA submessage; without payload it has inline QoS only, such as a disposal."""
+    qos = encode_parameters(inline_qos) if inline_qos else b""
+    flags = (_DATA_PRESENT if payload else 0) | (_INLINE_QOS if inline_qos else 0)
+    head = struct.pack("<HH", 0, 16) + reader_id + writer_id + encode_sequence_number(sequence_number)
+    return _submessage(_DATA, flags, head + qos + payload)
 
 
-def heartbeat(writer: bytes, reader: bytes, first: int, last: int, count: int) -> bytes:
-    """Return a HEARTBEAT submessage that wants an answer."""
-    return _submessage(
-        _HEARTBEAT,
-        0,
-        reader + writer + sequence_number(first) + sequence_number(last) + struct.pack("<I", count),
-    )
+def encode_heartbeat(writer_id: bytes, reader_id: bytes, first: int, last: int, count: int) -> bytes:
+    """Return a HEARTBEAT submessage that requires an ACKNACK."""
+    numbers = encode_sequence_number(first) + encode_sequence_number(last)
+    return _submessage(_HEARTBEAT, 0, reader_id + writer_id + numbers + struct.pack("<I", count))
 
 
-def acknack(writer: bytes, reader: bytes, base: int, missing: Iterable[int], count: int) -> bytes:
-    """Return an ACKNACK submessage: all before `base` is there, `missing` (within 256) is asked for."""
-    offsets = [number - base for number in missing if number - base < _WINDOW]
+def encode_acknack(
+    writer_id: bytes, reader_id: bytes, base: int, missing: Iterable[int], count: int
+) -> bytes:
+    """Return an ACKNACK submessage: all before `base` is there, `missing` (within 256 of it) is requested."""
+    offsets = [number - base for number in missing if number - base < _MOST_IN_SET]
     bits = max(offsets, default=-1) + 1
     words = [0] * ((bits + 31) // 32)
     for offset in offsets:
         words[offset // 32] |= 1 << (31 - offset % 32)
-    numbers = sequence_number(base) + struct.pack(f"<I{len(words)}I", bits, *words)
-    return _submessage(_ACKNACK, _FINAL, reader + writer + numbers + struct.pack("<I", count))
+    numbers = encode_sequence_number(base) + struct.pack(f"<I{len(words)}I", bits, *words)
+    return _submessage(_ACKNACK, _FINAL, reader_id + writer_id + numbers + struct.pack("<I", count))
 
 
-def parameters(values: Mapping[int, bytes]) -> bytes:
+def encode_parameters(values: Mapping[int, bytes]) -> bytes:
     """Return a parameter list."""
     padded = {id_: value + bytes(-len(value) % 4) for id_, value in values.items()}
-    return b"".join(struct.pack("<HH", id_, len(value)) + value for id_, value in padded.items()) + _SENTINEL
+    encoded = b"".join(struct.pack("<HH", id_, len(value)) + value for id_, value in padded.items())
+    return encoded + _PID_SENTINEL
 
 
-def read_parameters(encoded: bytes) -> tuple[dict[int, bytes], int]:
-    """Return a parameter list, the first of each kind, and how many bytes it has.
+def parse_parameters(encoded: bytes) -> tuple[dict[int, bytes], int]:
+    """Return a parameter list, the first of each id, and its length in bytes.
 
-    Raises MessageError if it has no end.
+    Raises MessageError if it has no sentinel.
     """
     found: dict[int, bytes] = {}
     at = 0
@@ -168,75 +174,66 @@ def read_parameters(encoded: bytes) -> tuple[dict[int, bytes], int]:
     raise MessageError(f"a parameter list of {len(encoded)} bytes has no end")
 
 
-def text(value: str) -> bytes:
+def encode_string(value: str) -> bytes:
     """Return a string as a parameter has it."""
     encoded = value.encode() + b"\0"
     return struct.pack("<I", len(encoded)) + encoded
 
 
-def received(datagram: bytes, own: bytes) -> Received:
-    """Return what a datagram has for the participant with the GUID prefix `own`.
+def parse_message(datagram: bytes, own: bytes) -> Message:
+    """Return the part of a datagram that is for the participant with the GUID prefix `own`.
 
-    Raises MessageError if it is no message, or one in big-endian.
+    Raises MessageError if it is no RTPS message, or big-endian.
     """
     if len(datagram) < 20 or datagram[:4] != b"RTPS":
         raise MessageError(f"{len(datagram)} bytes are no message of RTPS")
     try:
-        return Received(datagram[8:20], tuple(_submessages(datagram, own)))
+        return Message(datagram[8:20], tuple(_submessages(datagram, own)))
     except (struct.error, IndexError) as error:
-        raise MessageError(f"{len(datagram)} bytes are a torn message of RTPS: {error}") from error
+        raise MessageError(f"{len(datagram)} bytes are a truncated message of RTPS: {error}") from error
 
 
 def _submessages(datagram: bytes, own: bytes) -> Iterator[Submessage]:
     at, is_ours = 20, True
     while at + 4 <= len(datagram):
         kind, flags, length = struct.unpack_from("<BBH", datagram, at)
-        if not flags & _LITTLE:
-            raise MessageError("a message of RTPS in big-endian is not read")
+        if not flags & _LITTLE_ENDIAN:
+            raise MessageError("big-endian messages of RTPS are not supported")
         content = datagram[at + 4 : at + 4 + length] if length else datagram[at + 4 :]
         at += 4 + len(content)
-        if kind == _INFO_DESTINATION:
+        if kind == _INFO_DST:
             is_ours = content[:12] in (own, bytes(12))
         elif is_ours and kind == _DATA:
-            yield _read_data(content, flags)
+            yield _data(content, flags)
         elif is_ours and kind == _HEARTBEAT:
-            yield Heartbeat(
-                content[4:8],
-                content[:4],
-                _read_number(content, 8),
-                _read_number(content, 16),
-                bool(flags & _FINAL),
-            )
+            first, last = _sequence_number(content, 8), _sequence_number(content, 16)
+            yield Heartbeat(content[4:8], content[:4], first, last, bool(flags & _FINAL))
         elif is_ours and kind == _ACKNACK:
-            yield Acknack(content[4:8], content[:4], *_read_set(content, 8))
+            yield AckNack(content[4:8], content[:4], *_sequence_number_set(content, 8))
         elif is_ours and kind == _GAP:
-            yield Gap(content[4:8], content[:4], _read_number(content, 8), *_read_set(content, 16))
+            start = _sequence_number(content, 8)
+            yield Gap(content[4:8], content[:4], start, *_sequence_number_set(content, 16))
 
 
-def _read_data(content: bytes, flags: int) -> Data:
+def _data(content: bytes, flags: int) -> Data:
     (to_qos,) = struct.unpack_from("<H", content, 2)
-    at, qos = 4 + to_qos, dict[int, bytes]()
+    at, inline_qos = 4 + to_qos, dict[int, bytes]()
     if flags & _INLINE_QOS:
-        qos, length = read_parameters(content[at:])
+        inline_qos, length = parse_parameters(content[at:])
         at += length
-    return Data(
-        content[8:12],
-        content[4:8],
-        _read_number(content, 12),
-        qos,
-        content[at:] if flags & (_PAYLOAD | _KEY) else b"",
-    )
+    payload = content[at:] if flags & (_DATA_PRESENT | _KEY_PRESENT) else b""
+    return Data(content[8:12], content[4:8], _sequence_number(content, 12), inline_qos, payload)
 
 
-def _read_number(content: bytes, at: int) -> int:
+def _sequence_number(content: bytes, at: int) -> int:
     high, low = struct.unpack_from("<iI", content, at)
     return (high << 32) + low
 
 
-def _read_set(content: bytes, at: int) -> tuple[int, tuple[int, ...]]:
-    """Return the base of a set of numbers, and the numbers."""
-    base = _read_number(content, at)
+def _sequence_number_set(content: bytes, at: int) -> tuple[int, tuple[int, ...]]:
+    """Return the base of a SequenceNumberSet, and the numbers in it."""
+    base = _sequence_number(content, at)
     (bits,) = struct.unpack_from("<I", content, at + 8)
-    bits = min(bits, _WINDOW)
+    bits = min(bits, _MOST_IN_SET)
     words = struct.unpack_from(f"<{(bits + 31) // 32}I", content, at + 12)
     return base, tuple(base + bit for bit in range(bits) if words[bit // 32] >> (31 - bit % 32) & 1)

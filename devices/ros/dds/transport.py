@@ -1,5 +1,4 @@
-"""ROS 2 as its programs with DDS lay it out, on Eclipse Cyclone DDS: the gateway is one more participant, and
-needs no ROS.
+"""ROS 2 over DDS, on Eclipse Cyclone DDS: the gateway is one more participant, and needs no ROS.
 
 Sources: names from ros2/design, articles/140_topic_and_service_name_mapping.md; user data from
 ros2/rmw_dds_common, rmw_dds_common/src/qos.cpp (hash of a type) and ros2/rmw_cyclonedds,
@@ -15,56 +14,56 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from devices.ros.dds.arrivals import Arrivals
-from devices.ros.dds.calls import Calls
+from devices.ros.dds.discovery import Discovery
 from devices.ros.dds.graph import INFO_TOPIC, INFO_TYPE, entities_info
-from devices.ros.dds.programs import Programs
+from devices.ros.dds.services import ServiceParticipant
 from devices.ros.dds.types import Payload, payload_type
+from devices.ros.dds.waitset import ReaderWaitSet
 from devices.ros.topics.row import Row
-from devices.ros.transport import NODE, Client, Handler, Publisher, Taker, Transport
+from devices.ros.transport import NODE, Client, MessageHandler, Publisher, ServiceHandler, Transport
 from schemas.codec import rihs01
 
 __all__ = ["DdsTransport"]
 
 _ALWAYS = (Policy.Reliability.Reliable(0), Policy.DataRepresentation(use_cdrv0_representation=True))
-"""A reader gets all that still is there when it asks; a writer waits 0 ns for one."""
+"""Reliable, as far as a writer's history reaches; it never blocks for a reader (max_blocking_time 0 ns)."""
 
 VOLATILE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(10))
-"""As ROS programs have it: the last ten messages."""
+"""As ROS programs have it by default: the last ten messages."""
 _LARGE = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(60))
 """Of pictures, a second at 60 Hz.
 
-What is larger than a packet comes in parts, and a reader of Fast DDS 2.14 that has some of them never returns
-from its next take when it is told that the rest is gone (docs/decisions/0030): so the rest is there while a
-busy machine loses packets.
+A message larger than a packet is sent in fragments, and a reader of Fast DDS 2.14 that has some of them
+never returns from its next take when a GAP says that the rest is gone (docs/decisions/0030): so the writer
+keeps the rest while a busy machine loses packets.
 """
 _LAST = Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1)
 LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), _LAST)
-_HEARD = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
-"""As many as a gateway takes at once."""
+_SUBSCRIBED = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
+"""As many as a gateway accepts at once."""
 
 
 class DdsTransport(Transport):
-    """Publishes, listens and answers as one node on one participant.
+    """Publishes, subscribes and serves as one node on one participant.
 
-    Nothing that is published waits for a reader: each topic keeps its last messages for whoever is slow.
-    Messages are taken in a thread of their own.
+    Publishing never waits for a reader: each writer keeps its last messages for slow ones. Messages are
+    taken in a thread of their own.
     """
 
-    def __init__(self, domain: Domain, number: int, calls: Calls) -> None:
-        """Join `domain`, whose number is `number`, with what answers services there."""
-        self._domain, self._calls = domain, calls
+    def __init__(self, domain: Domain, number: int, services: ServiceParticipant) -> None:
+        """Join `domain`, whose number is `number`; `services` is a participant of the same domain."""
+        self._domain, self._services = domain, services
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
-        self._id = self._participant.guid.bytes
-        calls.ignore(self._id)
-        self._messages = Arrivals(self._participant, "DDS messages")
-        # first: no message comes before its sender
-        self._programs = Programs(self._participant, self._messages)
+        self._guid = self._participant.guid.bytes
+        services.ignore(self._guid)
+        self._waitset = ReaderWaitSet(self._participant, "DDS messages")
+        # added first: no message is handled before its sender is discovered
+        self._discovery = Discovery(self._participant, self._waitset)
         self._topics: set[str] = set()
         self._readers: list[DataReader[Payload]] = []
         self._writers: list[DataWriter[Payload]] = []
         self._served: list[tuple[bytes, bytes]] = []
-        """Ids of what hears and answers each service."""
+        """GUIDs of the reader and the writer of each service."""
         self._info = self._writer(INFO_TOPIC, payload_type(INFO_TYPE), LATCHED)
         self._closed = False
         self._announce()
@@ -81,27 +80,27 @@ class DdsTransport(Transport):
 
         return publish
 
-    def subscribe(self, row: Row, take: Taker) -> None:  # noqa: D102
-        def heard(sample: Payload | InvalidSample) -> None:
+    def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
+        def on_sample(sample: Payload | InvalidSample) -> None:
             if isinstance(sample, Payload):
-                take(sample.cdr, self._programs.sender(sample.sample_info.publication_handle))
+                receive(sample.cdr, self._discovery.sender(sample.sample_info.publication_handle))
 
-        self._messages.add(self._reader(f"rt{row.topic}", payload_type(row.type), row.type), heard)
+        self._waitset.add(self._reader(f"rt{row.topic}", payload_type(row.type), row.type), on_sample)
 
-    def serve(self, row: Row, handle: Handler) -> None:  # noqa: D102
+    def serve(self, row: Row, handle: ServiceHandler) -> None:  # noqa: D102
         self._topics |= {f"rq{row.topic}Request", f"rr{row.topic}Reply"}
-        self._served.append(self._calls.serve(row.topic, row.type, handle))
+        self._served.append(self._services.serve(row.topic, row.type, handle))
         self._announce()
 
     def clients(self) -> tuple[Client, ...]:  # noqa: D102
-        return self._programs.clients(self._topics)
+        return self._discovery.clients(self._topics)
 
     def close(self) -> None:  # noqa: D102
         if not self._closed:
             self._closed = True
-            self._messages.close()
-            self._calls.close()
-            # now, with all that is on it, and not when somebody lets go of the last part
+            self._waitset.close()
+            self._services.close()
+            # deletes it now, with all its entities, and not with the last reference to one of them
             self._participant.__del__()
             del self._domain
 
@@ -116,19 +115,19 @@ class DdsTransport(Transport):
     def _reader(self, topic: str, type_: type[Payload], ros_type: str = "") -> DataReader[Payload]:
         self._topics.add(topic)
         reader = DataReader(
-            self._participant, Topic(self._participant, topic, type_), _HEARD + _hashed(ros_type)
+            self._participant, Topic(self._participant, topic, type_), _SUBSCRIBED + _hashed(ros_type)
         )
         self._readers.append(reader)
         self._announce()
         return reader
 
     def _announce(self) -> None:
-        """Tell of which node our readers and writers are."""
+        """Publish to which node our readers and writers belong."""
         readers = [*(reader.guid.bytes for reader in self._readers), *(reader for reader, _ in self._served)]
         writers = [*(writer.guid.bytes for writer in self._writers), *(writer for _, writer in self._served)]
-        self._info.write(self._info.data_type(entities_info(self._id, NODE, readers, writers)))
+        self._info.write(self._info.data_type(entities_info(self._guid, NODE, readers, writers)))
 
 
 def _hashed(ros_type: str) -> Qos:
-    """Return what lets a program tell the hash (REP-2016) of a topic's type."""
+    """Return the user data with the hash (REP-2016) of a topic's type."""
     return Qos(Policy.Userdata(f"typehash={rihs01(ros_type)};".encode())) if ros_type else Qos()

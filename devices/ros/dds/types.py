@@ -1,6 +1,6 @@
-"""DDS types made of ROS types, whose samples are messages that are CDR already: nothing is serialised twice.
+"""DDS types from ROS types, whose samples are messages in CDR already: nothing is serialised twice.
 
-Cyclone DDS announces the type of every topic and lets in only bytes that are such a message, so the whole
+Cyclone DDS announces the type of every topic and accepts only bytes that are such a message, so the whole
 definition is needed; it comes from the type store, where our models are.
 """
 
@@ -43,11 +43,14 @@ class Payload(IdlStruct):
     """A message as it goes over the wire."""
 
     def __init__(self, cdr: bytes) -> None:
-        """Take the message with its encapsulation header."""
+        """`cdr`: the message with its encapsulation header."""
         self.cdr = cdr
 
     def serialize(
-        self, buffer: object = None, endianness: object = None, use_version_2: bool | None = None
+        self,
+        buffer: object = None,  # noqa: ARG002
+        endianness: object = None,  # noqa: ARG002
+        use_version_2: bool | None = None,  # noqa: ARG002
     ) -> bytes:
         """Return the message as it is."""
         return self.cdr
@@ -59,7 +62,7 @@ class Payload(IdlStruct):
 
     @classmethod
     def deserialize_key(cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Self:  # noqa: ARG003
-        """Return what there is of a message that only says that its writer is gone."""
+        """Return the key of a disposed instance, which has no message."""
         return cls(data)
 
 
@@ -81,9 +84,7 @@ def _fields(ros_type: str) -> dict[str, Any]:
 
 
 def _type(described: Any) -> Any:
-    """Return the type of a field as rosbags describes it: its kind, and what it is made of; bounds and
-    lengths are 0 where there are none.
-    """
+    """Return the type of a field as rosbags describes it; bounds and lengths are 0 if there are none."""
     kind, of = described
     if kind == Nodetype.NAME:
         return _struct(of)

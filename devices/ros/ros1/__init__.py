@@ -1,1 +1,1 @@
-"""ROS 1."""
+"""ROS 1: a node in pure Python (XML-RPC and TCPROS)."""

@@ -1,5 +1,4 @@
-"""One connection between two programs of ROS 1 (TCPROS): a header each, and then frames of four bytes of
-length and a message.
+"""One TCPROS connection: a header from each side, then frames of four bytes of length and a message.
 
 Source: wiki.ros.org/ROS/TCPROS and wiki.ros.org/ROS/Connection Header.
 """
@@ -14,41 +13,41 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from devices.ros.ros1.loop import Loop
+from devices.ros.ros1.event_loop import EventLoop
 from schemas.codec import MAX_MESSAGE_BYTES
 from schemas.errors import MessageError
 
-__all__ = ["Connection", "Fields", "Incoming", "header_frame"]
+__all__ = ["Connection", "Fields", "FrameHandler", "header_frame", "parse_header"]
 
 log = logging.getLogger(__name__)
 
 Fields = Mapping[str, str]
-"""What a connection's header tells: topic, type, md5sum, callerid and more."""
+"""The fields of a connection header: topic, type, md5sum, callerid and more."""
 
-Incoming = Callable[[bytes], None]
-"""Takes a message, without its length."""
+FrameHandler = Callable[[bytes], None]
+"""Receives the message of a frame, without its length."""
 
 _LENGTH = struct.Struct("<I")
 _READ_BYTES = 1 << 14
-"""At once, of one connection: a flood on it has the others wait for so much."""
+"""At once, of one connection: the others wait no longer than for that."""
 _MOST_HEADER_BYTES = 1 << 20
 _BACKLOG = 1000
 _KEEPALIVE = {"TCP_KEEPIDLE": 60, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 9}
-"""Seconds of silence until it is asked whether the other machine is still there, between two questions, and
-how many of them; where the system lets them be set. As rospy has it (ros/ros_comm,
-clients/rospy/src/rospy/impl/tcpros_base.py): one that lost its power closes no connection.
+"""Seconds of silence until the first probe, seconds between probes, and their number, where the system has
+these options. As in rospy (ros/ros_comm, clients/rospy/src/rospy/impl/tcpros_base.py): a machine that lost
+its power closes no connection.
 """
 
 
 def header_frame(fields: Fields) -> bytes:
-    """Return a header as it is sent."""
+    """Return the frame of a connection header."""
     parts = [f"{name}={value}".encode() for name, value in fields.items()]
     content = b"".join(_LENGTH.pack(len(part)) + part for part in parts)
     return _LENGTH.pack(len(content)) + content
 
 
-def _fields(content: bytes) -> Fields:
-    """Return what a header tells. Raises MessageError if it is none."""
+def parse_header(content: bytes) -> Fields:
+    """Return the fields of a connection header. Raises MessageError if it is invalid."""
     fields: dict[str, str] = {}
     at = 0
     try:
@@ -65,27 +64,33 @@ def _fields(content: bytes) -> Fields:
 
 
 class Connection:
-    """A socket with what is read from and written to it.
+    """A socket of the event loop, with its buffers.
 
-    Nothing waits: what a program does not take is kept for it up to a limit, then the oldest is dropped.
-
-    The other side's header goes to `greeted`, which returns what takes the messages that follow; it raises
-    MessageError to hang up.
+    Sending never blocks: messages that a program does not read are kept up to a limit, then the oldest is
+    dropped.
     """
 
     def __init__(
         self,
-        loop: Loop,
+        loop: EventLoop,
         sock: socket.socket,
-        greeted: Callable[[Connection, Fields], Incoming],
-        lost: Callable[[Connection], None],
+        on_header: Callable[[Connection, Fields], FrameHandler],
+        on_closed: Callable[[Connection], None],
         *,
         keep: int = _BACKLOG,
     ) -> None:
-        """Take a connected socket, and what is told when the connection has ended; `keep`: messages that wait
-        for a slow reader.
+        """Prepare a connected socket; `start` begins to read.
+
+        Args:
+            loop: whose thread reads and writes.
+            sock: the connected socket.
+            on_header: gets the other side's header and returns the handler of the messages that follow;
+                raises MessageError to close the connection.
+            on_closed: called when the connection has ended.
+            keep: messages that are kept for a slow reader.
         """
-        self._loop, self._socket, self._greeted, self._lost, self.keep = loop, sock, greeted, lost, keep
+        self._loop, self._socket, self.keep = loop, sock, keep
+        self._on_header, self._on_closed = on_header, on_closed
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -94,22 +99,22 @@ class Connection:
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
         self.address = str(sock.getpeername()[0])
         self.program = self.address
-        """Name of the program at the other side, once its header has come."""
-        self._take: Incoming | None = None
+        """Name of the program at the other side, once its header has arrived."""
+        self._on_frame: FrameHandler | None = None
         self._read = bytearray()
-        self._waiting: deque[memoryview] = deque()
-        self._begun = False
-        """Whether a part of the first of those that wait is sent."""
+        self._queue: deque[memoryview] = deque()
+        self._partly_sent = False
+        """Whether the first frame of the queue is sent in part."""
         self._writing = threading.Lock()
         self._closed = False
 
     @property
-    def is_greeted(self) -> bool:
-        """Whether the other side's header has come, and is heeded."""
-        return self._take is not None
+    def is_established(self) -> bool:
+        """Whether the other side's header has arrived and was accepted."""
+        return self._on_frame is not None
 
     def start(self) -> None:
-        """Begin to read; from any thread, once."""
+        """Start to read; from any thread, once."""
         self._loop.call(partial(self._watch, writing=False))
 
     def _watch(self, *, writing: bool) -> None:
@@ -117,49 +122,49 @@ class Connection:
             self._loop.watch(self._socket, self, writing=writing)
 
     def send(self, frame: bytes | bytearray) -> None:
-        """Send, or keep until there is room; from any thread."""
+        """Send a frame, or queue it until the socket can be written; from any thread."""
         with self._writing:
             if self._closed:
                 return
-            if self._waiting:
-                self._keep(memoryview(frame))
+            if self._queue:
+                self._enqueue(memoryview(frame))
                 return
             try:
                 sent = self._socket.send(frame)
             except BlockingIOError:
                 sent = 0
-            except OSError:  # reset: the loop sees it, too, and ends the connection
+            except OSError:  # reset: the loop notices it, too, and ends the connection
                 return
             if sent < len(frame):
-                self._waiting.append(memoryview(frame)[sent:])
-                self._begun = sent > 0
+                self._queue.append(memoryview(frame)[sent:])
+                self._partly_sent = sent > 0
                 self._loop.call(partial(self._watch, writing=True))
 
-    def _keep(self, frame: memoryview) -> None:
-        if len(self._waiting) > self.keep:
-            del self._waiting[1 if self._begun else 0]
-        self._waiting.append(frame)
+    def _enqueue(self, frame: memoryview) -> None:
+        if len(self._queue) > self.keep:
+            del self._queue[1 if self._partly_sent else 0]
+        self._queue.append(frame)
 
     def writable(self) -> None:
-        """Send what waits."""
+        """Send what is queued."""
         with self._writing:
             try:
-                while self._waiting:
-                    sent = self._socket.send(self._waiting[0])
-                    if sent < len(self._waiting[0]):
-                        self._waiting[0] = self._waiting[0][sent:]
-                        self._begun = True
+                while self._queue:
+                    sent = self._socket.send(self._queue[0])
+                    if sent < len(self._queue[0]):
+                        self._queue[0] = self._queue[0][sent:]
+                        self._partly_sent = True
                         return
-                    self._waiting.popleft()
-                    self._begun = False
+                    self._queue.popleft()
+                    self._partly_sent = False
             except BlockingIOError:
                 return
             except OSError:
-                self._waiting.clear()
+                self._queue.clear()
         self._watch(writing=False)
 
     def readable(self) -> None:
-        """Take what has come."""
+        """Read what has arrived, and handle the complete frames."""
         try:
             chunk = self._socket.recv(_READ_BYTES)
         except BlockingIOError:
@@ -171,31 +176,31 @@ class Connection:
             return
         self._read += chunk
         try:
-            self._take_frames()
+            self._handle_frames()
         except MessageError as error:
             log.warning("ROS 1: the connection with %s is closed: %s", self.program, error)
             self.close()
-        except Exception:  # what was read is not taken again and again
+        except Exception:  # the same bytes must not be handled again and again
             self.close()
             raise
 
-    def _take_frames(self) -> None:
+    def _handle_frames(self) -> None:
         at = 0
         while len(self._read) - at >= _LENGTH.size:
             (length,) = _LENGTH.unpack_from(self._read, at)
-            most = MAX_MESSAGE_BYTES if self._take is not None else _MOST_HEADER_BYTES
+            most = MAX_MESSAGE_BYTES if self._on_frame is not None else _MOST_HEADER_BYTES
             if length > most:
                 raise MessageError(f"{length} bytes in one message exceed the limit of {most}")
             end = at + _LENGTH.size + length
             if len(self._read) < end:
                 break
             content, at = bytes(self._read[at + _LENGTH.size : end]), end
-            if self._take is None:
-                fields = _fields(content)
+            if self._on_frame is None:
+                fields = parse_header(content)
                 self.program = fields.get("callerid", self.address)
-                self._take = self._greeted(self, fields)
+                self._on_frame = self._on_header(self, fields)
             else:
-                self._take(content)
+                self._on_frame(content)
         del self._read[:at]
 
     def close(self) -> None:
@@ -204,7 +209,7 @@ class Connection:
             if self._closed:
                 return
             self._closed = True
-            self._waiting.clear()
+            self._queue.clear()
             self._loop.forget(self._socket)
             self._socket.close()
-        self._lost(self)
+        self._on_closed(self)

@@ -1,6 +1,4 @@
-"""A gateway to ROS 1: its own node in pure Python, at the master of the console; nothing of ROS is needed
-where the hub runs.
-"""
+"""A gateway to ROS 1: a node in pure Python at the master of the console; the hub's machine needs no ROS."""
 
 from __future__ import annotations
 
@@ -21,11 +19,11 @@ from schemas.errors import DeviceError
 __all__ = ["Ros1Gateway", "Ros1Params"]
 
 _MASTER = "http://127.0.0.1:11311"
-"""Where roscore listens unless it is told otherwise."""
+"""Where roscore listens by default."""
 
 
 class Ros1Params(GatewayParams):
-    """Which part of the dVRK is shown, and to the programs of which master."""
+    """Which part of the dVRK is shown, and at which master."""
 
     master: Annotated[str, Field(pattern=r"^http://[^/:\s]+:\d+/?$")] | None = Field(
         default=None,
@@ -37,8 +35,8 @@ class Ros1Params(GatewayParams):
         default=None,
         description=(
             "address of this machine at which programs reach the gateway, which listens there only; by"
-            " default that from which the master is reached: 127.0.0.1 for one on this machine. ROS 1 asks"
-            " nobody who he is: whoever reaches another address than 127.0.0.1 may command the arms"
+            " default that from which the master is reached: 127.0.0.1 for one on this machine. ROS 1"
+            " identifies no program: each that reaches another address than 127.0.0.1 may command the arms"
         ),
     )
 
@@ -47,8 +45,8 @@ class Ros1Params(GatewayParams):
     def _reachable(cls, ip: IPv4Address | None) -> IPv4Address | None:
         if ip is not None and ip.is_unspecified:
             raise ValueError(
-                f"{ip} is no address that a program could connect to; expected that of one of this machine's"
-                " networks"
+                f"{ip} is no address that a program could connect to; expected the address of this machine in"
+                " one of its networks"
             )
         return ip
 
@@ -60,19 +58,18 @@ class Ros1Gateway(Gateway):
     params_model = Ros1Params
 
     def __init__(self, name: str, params: Ros1Params) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._master, self._ip = params.master, params.ip
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
-        """Begin to be a node; its master may come later.
+        """Start the node; its master may start later.
 
-        Raises DeviceError if there is no way to the master, or if `ip` is not this machine.
+        Raises DeviceError if there is no route to the master, or if `ip` is not this machine.
         """
-        from devices.ros.ros1.transport import Ros1Transport  # it parses all definitions of Noetic
+        from devices.ros.ros1.transport import Ros1Transport  # parses all definitions of Noetic
 
         master = self._master or os.environ.get("ROS_MASTER_URI") or _MASTER
-        host = _way_to(master) if self._ip is None else str(self._ip)
+        host = _address_towards(master) if self._ip is None else str(self._ip)
         try:
             return Ros1Transport(master, f"/trocar_{self.name}", host)
         except OSError as error:
@@ -81,10 +78,10 @@ class Ros1Gateway(Gateway):
             ) from error
 
 
-def _way_to(master: str) -> str:
+def _address_towards(master: str) -> str:
     """Return the address of this machine from which a master is reached.
 
-    Raises DeviceError if there is no way to it.
+    Raises DeviceError if there is no route to it.
     """
     try:
         address = urlsplit(master)
@@ -93,6 +90,6 @@ def _way_to(master: str) -> str:
             return str(sock.getsockname()[0])
     except (OSError, ValueError, TypeError) as error:
         raise DeviceError(
-            f"there is no way to the ROS master at '{master}' ({error}); expected http://HOST:PORT, with a"
-            " host that this machine knows"
+            f"there is no route to the ROS master at '{master}' ({error}); expected http://HOST:PORT, with a"
+            " host that this machine can resolve"
         ) from error

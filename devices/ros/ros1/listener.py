@@ -1,4 +1,4 @@
-"""Where other programs of ROS 1 connect to ours."""
+"""Accepts connections of other ROS 1 programs."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
-from devices.ros.ros1.loop import Loop
+from devices.ros.ros1.event_loop import EventLoop
 
 __all__ = ["Listener"]
 
 log = logging.getLogger(__name__)
 
 _BACKLOG = 512
-"""Connections that may come at once: a console that wants all topics makes several hundred."""
+"""Connections that may arrive at once: a console that subscribes to all topics makes several hundred."""
 _PAUSE_S = 1.0
 _FILES = 16384
 
 
 class Listener:
-    """A socket at a free port."""
+    """A listening socket at a free port."""
 
-    def __init__(self, loop: Loop, host: str, came: Callable[[socket.socket], None]) -> None:
-        """Take the address to listen at, and what takes each connection."""
-        _allow_many()
-        self._loop, self._came = loop, came
+    def __init__(self, loop: EventLoop, host: str, on_connection: Callable[[socket.socket], None]) -> None:
+        """Listen at the address `host`; `on_connection` gets the socket of each connection."""
+        _raise_file_limit()
+        self._loop, self._on_connection = loop, on_connection
         self._socket = socket.create_server((host, 0), backlog=_BACKLOG)
         self._socket.setblocking(False)
         self.port = int(self._socket.getsockname()[1])
@@ -37,12 +37,12 @@ class Listener:
         self._loop.call(partial(self._loop.watch, self._socket, self))
 
     def readable(self) -> None:
-        """Take a connection."""
+        """Accept a connection."""
         try:
             sock, _ = self._socket.accept()
         except BlockingIOError:
             return
-        except OSError as error:  # too many open files: what waits stays readable
+        except OSError as error:  # too many open files: the socket stays readable
             log.warning("ROS 1: a program cannot connect: %s", error)
             self._loop.forget(self._socket)
             pause = threading.Timer(_PAUSE_S, self._watch)
@@ -50,23 +50,21 @@ class Listener:
             pause.start()
             return
         try:
-            self._came(sock)
-        except OSError:  # gone already
+            self._on_connection(sock)
+        except OSError:  # closed by the other side already
             sock.close()
 
     def writable(self) -> None:
-        """Nothing is written here."""
+        """A listening socket is never written to."""
 
     def close(self) -> None:
-        """Listen no more; in the loop's thread."""
+        """Stop listening; in the loop's thread."""
         self._loop.forget(self._socket)
         self._socket.close()
 
 
-def _allow_many() -> None:
-    """Let this process open as many files as the system grants it, within reason: in ROS 1 each topic of each
-    program is one.
-    """
+def _raise_file_limit() -> None:
+    """Raise this process's limit of open files: in ROS 1 each topic of each program is a socket."""
     if sys.platform != "win32":
         import resource
 

@@ -1,14 +1,14 @@
-"""A service that a node of ROS 1 answers."""
+"""A service of our ROS 1 node."""
 
 from __future__ import annotations
 
 import struct
 from functools import partial
 
-from devices.ros.ros1.connection import Connection, Fields, Incoming, header_frame
+from devices.ros.ros1.connection import Connection, Fields, FrameHandler, header_frame
 from devices.ros.ros1.types import Wire, ros1_name, service_checksum
 from devices.ros.topics.row import Row
-from devices.ros.transport import Handler
+from devices.ros.transport import ServiceHandler
 from schemas.errors import MessageError
 
 __all__ = ["Service"]
@@ -17,10 +17,10 @@ _FAILED = struct.Struct("<BI")
 
 
 class Service:
-    """Answers requests in the order in which they come; a program may ask once or often over one connection."""
+    """Answers requests in the order of their arrival, one or many per connection."""
 
-    def __init__(self, row: Row, handle: Handler, node: str) -> None:
-        """Take the service, what answers it, and the name of our node."""
+    def __init__(self, row: Row, handle: ServiceHandler, node: str) -> None:
+        """`node`: name of our node."""
         self._handle, self._name = handle, row.topic
         self._request, self._response = Wire(f"{row.type}_Request"), Wire(f"{row.type}_Response")
         name = ros1_name(row.type)
@@ -32,19 +32,19 @@ class Service:
             "type": name,
         }
 
-    def greet(self, caller: Connection, fields: Fields) -> Incoming:
-        """Take a program that wants to ask. Raises MessageError if it takes the service for something else."""
+    def on_header(self, client: Connection, fields: Fields) -> FrameHandler:
+        """Accept a client. Raises MessageError if its header has another type."""
         ours, theirs = self._header["md5sum"], fields.get("md5sum", "*")
         if theirs not in (ours, "*"):
             raise MessageError(
                 f"service {self._name} is {self._header['type']} with MD5 {ours}, not {theirs}"
             )
-        caller.send(header_frame(self._header))
-        return partial(self._answer, caller)
+        client.send(header_frame(self._header))
+        return partial(self._answer, client)
 
-    def _answer(self, caller: Connection, request: bytes) -> None:
+    def _answer(self, client: Connection, request: bytes) -> None:
         try:
-            caller.send(b"\x01" + self._response.frame(self._handle(self._request.cdr(request)), 0))
+            client.send(b"\x01" + self._response.frame(self._handle(self._request.cdr(request)), 0))
         except MessageError as error:
-            word = str(error).encode()
-            caller.send(_FAILED.pack(0, len(word)) + word)
+            reason = str(error).encode()
+            client.send(_FAILED.pack(0, len(reason)) + reason)

@@ -1,4 +1,4 @@
-"""Topics that a node of ROS 1 listens to, and the programs that publish them."""
+"""Topics that our ROS 1 node subscribes to, and connections to their publishers."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Iterable
 from functools import partial
 from time import monotonic, time_ns
 
-from devices.ros.ros1.api import Program
-from devices.ros.ros1.connection import Connection, Fields, Incoming, header_frame
-from devices.ros.ros1.loop import Loop
+from devices.ros.ros1.connection import Connection, Fields, FrameHandler, header_frame
+from devices.ros.ros1.event_loop import EventLoop
 from devices.ros.ros1.types import Wire, checksum, definition, ros1_name
+from devices.ros.ros1.xmlrpc_api import ApiClient
 from devices.ros.topics.row import Row
-from devices.ros.transport import Taker
+from devices.ros.transport import MessageHandler
 from schemas.errors import DeviceError, MessageError
 
 __all__ = ["Subscription", "Subscriptions"]
@@ -22,27 +22,26 @@ __all__ = ["Subscription", "Subscriptions"]
 log = logging.getLogger(__name__)
 
 _CONNECT_S = 2.0
-_SOONEST_S, _LATEST_S = 0.5, 30.0
-"""How long it takes until a connection that failed is tried again, at first and at last; rospy has the same.
-"""
-_KEPT_S = 0.5
-"""What a publisher has kept for those who come later follows its header at once: within a few milliseconds,
-or some tens on a busy machine. What comes later than this is meant now.
+_FIRST_RETRY_S, _LAST_RETRY_S = 0.5, 30.0
+"""Shortest and longest time until a failed connection is tried again; as in rospy."""
+_LATCHED_S = 0.5
+"""A latched message follows the publisher's header at once: within a few milliseconds, or some tens on a busy
+machine. A message that arrives later than this was published now.
 """
 _UNREACHED = (
-    "ROS 1: the program at %s, which publishes %s, is not reached: %s. Its ROS_IP or ROS_HOSTNAME must be an"
-    " address that this machine knows"
+    "ROS 1: the program at %s, which publishes %s, cannot be reached: %s. Its ROS_IP or ROS_HOSTNAME must be"
+    " an address that this machine can resolve"
 )
-_NO_MESSAGE = b"\xff\xff"
-"""Stands before bytes that could not be made CDR, which it cannot begin with."""
+_INVALID = b"\xff\xff"
+"""Prefix of bytes that could not be converted to CDR, which cannot begin so."""
 
 
 class Subscription:
-    """One topic, and what takes its messages."""
+    """One topic, and the handler of its messages."""
 
-    def __init__(self, row: Row, take: Taker, node: str) -> None:
-        """Take the topic, what takes its messages, and the name of our node."""
-        self.topic, self._take, self._wire = row.topic, take, Wire(row.type)
+    def __init__(self, row: Row, receive: MessageHandler, node: str) -> None:
+        """`node`: name of our node."""
+        self.topic, self._receive, self._wire = row.topic, receive, Wire(row.type)
         self._md5 = checksum(row.type)
         self.header = {
             "callerid": node,
@@ -54,85 +53,87 @@ class Subscription:
         }
 
     def check(self, fields: Fields) -> None:
-        """Raise MessageError if a publisher's header says that it publishes something else, or nothing."""
+        """Raise MessageError if a publisher's header reports an error or another type."""
         if "error" in fields:
             raise MessageError(f"{self.topic}: {fields['error']}")
         if fields.get("md5sum", "*") not in (self._md5, "*"):
             raise MessageError(
-                f"{self.topic} has MD5 {self._md5}, not {fields['md5sum']}: its messages are of another"
-                " version"
+                f"{self.topic} has MD5 {self._md5}, not {fields['md5sum']}: the publisher has another version"
+                " of the message"
             )
 
-    def hear(self, message: bytes, program: str, *, linked_ns: int) -> None:
-        """Hand on a message as CDR, or as bytes that are none."""
+    def on_message(self, message: bytes, program: str, *, connected_ns: int) -> None:
+        """Pass on a message as CDR, or as invalid bytes, which the receiver counts and reports."""
         try:
             cdr = self._wire.cdr(message)
         except MessageError:
-            cdr = _NO_MESSAGE + message
-        self._take(cdr, program, linked_ns=linked_ns)
+            cdr = _INVALID + message
+        self._receive(cdr, program, connected_ns=connected_ns)
 
 
-class _Link:
-    """Between a topic of ours and a program that publishes it."""
+class _PublisherLink:
+    """Our subscription to a topic at one of its publishers."""
 
-    def __init__(self, subscription: Subscription, *, there_before: bool) -> None:
-        """Take the topic; `there_before`: what the program has kept of it is older than the link."""
-        self.subscription, self.there_before = subscription, there_before
+    def __init__(self, subscription: Subscription, *, published_before: bool) -> None:
+        """`published_before`: a latched message of the publisher is older than the connection."""
+        self.subscription, self.published_before = subscription, published_before
         self.connection: Connection | None = None
         self.wanted = True
-        """Whether the master says that the program publishes it."""
+        """Whether the program publishes the topic, by what the master reports."""
         self.due, self.delay = 0.0, 0.0
 
     def retry(self) -> None:
-        """Have the connection made again, later each time that it fails."""
-        # what the program has kept by then was heard, or could not be told while it was meant
-        self.connection, self.there_before = None, True
-        self.delay = min(max(2 * self.delay, _SOONEST_S), _LATEST_S)
+        """Schedule the next attempt to connect, later after each failure."""
+        # a latched message at the next connection was received already, or is too old to be meant
+        self.connection, self.published_before = None, True
+        self.delay = min(max(2 * self.delay, _FIRST_RETRY_S), _LAST_RETRY_S)
         self.due = monotonic() + self.delay
 
-    def greeted(self, connection: Connection, fields: Fields) -> Incoming:
-        """Take the header of the publisher."""
+    def on_header(self, connection: Connection, fields: Fields) -> FrameHandler:
+        """Accept the publisher's header. Raises MessageError if it is not that of our topic."""
         self.subscription.check(fields)
         self.delay = 0.0
-        keeps = self.there_before and fields.get("latching") == "1"
-        kept_until, linked_ns = monotonic() + _KEPT_S, time_ns()
+        is_first = self.published_before and fields.get("latching") == "1"
+        latched_until, connected_ns = monotonic() + _LATCHED_S, time_ns()
 
-        def heard(message: bytes) -> None:
-            nonlocal keeps
-            maybe_kept, keeps = keeps and monotonic() < kept_until, False
-            self.subscription.hear(message, connection.program, linked_ns=linked_ns if maybe_kept else 0)
+        def on_frame(message: bytes) -> None:
+            nonlocal is_first
+            may_be_latched, is_first = is_first and monotonic() < latched_until, False
+            self.subscription.on_message(
+                message, connection.program, connected_ns=connected_ns if may_be_latched else 0
+            )
 
-        return heard
+        return on_frame
 
 
 class Subscriptions:
-    """All topics.
+    """All subscribed topics.
 
-    Each program that publishes any of them has a thread that connects to it, so that one that does not answer
-    holds up no other.
+    For each program that publishes any of them a thread connects to it, so that one that does not answer
+    delays no other.
     """
 
-    def __init__(self, loop: Loop, node: str) -> None:
-        """Take what watches the connections, and the name of our node."""
+    def __init__(self, loop: EventLoop, node: str) -> None:
+        """`loop` watches the connections; `node`: name of our node."""
         self._loop, self._node = loop, node
         self._subscriptions: dict[str, Subscription] = {}
         self._listed: set[str] = set()
-        """Topics of which a master has told who published them before us."""
-        self._links: dict[str, dict[str, _Link]] = {}
-        """By address of the program and topic."""
+        """Topics whose earlier publishers the master has listed, in its answer to our registration."""
+        self._links: dict[str, dict[str, _PublisherLink]] = {}
+        """By URI of the program and topic."""
         self._changing = threading.Condition()
         self._closed = False
 
     @property
     def topics(self) -> list[list[str]]:
-        """Names and types."""
+        """Names and ROS 1 types."""
         return [
             [topic, subscription.header["type"]] for topic, subscription in self._subscriptions.copy().items()
         ]
 
     @property
     def connections(self) -> list[tuple[str, Connection]]:
-        """Topics with the connections to their publishers."""
+        """Topics with the established connections to their publishers."""
         with self._changing:
             found = [
                 (link.subscription.topic, link.connection)
@@ -142,27 +143,31 @@ class Subscriptions:
         return [
             (topic, connection)
             for topic, connection in found
-            if connection is not None and connection.is_greeted
+            if connection is not None and connection.is_established
         ]
 
     def add(self, subscription: Subscription) -> None:
-        """Listen to a topic, once its publishers are known."""
+        """Subscribe to a topic; connections follow when its publishers are known."""
         self._subscriptions[subscription.topic] = subscription
 
-    def update(self, topic: str, uris: Iterable[str], *, there_before: bool) -> None:
-        """Take the addresses of all programs that publish a topic; `there_before`: it is a master's answer to
-        our registration, so they did before we listened.
+    def update(self, topic: str, uris: Iterable[str], *, published_before: bool) -> None:
+        """Set the URIs of all programs that publish a topic.
 
-        Of whom it tells before that, it is not known. One that is not among them and still connected is heard
-        until it goes: a master that has started again knows nobody.
+        A connected publisher that is not among them keeps its connection: a restarted master knows no node.
+
+        Args:
+            topic: its name.
+            uris: of its publishers' Slave APIs.
+            published_before: whether this is the master's answer to our registration, so that they published
+                before we subscribed. Of updates before that answer it is unknown, and assumed.
         """
         subscription, publishing = self._subscriptions.get(topic), set(uris)
         if subscription is None:
             return
         with self._changing:
-            if there_before:
+            if published_before:
                 self._listed.add(topic)
-            kept_before = there_before or topic not in self._listed
+            is_older = published_before or topic not in self._listed
             for uri in sorted(publishing):
                 links = self._links.get(uri)
                 if links is None and not self._closed:
@@ -171,37 +176,37 @@ class Subscriptions:
                         target=self._connect_all, args=(uri,), name=f"ROS 1 {uri}", daemon=True
                     ).start()
                 if links is not None:
-                    links.setdefault(topic, _Link(subscription, there_before=kept_before))
+                    links.setdefault(topic, _PublisherLink(subscription, published_before=is_older))
             for uri, links in self._links.items():
                 if topic in links:
                     links[topic].wanted = uri in publishing
             self._changing.notify_all()
 
     def _connect_all(self, uri: str) -> None:
-        """Keep the links to one program connected, as long as there are any."""
-        program, links, told = Program(uri, self._node), self._links[uri], False
+        """Keep the links to one program connected, as long as it has any."""
+        client, links, has_warned = ApiClient(uri, self._node), self._links[uri], False
         try:
             while (link := self._due(uri, links)) is not None:
                 try:
-                    self._connect(program, link)
+                    self._connect(client, link)
                 except (OSError, DeviceError, ValueError) as error:
-                    # it has ended without a word to the master
+                    # refused: the program has ended without unregistering
                     is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)
                     log.log(
-                        logging.DEBUG if is_gone or told else logging.WARNING,
+                        logging.DEBUG if is_gone or has_warned else logging.WARNING,
                         _UNREACHED,
                         uri,
                         link.subscription.topic,
                         error,
                     )
-                    told = told or not is_gone
+                    has_warned = has_warned or not is_gone
                     with self._changing:
                         link.retry()
         finally:
-            program.close()
+            client.close()
 
-    def _due(self, uri: str, links: dict[str, _Link]) -> _Link | None:
-        """Wait for a link that is to be connected now; None when there are no links any more."""
+    def _due(self, uri: str, links: dict[str, _PublisherLink]) -> _PublisherLink | None:
+        """Wait for a link that is due to be connected; None when the program has no links any more."""
         with self._changing:
             while not self._closed:
                 for topic in [
@@ -218,39 +223,41 @@ class Subscriptions:
             del self._links[uri]
             return None
 
-    def _connect(self, program: Program, link: _Link) -> None:
+    def _connect(self, client: ApiClient, link: _PublisherLink) -> None:
         """Connect to a topic of a program.
 
-        Raises OSError, DeviceError, or of a host's name that is none ValueError, if that cannot be.
+        Raises OSError or DeviceError if that fails, ValueError if the host's name is invalid.
         """
-        answer = program.call("requestTopic", link.subscription.topic, [["TCPROS"]])
-        match answer:
+        result = client.call("requestTopic", link.subscription.topic, [["TCPROS"]])
+        match result:
             case (1, _, [_, str(host), int(port)]) if 0 < port < 1 << 16:
                 sock = socket.create_connection((host, port), _CONNECT_S)
             case _:
-                raise DeviceError(f"it names no place to connect to: {answer}")
+                raise DeviceError(f"it returns no address to connect to: {result}")
         try:
             with self._changing:
-                self._begin(link, sock)
-        except OSError:  # gone already
+                self._open(link, sock)
+        except OSError:  # closed by the other side already
             sock.close()
             raise
 
-    def _begin(self, link: _Link, sock: socket.socket) -> None:
+    def _open(self, link: _PublisherLink, sock: socket.socket) -> None:
         if self._closed:
             sock.close()
             return
-        link.connection = connection = Connection(self._loop, sock, link.greeted, partial(self._lost, link))
+        link.connection = connection = Connection(
+            self._loop, sock, link.on_header, partial(self._on_closed, link)
+        )
         connection.send(header_frame(link.subscription.header))
         connection.start()
 
-    def _lost(self, link: _Link, _: Connection) -> None:
+    def _on_closed(self, link: _PublisherLink, _: Connection) -> None:
         with self._changing:
             link.retry()
             self._changing.notify_all()
 
     def close(self) -> None:
-        """Connect no more; connections that are there end with their loop."""
+        """Stop connecting; open connections end with their loop."""
         with self._changing:
             self._closed = True
             self._changing.notify_all()

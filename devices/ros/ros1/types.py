@@ -1,9 +1,8 @@
-"""Messages and services as ROS 1 has them: names, definitions, checksums, and what its wire has in place of
-CDR.
+"""Messages and services of ROS 1: names, definitions, MD5 sums, and conversion to and from CDR.
 
 ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, and
-knows the definitions of Noetic, in which some fields have other names than in ROS 2 (`CameraInfo`); what it
-does not know (CRTK, tf2) is the same in both and comes from our models.
+has the definitions of Noetic, in which some fields have other names than in ROS 2 (`CameraInfo`); types that
+it lacks (CRTK, tf2) are the same in both and come from our models.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ def ros1_name(type_: str) -> str:
 
 
 def definition(type_: str) -> str:
-    """Return the definition of a message and of all that it holds, as publishers tell it and bags keep it."""
+    """Return the definition of a message and of its fields' types, as connection headers and bags have it."""
     return _noetic().generate_msgdef(type_, ros_version=1)[0]
 
 
@@ -54,16 +53,14 @@ def checksum(type_: str) -> str:
 
 
 def service_checksum(type_: str) -> str:
-    """Return the MD5 sum of a service: that of the texts of its request and response, one after the other
-    (genmsg, gentools.py).
-    """
+    """Return the MD5 sum of a service: of the texts of its request and response (genmsg, gentools.py)."""
     return md5(
         (_summed(f"{type_}_Request") + _summed(f"{type_}_Response")).encode(), usedforsecurity=False
     ).hexdigest()
 
 
 def _summed(type_: str) -> str:
-    """Return the text of which a checksum is made: the definition, with its checksum for every message in it."""
+    """Return the text that is summed: the definition, with sums in place of message types."""
     lines = definition(type_).partition("=" * 80)[0].strip().splitlines()
     return "\n".join(_summed_line(*line.split(" ", 1)) for line in lines)
 
@@ -74,18 +71,16 @@ def _summed_line(kind: str, name: str) -> str:
 
 
 class Wire:
-    """Converts messages of one type to the frames of ROS 1, four bytes of length and the message, and back."""
+    """Converts messages of one type to frames of ROS 1 (length in four bytes, message), and back."""
 
     def __init__(self, type_: str) -> None:
-        """Take the type as our models have it: `sensor_msgs/msg/JointState`."""
+        """`type_`: as our models have it, `sensor_msgs/msg/JointState`."""
         self._type, self._store = type_, typestore()
         fields = self._store.fielddefs[type_][1]
         self._counted = bool(fields) and fields[0][1][1] == _HEADER
 
     def frame(self, cdr: bytes, count: int) -> bytearray:
-        """Return the frame of a message of ours; `count` goes into its header, if it has one, as the
-        publishers of ROS 1 do it.
-        """
+        """Return the frame of a message; `count` is the sequence number of its header, if it has one."""
         message = self._store.cdr_to_ros1(memoryview(cdr), self._type)
         frame = bytearray(_LENGTH.size + len(message))
         frame[_LENGTH.size :] = message

@@ -1,1 +1,1 @@
-"""The topics and services that every gateway serves."""
+"""The topics and services of a gateway, independent of the middleware: tables, validation, publishing."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from devices.ros.topics.outgoing import State
+from devices.ros.topics.publications import State
 from devices.ros.topics.row import Row
-from devices.ros.transport import Handler
+from devices.ros.transport import ServiceHandler
 from robots.dvrk.kinematics_queries import KinematicsQueries
 from robots.serial_chain import SerialChain
 from schemas.codec import decode, encode
@@ -22,21 +22,25 @@ from schemas.vectors import Vector
 __all__ = ["kinematics_handler"]
 
 
-def kinematics_handler(row: Row, chain: SerialChain, base: State) -> Handler:
-    """Return what answers the service `row` of an arm with this kinematics; `base`: the pose of its base in
-    its reference.
+def kinematics_handler(row: Row, chain: SerialChain, base: State) -> ServiceHandler:
+    """Return the handler of the service `row`.
+
+    Args:
+        row: forward or inverse kinematics, in the arm's base (`local/...`) or in its reference frame.
+        chain: the arm's kinematics.
+        base: pose, shape (7,), of the arm's base in its reference frame.
     """
     queries = KinematicsQueries(chain)
 
     def forward(payload: bytes) -> bytes:
-        stands = None if row.name.startswith("local/") else base.value
-        if stands is None and not row.name.startswith("local/"):
+        base_pose = None if row.name.startswith("local/") else base.value
+        if base_pose is None and not row.name.startswith("local/"):
             return encode(
                 ForwardKinematicsResponse(
-                    message=f"nobody tells {base.port.name} now: is the session running?"
+                    message=f"{base.port.name} has no value now: is the session running?"
                 )
             )
-        answer = queries.forward(decode(ForwardKinematicsRequest, payload).jp, stands)
+        answer = queries.forward(decode(ForwardKinematicsRequest, payload).jp, base_pose)
         return encode(
             ForwardKinematicsResponse(cp=_pose(answer.value), result=answer.result, message=answer.message)
         )

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from schemas.ports import Port
+from schemas.ros import CompressedImage, Image
 
 __all__ = ["Row", "Way"]
 
-_PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_PICTURES = (Image.ros_type, CompressedImage.ros_type)
 
 Way = Literal["publish", "subscribe", "serve"]
 
@@ -23,25 +24,24 @@ class Row:
     type: str
     """ROS 2 type: `sensor_msgs/msg/JointState`, `crtk_msgs/srv/QueryForwardKinematics`."""
     way: Way
-    """`publish`: what the simulation tells; `subscribe`: what ROS programs say; `serve`: what they ask."""
+    """`publish`: from the simulation; `subscribe`: from ROS programs; `serve`: a service for them."""
     port: Port | None = None
     """The port behind it: an input if published, an output if subscribed to.
 
-    None: the gateway itself makes or answers it.
+    None: the gateway itself publishes or serves it.
     """
     latched: bool = False
     """Late joiners get the last message."""
     periodic: bool = False
-    """Published at the gateway's period, the newest value each time; otherwise once for every message, at
-    once.
-    """
+    """Published at the gateway's period, the newest value each time; otherwise once per message, at once."""
     owner: str = ""
-    """The arm, console part or camera that it belongs to, on whose `warning` and `error` its bad input is
-    told: `PSM1`, `SUJ/PSM1`.
+    """The arm, console part or camera that it belongs to: `PSM1`, `SUJ/PSM1`.
+
+    Its `warning` and `error` report what was refused on this row.
     """
 
     is_real: bool = False
-    """Whether it is of a real arm or pedal, that is listened to."""
+    """Whether it belongs to a real arm or pedal that the gateway subscribes to."""
 
     @property
     def is_picture(self) -> bool:
@@ -50,10 +50,10 @@ class Row:
 
     @property
     def name(self) -> str:
-        """What is left of the topic without its owner: `measured_js`, `jaw/servo_jp`."""
+        """The topic without its owner: `measured_js`, `jaw/servo_jp`."""
         return self.topic.rpartition(f"/{self.owner}/")[2] if self.owner else self.topic[1:]
 
     @property
-    def leads(self) -> bool:
-        """Say whether it moves an arm: such commands are heeded from one program at a time."""
+    def moves(self) -> bool:
+        """Whether it moves an arm: such commands are accepted from one program at a time."""
         return self.way == "subscribe" and self.name.rpartition("/")[2].startswith(("servo_", "move_"))

@@ -1,1 +1,1 @@
-"""ROS 2 over Zenoh, as rmw_zenoh lays it out."""
+"""ROS 2 over Zenoh, compatible with rmw_zenoh."""

@@ -1,6 +1,4 @@
-"""A gateway to ROS 2 over Zenoh: programs with RMW_IMPLEMENTATION=rmw_zenoh_cpp connect to the hub, which is
-the router that they look for.
-"""
+"""A gateway to ROS 2 over Zenoh: the hub is the router of programs with RMW_IMPLEMENTATION=rmw_zenoh_cpp."""
 
 from __future__ import annotations
 
@@ -20,7 +18,7 @@ __all__ = ["ZenohGateway", "ZenohParams"]
 
 
 class ZenohParams(GatewayParams):
-    """Which part of the dVRK is shown, and to whom."""
+    """Which part of the dVRK is shown, and in which domain."""
 
     domain: int = Field(
         default=0,
@@ -31,35 +29,34 @@ class ZenohParams(GatewayParams):
 
 
 class ZenohGateway(Gateway):
-    """The kind `ros2-zenoh`."""
+    """The kind `ros2-zenoh`; a `hub.transport.router_client.RouterClient`."""
 
     kind = "ros2-zenoh"
     params_model = ZenohParams
 
     def __init__(self, name: str, params: ZenohParams) -> None:
-        """Take the participant's name and its parameters."""
         super().__init__(name, params)
         self._domain = params.domain
         self._connect: Callable[[], zenoh.Session] | None = None
 
     @property
     def foreign_keys(self) -> tuple[str, ...]:
-        """Topics and services of the domain, what keeps their last messages, and the graph."""
+        """Keys of the domain's topics and services, of caches of their last messages, and of the graph."""
         return f"{self._domain}/**", f"{self._domain}/**/@adv/**", graph_key(self._domain)
 
     def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
-        """Take what opens a Zenoh session with the hub."""
+        """Receive the function that opens a Zenoh session with the hub."""
         self._connect = connect
 
     def connect(self, directory: Path) -> Transport:  # noqa: ARG002
         """Join the graph of the domain.
 
-        Raises ConnectError if the hub cannot be reached, DeviceError if there is none.
+        Raises ConnectError if the hub cannot be reached, DeviceError if the device has no hub.
         """
         if self._connect is None:
             raise DeviceError(
-                f"'{self.name}' shows ROS programs what its hub runs, and has been opened without one"
+                f"'{self.name}' needs the router of a hub, and was opened without one: run it in a session"
             )
-        from devices.ros.zenoh.transport import ZenohTransport  # it needs the extra
+        from devices.ros.zenoh.transport import ZenohTransport  # needs the extra
 
         return ZenohTransport(self._connect, self._domain)

@@ -1,4 +1,4 @@
-"""Who is in a ROS graph on Zenoh, by the tokens of its programs, and which of them has sent a message."""
+"""The ROS graph on Zenoh: programs by their liveliness tokens, and the sender of each message."""
 
 from __future__ import annotations
 
@@ -8,83 +8,81 @@ from collections.abc import Collection
 from xxhash import xxh3_128_digest
 
 from devices.ros.transport import Client
-from devices.ros.zenoh.layout import Endpoint
+from devices.ros.zenoh.layout import GraphToken
 
 __all__ = ["Graph", "gid_of"]
 
 
-def gid_of(token: str) -> bytes:
-    """Return the id that rmw_zenoh makes of a token: XXH3 with 128 bits, the low half first."""
-    return xxh3_128_digest(token.encode())[::-1]
+def gid_of(key: str) -> bytes:
+    """Return the gid that rmw_zenoh makes of a token's key: XXH3 with 128 bits, the low half first."""
+    return xxh3_128_digest(key.encode())[::-1]
 
 
 class Graph:
-    """The other programs.
+    """The other programs of the graph; for use from any thread.
 
-    A program is a session of Zenoh, and is called like the first node of it; may be used from any thread.
+    A program is a Zenoh session, and has the name of its first node.
     """
 
     def __init__(self, own_session: str) -> None:
-        """`own_session`: the id of the session whose tokens are not looked at."""
+        """`own_session`: id of the session whose tokens are ignored."""
         self._own = own_session
         self._changing = threading.Lock()
-        self._there: dict[str, Endpoint] = {}
-        """By token."""
+        self._tokens: dict[str, GraphToken] = {}
+        """By key."""
         self._names: dict[str, str] = {}
-        """By session."""
+        """Of programs, by session."""
         self._senders: dict[bytes, str] = {}
-        """Token by the id of a publisher, also where that was not made of the token."""
+        """Key of the token by gid of the publisher, also where the gid is not a hash of the key."""
 
-    def came(self, token: str) -> None:
-        """Take note of a token."""
-        endpoint = Endpoint.of(token)
-        if endpoint is None or endpoint.session == self._own:
+    def add(self, key: str) -> None:
+        """Add the token with this key."""
+        token = GraphToken.parsed(key)
+        if token is None or token.session == self._own:
             return
         with self._changing:
-            self._there[token] = endpoint
-            if endpoint.session not in self._names:
-                taken = endpoint.node in self._names.values()
-                self._names[endpoint.session] = (
-                    f"{endpoint.node} ({endpoint.session})" if taken else endpoint.node
-                )
+            self._tokens[key] = token
+            if token.session not in self._names:
+                taken = token.node in self._names.values()
+                self._names[token.session] = f"{token.node} ({token.session})" if taken else token.node
 
-    def went(self, token: str) -> None:
-        """Forget a token."""
+    def remove(self, key: str) -> None:
+        """Remove the token with this key."""
         with self._changing:
-            endpoint = self._there.pop(token, None)
-            if endpoint is None:
+            token = self._tokens.pop(key, None)
+            if token is None:
                 return
-            self._senders = {gid: its for gid, its in self._senders.items() if its != token}
-            if all(other.session != endpoint.session for other in self._there.values()):
-                del self._names[endpoint.session]
+            self._senders = {gid: its for gid, its in self._senders.items() if its != key}
+            if all(other.session != token.session for other in self._tokens.values()):
+                del self._names[token.session]
 
     def sender(self, topic: str, gid: bytes) -> str:
         """Return the name of the program that sent a message on `topic` as the publisher `gid`.
 
-        A publisher whose id is not made of its token, as other clients than rmw_zenoh may have it, is known
-        as the only one left on its topic; where two such share a topic from the beginning, each goes by its
-        id.
+        A publisher whose gid is not the hash of its token's key, as with other clients than rmw_zenoh, is
+        identified as the only unidentified one of its topic; where two such share a topic from the beginning,
+        each is named by its gid.
         """
         with self._changing:
-            token = self._senders.get(gid)
-            if token is None:
-                named = set(self._senders.values())
-                nameless = [
-                    t
-                    for t, e in self._there.items()
-                    if e.kind == "MP" and e.topic == topic and t not in named
+            key = self._senders.get(gid)
+            if key is None:
+                identified = set(self._senders.values())
+                others = [
+                    key
+                    for key, token in self._tokens.items()
+                    if token.kind == "MP" and token.topic == topic and key not in identified
                 ]
-                by_hash = next((t for t in nameless if gid_of(t) == gid), None)
-                token = by_hash if by_hash is not None else nameless[0] if len(nameless) == 1 else None
-                if token is None:
+                by_hash = next((other for other in others if gid_of(other) == gid), None)
+                key = by_hash if by_hash is not None else others[0] if len(others) == 1 else None
+                if key is None:
                     return f"publisher {gid.hex()}"
-                self._senders[gid] = token
-            return self._names[self._there[token].session]
+                self._senders[gid] = key
+            return self._names[self._tokens[key].session]
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
-        """Return the programs that have to do with any of `topics`."""
+        """Return the programs with a publisher, subscriber, server or client of any of `topics`."""
         with self._changing:
             sessions = dict.fromkeys(
-                endpoint.session for endpoint in self._there.values() if endpoint.topic in topics
+                token.session for token in self._tokens.values() if token.topic in topics
             )
             return tuple(Client(self._names[session], session) for session in sessions)

@@ -1,7 +1,6 @@
-"""How ROS 2 lies on Zenoh: keys of topics and services, tokens of the graph, and what goes along with every
-message, as rmw_zenoh has them in Jazzy.
+"""The layout of ROS 2 on Zenoh: keys of topics and services, liveliness tokens, and attachments of messages.
 
-Source: ros2/rmw_zenoh, docs/design.md, and for what that leaves open
+As rmw_zenoh has them in Jazzy. Source: ros2/rmw_zenoh, docs/design.md, and for what that leaves open
 rmw_zenoh_cpp/src/detail/liveliness_utils.cpp (commit 3411fdec), attachment_helpers.cpp and
 rmw_publisher_data.cpp (commit 3e19ec73).
 """
@@ -17,16 +16,16 @@ from schemas.codec import message_type, rihs01
 from schemas.errors import MessageError
 from schemas.message import msg_text
 
-__all__ = ["LATCHED", "VOLATILE", "Attachment", "Endpoint", "Kind", "graph_key", "key", "type_hash"]
+__all__ = ["LATCHED", "VOLATILE", "Attachment", "EntityKind", "GraphToken", "graph_key", "key", "type_hash"]
 
-Kind = Literal["NN", "MP", "MS", "SS", "SC"]
+EntityKind = Literal["NN", "MP", "MS", "SS", "SC"]
 """Node, publisher, subscriber, server and client of a service."""
 
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_BYTES = 16
 
 VOLATILE = "::,10:,:,:,,"
-"""Quality of service, of which only what differs from the default is said: the last ten messages."""
+"""Quality of service, encoded by its differences from the default: the last ten messages."""
 
 LATCHED = ":1:,1:,:,:,,"
 """Transient local, the last message."""
@@ -38,7 +37,7 @@ def key(domain: int, topic: str, type_: str) -> str:
 
 
 def graph_key(domain: int) -> str:
-    """Return the key of all tokens."""
+    """Return the key expression of all tokens."""
     return f"@ros2_lv/{domain}/**"
 
 
@@ -62,24 +61,24 @@ def _mangled(name: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Endpoint:
-    """What a token of the graph tells: a node, or what it publishes, hears, serves or asks."""
+class GraphToken:
+    """A liveliness token of an entity in the ROS graph: a node, publisher, subscriber, server or client."""
 
     session: str
     """Zenoh's id of the program's session."""
     number: int
     """Of the entity within its session."""
-    kind: Kind
+    kind: EntityKind
     node: str
-    """Name with namespace: `/dvrk`."""
+    """Name of the node with namespace: `/dvrk`."""
     topic: str = ""
-    """Of a topic or a service; empty for a node."""
+    """Name of the topic or service; empty for a node."""
     type: str = ""
     hash: str = ""
     quality: str = ""
 
-    def token(self, domain: int) -> str:
-        """Return the key of the liveliness token."""
+    def key(self, domain: int) -> str:
+        """Return the key of the token."""
         namespace, _, name = self.node.rpartition("/")
         parts = [
             "@ros2_lv",
@@ -97,9 +96,9 @@ class Endpoint:
         return "/".join(parts)
 
     @classmethod
-    def of(cls, token: str) -> Endpoint | None:
-        """Return what a token tells; None if it is none that we know how to read."""
-        parts = token.split("/")
+    def parsed(cls, key: str) -> GraphToken | None:
+        """Return the token with this key; None if the key is not one of the known forms."""
+        parts = key.split("/")
         if (
             len(parts) not in (9, 13)
             or parts[5] not in ("NN", "MP", "MS", "SS", "SC")
@@ -123,21 +122,21 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """What goes along with every message and request; a response brings back that of its request."""
+    """Sent with every message and request; a response returns that of its request."""
 
     sequence: int
     stamp_ns: int
-    """When it was sent, by the wall clock of its sender."""
+    """Time of sending, by the wall clock of the sender."""
     gid: bytes
-    """16 bytes: which publisher or client sent it."""
+    """Id of the publisher or client that sent it, 16 bytes."""
 
     def pack(self) -> bytes:
-        """Return the 33 bytes."""
+        """Return the attachment as 33 bytes."""
         return _ATTACHMENT.pack(self.sequence, self.stamp_ns, _GID_BYTES, self.gid)
 
     @classmethod
     def unpack(cls, data: bytes) -> Attachment:
-        """Raises MessageError if the bytes are none."""
+        """Return the attachment in `data`. Raises MessageError if the bytes are no attachment."""
         if len(data) != _ATTACHMENT.size or data[16] != _GID_BYTES:
             raise MessageError(
                 f"{len(data)} bytes are no attachment of ROS 2 (allowed: sequence number, stamp and 16 bytes"

@@ -18,12 +18,16 @@ _EVENT_INFO_TEXT = (
 
 
 def service_hash(name: str, request: str, response: str) -> str:
-    """Return `RIHS01_...` of the service `name` (`std_srvs/srv/Trigger`) with these parts, given as .msg
-    text.
+    """Return the hash of a service, `RIHS01_...`.
 
     A service is described as a type of three fields: request, response, and an event that holds at most one
-    of each (rosidl_parser's definition of a service; `tests/devices/ros` holds the result against the type
-    description that std_srvs of Jazzy ships).
+    of each (rosidl_parser's definition of a service; `tests/devices/ros/zenoh` compares the result with the
+    type description that std_srvs of Jazzy ships).
+
+    Args:
+        name: `std_srvs/srv/Trigger`.
+        request: .msg text of the request.
+        response: .msg text of the response.
     """
     store = get_typestore(Stores.EMPTY)
     store.fielddefs.update(typestore().fielddefs)
@@ -43,9 +47,7 @@ def service_hash(name: str, request: str, response: str) -> str:
 
 
 def _renamed(definition: Any) -> Any:
-    """Return a definition of rosbags with the types of a service called as ROS calls them: rosbags puts a
-    `msg` into their names.
-    """
+    """Return a definition of rosbags with ROS's names of a service's types: rosbags puts `msg` into them."""
     if isinstance(definition, str):
         return definition.replace("/srv/msg/", "/srv/")
     if isinstance(definition, list | tuple):

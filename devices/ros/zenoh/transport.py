@@ -1,4 +1,4 @@
-"""ROS 2 as rmw_zenoh lays it out, on the router of a hub."""
+"""ROS 2 in the layout of rmw_zenoh, on the router of a hub."""
 
 from __future__ import annotations
 
@@ -11,9 +11,18 @@ from zenoh import ext
 from zenoh.handlers import Callback
 
 from devices.ros.topics.row import Row
-from devices.ros.transport import NODE, Client, Handler, Publisher, Taker, Transport
+from devices.ros.transport import NODE, Client, MessageHandler, Publisher, ServiceHandler, Transport
 from devices.ros.zenoh.graph import Graph, gid_of
-from devices.ros.zenoh.layout import LATCHED, VOLATILE, Attachment, Endpoint, Kind, graph_key, key, type_hash
+from devices.ros.zenoh.layout import (
+    LATCHED,
+    VOLATILE,
+    Attachment,
+    EntityKind,
+    GraphToken,
+    graph_key,
+    key,
+    type_hash,
+)
 from schemas.errors import MessageError
 
 __all__ = ["ZenohTransport"]
@@ -21,19 +30,19 @@ __all__ = ["ZenohTransport"]
 log = logging.getLogger(__name__)
 
 _HEARTBEAT_S = 0.5
-"""How often a latched publisher repeats the number of its last message, from which a subscriber knows that it
-missed one: rmw_zenoh's period. Where that tells it once, and waits for every reader, we tell it all the time:
-a program that has stopped reading must hold up nobody.
+"""How often a latched publisher repeats the number of its last message, by which a subscriber detects a loss:
+rmw_zenoh's period. rmw_zenoh sends it once per message and blocks until every reader has it; we send it
+periodically, because a program that has stopped reading must not block the others.
 """
 
 
 class ZenohTransport(Transport):
     """Publishes, listens and answers under rmw_zenoh's keys, as one node.
 
-    Nothing that is published waits for a reader: what a program does not take is dropped for it, and of a
-    latched topic it asks for the last message again. States and events queue apart, and pictures have a
-    session of their own: where one program does not take them, the router tries for 50 ms before it drops the
-    rest of a picture, and meanwhile reads nothing else of that session.
+    Publishing never waits for a reader: messages that a program does not read are dropped for it, and it
+    queries the last message of a latched topic again. States and events have separate queues, and pictures
+    a session of their own: where one program does not read them, the router tries for 50 ms before it drops
+    the rest of a picture, and meanwhile reads nothing else of that session.
     """
 
     def __init__(self, connect: Callable[[], zenoh.Session], domain: int) -> None:
@@ -51,35 +60,31 @@ class ZenohTransport(Transport):
         ] = []
         self._number = 0
         self._closed = False
-        # in the thread that also brings messages: no message comes before its sender
-        watch = Callback(self._came_or_went, indirect=False)
+        # in the thread that also delivers messages: no message is handled before its sender's token
+        watch = Callback(self._token_changed, indirect=False)
         liveliness = self._session.liveliness()
         self._entities.append(liveliness.declare_subscriber(graph_key(domain), watch, history=True))
-        self._entities.append(liveliness.declare_token(Endpoint(self._id, 0, "NN", NODE).token(domain)))
+        self._entities.append(liveliness.declare_token(GraphToken(self._id, 0, "NN", NODE).key(domain)))
 
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
-        address, cdr, drop = (
-            key(self._domain, row.topic, row.type),
-            zenoh.Encoding.APPLICATION_CDR,
-            zenoh.CongestionControl.DROP,
-        )
-        urgency = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH
+        address, cdr = key(self._domain, row.topic, row.type), zenoh.Encoding.APPLICATION_CDR
+        drop = zenoh.CongestionControl.DROP
+        priority = zenoh.Priority.REAL_TIME if row.periodic else zenoh.Priority.INTERACTIVE_HIGH
         if row.latched:
-            last, numbered = ext.CacheConfig(max_samples=1), ext.MissDetectionConfig(heartbeat=_HEARTBEAT_S)
             publisher = ext.declare_advanced_publisher(
                 self._session,
                 address,
                 encoding=cdr,
                 congestion_control=drop,
-                priority=urgency,
-                cache=last,
-                sample_miss_detection=numbered,
+                priority=priority,
+                cache=ext.CacheConfig(max_samples=1),
+                sample_miss_detection=ext.MissDetectionConfig(heartbeat=_HEARTBEAT_S),
                 publisher_detection=True,
             )
         else:
             session = self._pictures if row.is_picture else self._session
             publisher = session.declare_publisher(
-                address, encoding=cdr, congestion_control=drop, priority=urgency
+                address, encoding=cdr, congestion_control=drop, priority=priority
             )
         self._entities.append(publisher)
         gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
@@ -92,30 +97,30 @@ class ZenohTransport(Transport):
 
         return publish
 
-    def subscribe(self, row: Row, take: Taker) -> None:  # noqa: D102
+    def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
         topic = row.topic
 
-        def heard(sample: zenoh.Sample) -> None:
+        def on_sample(sample: zenoh.Sample) -> None:
             try:
                 attached = Attachment.unpack(
                     b"" if sample.attachment is None else sample.attachment.to_bytes()
                 )
             except MessageError as error:
-                log.warning("%s: a message is not heeded: %s", topic, error)
+                log.warning("%s: a message is dropped: %s", topic, error)
                 return
-            take(sample.payload.to_bytes(), self._graph.sender(topic, attached.gid))
+            receive(sample.payload.to_bytes(), self._graph.sender(topic, attached.gid))
 
         self._entities.append(
             self._session.declare_subscriber(
-                key(self._domain, topic, row.type), Callback(heard, indirect=False)
+                key(self._domain, topic, row.type), Callback(on_sample, indirect=False)
             )
         )
         self._announce("MS", row, VOLATILE)
 
-    def serve(self, row: Row, handle: Handler) -> None:  # noqa: D102
+    def serve(self, row: Row, handle: ServiceHandler) -> None:  # noqa: D102
         address = key(self._domain, row.topic, row.type)
 
-        def asked(query: zenoh.Query) -> None:
+        def on_query(query: zenoh.Query) -> None:
             with query:
                 request, attachment = query.payload, query.attachment
                 try:
@@ -124,11 +129,11 @@ class ZenohTransport(Transport):
                 except MessageError as error:
                     query.reply_err(f"{row.topic}: {error}")
                     return
-                back = Attachment(attached.sequence, time_ns(), attached.gid).pack()
-                query.reply(address, response, encoding=zenoh.Encoding.APPLICATION_CDR, attachment=back)
+                returned = Attachment(attached.sequence, time_ns(), attached.gid).pack()
+                query.reply(address, response, encoding=zenoh.Encoding.APPLICATION_CDR, attachment=returned)
 
         self._entities.append(
-            self._session.declare_queryable(address, Callback(asked, indirect=True), complete=True)
+            self._session.declare_queryable(address, Callback(on_query, indirect=True), complete=True)
         )
         self._announce("SS", row, VOLATILE)
 
@@ -143,17 +148,16 @@ class ZenohTransport(Transport):
             self._session.close()
             self._pictures.close()
 
-    def _announce(self, kind: Kind, row: Row, quality: str) -> str:
-        """Tell the graph of a publisher, subscriber or server; return its token."""
+    def _announce(self, kind: EntityKind, row: Row, quality: str) -> str:
+        """Declare the liveliness token of a publisher, subscriber or server; return its key."""
         self._number += 1
         self._topics.add(row.topic)
-        token = Endpoint(
+        token = GraphToken(
             self._id, self._number, kind, NODE, row.topic, row.type, type_hash(row.type), quality
-        ).token(self._domain)
+        ).key(self._domain)
         self._entities.append(self._session.liveliness().declare_token(token))
         return token
 
-    def _came_or_went(self, sample: zenoh.Sample) -> None:
-        (self._graph.went if sample.kind == zenoh.SampleKind.DELETE else self._graph.came)(
-            str(sample.key_expr)
-        )
+    def _token_changed(self, sample: zenoh.Sample) -> None:
+        change = self._graph.remove if sample.kind == zenoh.SampleKind.DELETE else self._graph.add
+        change(str(sample.key_expr))

@@ -10,7 +10,7 @@ import pytest
 from controllers.dvrk_console.controller import DvrkConsole
 from controllers.dvrk_console.params import DvrkConsoleParams
 from devices.ros.params import GatewayParams
-from devices.ros.topics.face import face
+from devices.ros.topics.dvrk_table import dvrk_table
 from hub.participant import Inputs, Setup
 from hub.testing import check_engine
 from robots import rotation
@@ -86,7 +86,7 @@ def test_every_topic_of_the_console_in_the_table_is_there_with_its_type():
     told = {p.name: (p.type, p.variability) for p in Rig().console.ports if p.causality == "output"}
     heard = {p.name: (p.type, p.variability) for p in Rig().console.ports if p.causality == "input"}
     no_sound = {"system/beep", "system/string_to_speech"}
-    for row in face(GatewayParams.model_validate({"teleoperations": PAIRS, "cameras": []})):
+    for row in dvrk_table(GatewayParams.model_validate({"teleoperations": PAIRS, "cameras": []})):
         if (
             row.port is not None
             and row.owner in {"console", "system", "footpedals", *PAIRS}

@@ -34,7 +34,8 @@ normals = (
 )
 good_planes = st.builds(
     lambda n, *rest: Plane(*n, *rest),
-    normals, st.floats(-0.05, 0.05), st.floats(-2.0, 2.0), st.floats(0.0, 1e6), st.floats(0.0, 1e3), st.floats(0.0, 3.0),
+    normals, st.floats(-0.05, 0.05), st.floats(-2.0, 2.0),
+    st.floats(0.0, 1e6), st.floats(0.0, 1e3), st.floats(0.0, 3.0),
 )  # fmt: skip
 any_planes = st.builds(Plane, *8 * [st.floats(-2.0, 2.0) | bad])
 models = st.tuples(

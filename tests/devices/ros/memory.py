@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from devices.ros.gateway import Gateway
 from devices.ros.topics.row import Row
-from devices.ros.transport import Client, Handler, Publisher, Taker, Transport
+from devices.ros.transport import Client, MessageHandler, Publisher, ServiceHandler, Transport
 from schemas.codec import decode, encode, message_type
 from schemas.message import Message
 
@@ -19,8 +19,8 @@ class MemoryTransport(Transport):
     def __init__(self) -> None:
         self.published: defaultdict[str, list[bytes]] = defaultdict(list)
         self.rows: dict[str, Row] = {}
-        self.takers: dict[str, Taker] = {}
-        self.handlers: dict[str, Handler] = {}
+        self.receivers: dict[str, MessageHandler] = {}
+        self.handlers: dict[str, ServiceHandler] = {}
         self.connected: tuple[Client, ...] = ()
         self.closed = 0
 
@@ -28,11 +28,11 @@ class MemoryTransport(Transport):
         self._new(row)
         return self.published[row.topic].append
 
-    def subscribe(self, row: Row, take: Taker) -> None:
+    def subscribe(self, row: Row, receive: MessageHandler) -> None:
         self._new(row)
-        self.takers[row.topic] = take
+        self.receivers[row.topic] = receive
 
-    def serve(self, row: Row, handle: Handler) -> None:
+    def serve(self, row: Row, handle: ServiceHandler) -> None:
         self._new(row)
         self.handlers[row.topic] = handle
 
@@ -54,7 +54,7 @@ class MemoryTransport(Transport):
 
     def send(self, topic: str, message: Message | bytes, client: str = "/console") -> None:
         """Publish as a program would."""
-        self.takers[topic](message if isinstance(message, bytes) else encode(message), client)
+        self.receivers[topic](message if isinstance(message, bytes) else encode(message), client)
 
 
 class MemoryGateway(Gateway):

@@ -92,7 +92,7 @@ class Console:
         ]
 
     def offered(self, topic):
-        """Return node, type, hash, durability and reliability of each publisher and subscription of a topic."""
+        """Return node, type, hash, durability and reliability of all publishers and subscriptions."""
         there = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(
             topic
         )

@@ -6,7 +6,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from schemas.codec import message_type
+from tests.devices.ros.helpers import until
 
 CONSOLE = Path(__file__).with_name("rospy_console.py")
 NOETIC = "/opt/ros/noetic/lib/python3/dist-packages"
@@ -63,18 +63,8 @@ needs_rospy = pytest.mark.skipif(
 )
 
 
-def until(condition, seconds=5.0):
-    """Wait until `condition` holds; say whether it did."""
-    end = time.monotonic() + seconds
-    while not (held := condition()) and time.monotonic() < end:
-        time.sleep(0.005)
-    return held
-
-
 class Ros1:
-    """A master, which can be stopped and started again at the same port, and what programs must be told of
-    it.
-    """
+    """A master that can be restarted at the same port, and the environment of its programs."""
 
     def __init__(self, directory):
         with socket.socket() as sock:

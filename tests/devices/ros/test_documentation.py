@@ -1,5 +1,4 @@
-"""docs/ros.md says what the gateways do: its tables are made of their tables, and what it prints for a shell
-or a scenario works.
+"""docs/ros.md is correct: its tables equal those of the gateways, and its commands and scenarios work.
 
 `python -m tests.devices.ros.test_documentation` prints the tables.
 """
@@ -14,14 +13,15 @@ import numpy as np
 import pytest
 
 from devices.ros.params import GatewayParams
-from devices.ros.topics.face import NOT_SERVED, face
-from devices.ros.topics.vrep import paper_face
+from devices.ros.topics.dvrk_table import NOT_SERVED, dvrk_table
+from devices.ros.topics.vrep_table import vrep_table
 from hub.planning.scenario_file import load
 from hub.session.launch import plan_of
 from tests.devices.ros.bags.test_player import joints, write
 from tests.devices.ros.crtk_table import WHOLE
+from tests.devices.ros.helpers import until
 from tests.devices.ros.zenoh.test_console import gated
-from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE, until
+from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE
 from tests.devices.ros.zenoh.zenoh_peer import Peer
 
 __all__ = ["gated"]
@@ -37,13 +37,11 @@ UNDER = {
     "dvrk/PSM1": "/dvrk/<PSM>",
     "dvrk/PSM2": "/dvrk/<PSM>",
 }
-"""How owners are called on the page."""
+"""Names of owners on the page."""
 
 
 def lines_of(rows):
-    """Return the lines of a table: the topics of one owner, way and type together, those that all arms have
-    under `<arm>`.
-    """
+    """Return the lines of a table: one per owner, way and type; topics of all arms are under `<arm>`."""
     having = {}
     for row in rows:
         having.setdefault((row.name, row.type), []).append(row.owner)
@@ -83,7 +81,7 @@ def tables():
         {"profile": "paper", "arms": {"PSM1": HOLDING, "PSM2": HOLDING, "ECM": {}}}
     )
     missing = [f"| `{name}` | {why} |" for name, why in NOT_SERVED.items()]
-    return {"TABLE": lines_of(face(SHOWN)), "MISSING": missing, "PAPER": lines_of(paper_face(own))}
+    return {"TABLE": lines_of(dvrk_table(SHOWN)), "MISSING": missing, "PAPER": lines_of(vrep_table(own))}
 
 
 @pytest.mark.parametrize("name", ["TABLE", "MISSING", "PAPER"])

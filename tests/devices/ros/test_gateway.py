@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from devices.ros.params import GatewayParams
-from devices.ros.topics import commander as commander_module
+from devices.ros.topics import arbitration
 from hub.testing import check_device
 from schemas.codec import encode
 from schemas.crtk import ForwardKinematicsRequest, OperatingState, StringStamped
@@ -86,7 +86,7 @@ def test_a_second_time_it_begins_anew(tmp_path: Path) -> None:
         assert gateway.transport.heard("/PSM1/status") == []
 
 
-def test_latched_words_from_before_it_was_open_are_told(tmp_path: Path) -> None:
+def test_latched_events_from_before_it_was_open_are_published(tmp_path: Path) -> None:
     with make() as gateway:
         gateway.write("PSM1/operating_state", OperatingState(state="DISABLED"))
         gateway.write("PSM1/operating_state", OperatingState(state="ENABLED"))
@@ -98,7 +98,7 @@ def test_latched_words_from_before_it_was_open_are_told(tmp_path: Path) -> None:
         assert gateway.transport.heard("/endoscope/left/image_raw") == []
 
 
-def test_an_unknown_port_is_told_with_a_near_miss(gateway: MemoryGateway) -> None:
+def test_an_unknown_port_is_reported_with_a_near_miss(gateway: MemoryGateway) -> None:
     with pytest.raises(MessageError, match="Did you mean 'PSM1/measured_js'"):
         gateway.write("PSM1/measured_jx", np.zeros(18))
 
@@ -113,11 +113,13 @@ def test_states_are_published_at_its_own_rate_whatever_the_simulation_does(tmp_p
     assert len(stamps) >= 10
     assert all(one < other for one, other in pairwise(stamps))
     assert np.median(np.diff(stamps)) == pytest.approx(4e6, rel=0.5)
-    assert gateway.transport.published["/ECM/measured_js"] == []  # nobody has told it
+    assert gateway.transport.published["/ECM/measured_js"] == []  # it has no value
 
 
-def test_a_state_that_is_old_is_told_no_more(gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("devices.ros.topics.outgoing._SILENT_NS", 50_000_000)
+def test_an_old_state_is_not_published_any_more(
+    gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("devices.ros.topics.publications._MAX_AGE_NS", 50_000_000)
     gateway.write("PSM1/measured_js", np.arange(18.0))
     sleep(0.2)
     count = len(gateway.transport.published["/PSM1/measured_js"])
@@ -326,7 +328,7 @@ def test_the_console_has_warnings_only(gateway: MemoryGateway) -> None:
     assert told.startswith("console: teleop/set_scale refused: std_msgs/msg/Float64")
 
 
-def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> None:
+def test_a_latched_command_from_before_is_refused(gateway: MemoryGateway) -> None:
     old, now = (
         StringStamped(header=Header(stamp=Time.from_ns(stamp)), string="home")
         for stamp in (time_ns() - 10**11, time_ns())
@@ -334,7 +336,7 @@ def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> 
     gateway.transport.send("/PSM1/state_command", old)
     assert commands(gateway) == []
     (told,) = words(gateway, "/PSM1/warning")
-    assert "before this gateway was there" in told
+    assert "before this gateway was open" in told
     gateway.transport.send("/PSM1/state_command", now)
     gateway.transport.send("/PSM1/state_command", StringStamped(string="enable"))  # from `ros2 topic pub`
     assert commands(gateway) == [
@@ -343,20 +345,20 @@ def test_a_latched_command_from_before_is_not_heeded(gateway: MemoryGateway) -> 
     ]
 
 
-def test_a_command_that_a_connection_brings_again_is_not_heeded_again(gateway: MemoryGateway) -> None:
+def test_a_command_that_a_connection_delivers_again_is_refused(gateway: MemoryGateway) -> None:
     command = StringStamped(header=Header(stamp=Time.from_ns(time_ns())), string="home")
     for _ in range(2):
         gateway.transport.send("/PSM1/state_command", command)
     assert len(commands(gateway)) == 1
     (told,) = words(gateway, "/PSM1/warning")
-    assert "heeded before" in told
+    assert "accepted before" in told
 
 
 def test_one_program_at_a_time_commands_an_arm(
     gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [0]
-    monkeypatch.setattr(commander_module, "monotonic_ns", lambda: now[0])
+    monkeypatch.setattr(arbitration, "monotonic_ns", lambda: now[0])
     gateway.transport.send("/PSM1/servo_jp", joints(*[0.1] * 6), "/one")
     gateway.transport.send("/PSM1/jaw/servo_jp", joints(0.1), "/other")
     gateway.transport.send("/PSM1/move_jp", joints(*[0.2] * 6), "/other")
@@ -364,7 +366,8 @@ def test_one_program_at_a_time_commands_an_arm(
     gateway.transport.send("/ECM/servo_jp", joints(*[0.1] * 4), "/other")
     assert [port for port, _ in commands(gateway)] == ["PSM1/servo_jp", "PSM1/hold", "ECM/servo_jp"]
     assert all(
-        "/other is not heeded while /one commands the arm" in told for told in words(gateway, "/PSM1/warning")
+        "/other may not move the arm while /one commands it" in told
+        for told in words(gateway, "/PSM1/warning")
     )
     now[0] = 1_000_000_001
     gateway.transport.send("/PSM1/move_jp", joints(*[0.2] * 6), "/other")

@@ -207,7 +207,7 @@ def test_ports_are_those_of_a_stylus() -> None:
         ({"path": []}, "at least one waypoint"),
         ({"path": [{"at": "1 s"}, {"at": "1 s"}]}, "go forward"),
         ({"path": [{"at": 0, "buttons": [2]}]}, "buttons 0 and 1"),
-        ({"safety": {"force": "2 N"}}, "device bears 1.98 N"),
+        ({"safety": {"force": "2 N"}}, "device's limit is 1.98 N"),
         ({"safety": {"force": "2.1 N"}}, "less than or equal to 2"),
         ({"safety": {"stiffness": "1 kN/m"}}, "less than or equal to 400"),
         ({"safety": {"silence": "1 s"}}, "less than or equal to"),

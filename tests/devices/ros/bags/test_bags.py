@@ -28,9 +28,10 @@ from hub.verify import verify
 from schemas.codec import message_type, validated
 from schemas.errors import MessageError, RecordingError
 from schemas.vectors import VectorCodec
+from tests.devices.ros.helpers import until
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rospy_peer import environment, needs_rospy, rospy_python
-from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE_TYPE, joints, until
+from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE_TYPE, joints
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built
 
 __all__ = ["rclpy_python"]
@@ -265,7 +266,8 @@ for line in sys.stdin:
     name, payload = json.loads(line)
     package, kind, type_ = name.split("/")
     message = deserialize_message(b64decode(payload), getattr(import_module(f"{package}.{kind}"), type_))
-    print(json.dumps(list(message.position) if type_ == "JointState" else message.state if type_ == "OperatingState" else None))
+    state = message.state if type_ == "OperatingState" else None
+    print(json.dumps(list(message.position) if type_ == "JointState" else state))
 """
 
 
@@ -294,7 +296,8 @@ import rosbag
 
 with rosbag.Bag(sys.argv[1]) as bag:
     latched = [c.topic for c in bag._get_connections() if c.header.get("latching") == b"1"]
-    print(json.dumps([sorted(latched), [list(m.position) for _, m, _ in bag.read_messages("/PSM1/measured_js")]]))
+    states = [list(m.position) for _, m, _ in bag.read_messages("/PSM1/measured_js")]
+    print(json.dumps([sorted(latched), states]))
 """
 
 
@@ -321,7 +324,7 @@ def test_ros_1_reads_it_once_it_is_converted(bag, tmp_path):
 
 
 def test_what_cannot_be_written_is_said(driven, bag, tmp_path):
-    with pytest.raises(RecordingError, match="there already"):
+    with pytest.raises(RecordingError, match="exists already"):
         export(driven, bag)
     with pytest.raises(RecordingError, match=r"no gateway 'rso'\. Did you mean 'ros'\?"):
         export(driven, tmp_path / "bag", "rso")

@@ -244,7 +244,7 @@ def test_states_of_a_real_system_are_signals(tmp_path):
 
 
 def test_what_a_gateway_refuses_is_refused(tmp_path, caplog):
-    """The good one between the bad ones is heeded, and every refusal is told."""
+    """The good one between the bad ones is played, and every refusal is logged."""
     said = [
         (0.0, "/PSM1/servo_jp", joints(0.0, 0.1, 0.2)),
         (0.1, "/PSM1/servo_jp", joints(0.1, *[0.1] * 6)),
@@ -268,7 +268,7 @@ def test_what_a_gateway_refuses_is_refused(tmp_path, caplog):
         assert any(reason in line for line in told), told
 
 
-def test_a_command_that_only_a_connection_has_brought_moves_nothing(tmp_path, caplog):
+def test_an_old_command_delivered_by_a_new_connection_is_refused(tmp_path, caplog):
     """A recorder that joins late gets the last state command of a program, of an hour ago; one that is
     brought twice counts once.
     """
@@ -287,16 +287,16 @@ def test_a_command_that_only_a_connection_has_brought_moves_nothing(tmp_path, ca
         ("disable", 2.0),
     ]
     told = "\n".join(record.getMessage() for record in caplog.records)
-    assert "given 3600.0 s before it was recorded" in told
-    assert "heeded before, with the same stamp" in told
+    assert "published 3600.0 s before it was recorded" in told
+    assert "accepted before, with the same stamp" in told
 
 
-def test_what_is_passed_over_is_said(bag, caplog):
+def test_ignored_topics_are_logged(bag, caplog):
     with caplog.at_level(logging.INFO):
         played(bag)
     (line,) = [record.getMessage() for record in caplog.records]
     assert line.endswith(
-        "as nothing here hears them: /PSM1/measured_js (sensor_msgs/msg/JointState, 1), /rosout"
+        "that no port here takes are ignored: /PSM1/measured_js (sensor_msgs/msg/JointState, 1), /rosout"
         " (std_msgs/msg/String, 1)"
     )
 

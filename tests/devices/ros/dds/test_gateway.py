@@ -11,6 +11,7 @@ from devices.ros.dds.gateway import DdsGateway
 from schemas.codec import message_type, rihs01
 from schemas.ros import Header, JointState, StringMessage, Time
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
+from tests.devices.ros.helpers import received, until
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rclpy_peer import RclpyPeer, free_domain
 
@@ -34,16 +35,8 @@ def showing(directory, **params):
         yield gateway
 
 
-def until(condition, seconds=5.0):
-    """Wait until `condition` holds; say whether it did."""
-    end = time.monotonic() + seconds
-    while not (held := condition()) and time.monotonic() < end:
-        time.sleep(0.005)
-    return held
-
-
 class Console(RclpyPeer):
-    """A program that waits until the gateway has found it, too: nobody gets what was published before that."""
+    """A program that waits until the gateway has discovered it: it gets nothing from before that."""
 
     def __init__(self, python, gateway, name="console", **settings):
         super().__init__(python, gateway.params.domain, name, **settings)
@@ -56,7 +49,7 @@ class Console(RclpyPeer):
         found += [it.get_subscription_matched_status for it in transport._readers if it.topic.name in topics]
         assert until(lambda: all(status().current_count for status in found))
         assert until(lambda: any(client.name == f"/{self.name}" for client in transport.clients())), (
-            "nobody has told the gateway its name"
+            "the gateway does not know its name"
         )
 
 
@@ -91,10 +84,6 @@ def joints(values=(0.0,) * 6):
     return JointState(header=Header(stamp=Time.from_ns(time.time_ns())), position=np.array(values))
 
 
-def came(gateway, topic=COMMAND):
-    return [sample for sample in gateway.read(0) if sample.port == topic[1:]]
-
-
 def test_all_belongs_to_one_node_called_as_on_the_real_system(rclpy_python, psm):
     with console(rclpy_python, psm, STATE, EVENT, COMMAND) as program:
         assert until(lambda: sorted(program.do("nodes")) == ["/console", "/console_asking", "/dvrk"])
@@ -110,7 +99,7 @@ def test_all_belongs_to_one_node_called_as_on_the_real_system(rclpy_python, psm)
 def test_a_program_with_the_default_range_finds_it(rclpy_python, psm):
     with console(rclpy_python, psm, COMMAND, discovery="SUBNET") as program:
         program.send(row(psm, COMMAND), joints())
-        assert until(lambda: came(psm))
+        assert until(lambda: received(psm, COMMAND))
 
 
 def test_another_domain_is_another_graph(rclpy_python, psm):
@@ -126,7 +115,7 @@ def test_a_console_that_comes_back_is_there_again(rclpy_python, psm):
             psm.write(STATE[1:], np.zeros(18))
             assert program.heard(row(psm, STATE), 5.0)
             program.send(row(psm, COMMAND), joints())
-            assert until(lambda: came(psm))
+            assert until(lambda: received(psm, COMMAND))
         assert until(lambda: psm._transport.clients() == ()), psm._transport.clients()
 
 
@@ -136,10 +125,10 @@ def test_a_second_console_does_not_command_the_same_arm(rclpy_python, psm):
         console(rclpy_python, psm, COMMAND, WARNING, name="second") as second,
     ):
         first.send(row(psm, COMMAND), joints([0.1] * 6))
-        assert until(lambda: came(psm))
+        assert until(lambda: received(psm, COMMAND))
         second.send(row(psm, COMMAND), joints([0.5] * 6))
         assert "/second" in second.heard(row(psm, WARNING), 5.0).data
-        assert not came(psm)
+        assert not received(psm, COMMAND)
 
 
 def test_bytes_that_are_no_message_move_nothing(rclpy_python, psm):
@@ -148,7 +137,7 @@ def test_bytes_that_are_no_message_move_nothing(rclpy_python, psm):
             program.do("send_raw", topic=COMMAND, payload=payload.hex())
         program.send(row(psm, COMMAND), joints([0.25] * 6))
         heard = []
-        assert until(lambda: heard.extend(came(psm)) or heard)
+        assert until(lambda: heard.extend(received(psm, COMMAND)) or heard)
         assert [sample.message.position.tolist() for sample in heard] == [[0.25] * 6]
 
 
@@ -160,7 +149,7 @@ def test_a_flood_costs_no_other_console_its_states(rclpy_python, psm):
         flood.send(row(psm, COMMAND), joints(), times=20_000)
         psm.write(STATE[1:], np.zeros(18))
         assert program.do("count", topic=STATE, seconds=0.5) > 20
-        assert 0 < len(came(psm)) < 20_000
+        assert 0 < len(received(psm, COMMAND)) < 20_000
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(rclpy_python, domain, tmp_path):

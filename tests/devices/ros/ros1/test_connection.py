@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from devices.ros.ros1.connection import Connection, _fields, header_frame
-from devices.ros.ros1.loop import Loop
+from devices.ros.ros1.connection import Connection, header_frame, parse_header
+from devices.ros.ros1.event_loop import EventLoop
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="="), min_size=1)
 
@@ -25,9 +25,9 @@ def framed(content):
 @contextmanager
 def connected(keep=3, greet=None):
     """A connection, its other end, and queues of what it has heard and of whether it was lost."""
-    loop, heard, ends = Loop("test"), queue.Queue(), queue.Queue()
+    loop, heard, ends = EventLoop("test"), queue.Queue(), queue.Queue()
 
-    def greeted(connection, fields):
+    def on_header(connection, fields):
         heard.put(fields)
         return heard.put if greet is None else greet(connection, fields)
 
@@ -35,7 +35,7 @@ def connected(keep=3, greet=None):
         other = socket.create_connection(server.getsockname(), timeout=5.0)
         sock, _ = server.accept()
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    connection = Connection(loop, sock, greeted, ends.put, keep=keep)
+    connection = Connection(loop, sock, on_header, ends.put, keep=keep)
     connection.start()
     try:
         yield connection, other, heard, ends
@@ -55,7 +55,7 @@ def received(sock, count):
 
 @given(st.dictionaries(NAMES, st.text(st.characters(codec="utf-8"))))
 def test_a_header_says_what_was_put_into_it(fields):
-    assert _fields(header_frame(fields)[4:]) == fields
+    assert parse_header(header_frame(fields)[4:]) == fields
 
 
 def test_frames_come_whole_however_they_are_cut():
@@ -63,13 +63,13 @@ def test_frames_come_whole_however_they_are_cut():
         header_frame({"callerid": "/it", "topic": "/a"}) + framed(b"one") + framed(b"") + framed(b"x" * 70000)
     )
     with connected() as (connection, other, heard, _):
-        assert (connection.program, connection.is_greeted) == ("127.0.0.1", False)
+        assert (connection.program, connection.is_established) == ("127.0.0.1", False)
         for at in range(150):
             other.send(data[at : at + 1])
         other.sendall(data[150:])
         assert heard.get(timeout=5.0) == {"callerid": "/it", "topic": "/a"}
         assert [heard.get(timeout=5.0) for _ in range(3)] == [b"one", b"", b"x" * 70000]
-        assert (connection.program, connection.is_greeted) == ("/it", True)
+        assert (connection.program, connection.is_established) == ("/it", True)
 
 
 @pytest.mark.parametrize(

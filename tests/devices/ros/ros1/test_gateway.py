@@ -16,7 +16,8 @@ from schemas.codec import message_type
 from schemas.crtk import OperatingState
 from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.rospy_peer import Program, TablePeer, master, needs_rospy, until
+from tests.devices.ros.helpers import joint_fields, received, until
+from tests.devices.ros.rospy_peer import Program, TablePeer, master, needs_rospy
 from tests.hub.authorities import free_port
 
 pytestmark = needs_rospy
@@ -63,9 +64,7 @@ def console(ros):
 
 
 def joints(values=(0.1,) * 6, stamp_ns=None):
-    sec, nanosec = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 10**9)
-    header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": ""}
-    return {"header": header, "name": [], "position": list(values), "velocity": [], "effort": []}
+    return joint_fields(values, stamp_ns)
 
 
 def order(word, stamp_ns=0):
@@ -74,14 +73,14 @@ def order(word, stamp_ns=0):
 
 
 def came_in(gateway, topic, seconds=5.0):
-    return until(lambda: any(sample.port == topic[1:] for sample in gateway.read(0)), seconds)
+    return until(lambda: received(gateway, topic), seconds)
 
 
 def complaint(gateway, seconds=5.0):
     """Return why the last message that was refused was so."""
 
     def reasons():
-        return [count.reason for count in gateway._traffic._counts.values() if count.refused]
+        return [count.reason for count in gateway._counters._counts.values() if count.refused]
 
     return reasons()[0] if until(reasons, seconds) else ""
 
@@ -207,7 +206,7 @@ def test_a_second_console_does_not_command_the_same_arm(psm, ros, console):
         console.send(COMMAND, joints())
         assert came_in(psm, COMMAND)
         second.send(COMMAND, joints())
-        assert "/second is not heeded" in second.heard("/PSM1/warning", 5.0)["data"]
+        assert "/second may not move the arm" in second.heard("/PSM1/warning", 5.0)["data"]
         assert not came_in(psm, COMMAND, 0.1)
 
 
@@ -243,7 +242,7 @@ def test_a_request_that_is_none_gets_an_error(psm, console):
     assert console.call(topic, request.model_dump(mode="json"))["result"]
 
 
-def test_a_command_kept_from_before_is_not_heeded_when_the_gateway_comes(psm, console, tmp_path):
+def test_a_latched_command_from_before_is_refused_when_the_gateway_opens(psm, console, tmp_path):
     console.advertise(STATE_COMMAND, ORDER, True)
     console.advertise(COMMAND, JOINTS, True)
     console.send(STATE_COMMAND, order("home"))  # clients of ROS 1 do not stamp it
@@ -251,8 +250,8 @@ def test_a_command_kept_from_before_is_not_heeded_when_the_gateway_comes(psm, co
     assert came_in(psm, STATE_COMMAND), "of a console that comes later it is meant now"
     console.send(COMMAND, joints(stamp_ns=0))
     psm.open(tmp_path)
-    assert "kept by /console from before it was connected" in complaint(psm)
-    assert until(lambda: sum(count.refused for count in psm._traffic._counts.values()) == 2)
+    assert "published by /console before it was connected" in complaint(psm)
+    assert until(lambda: sum(count.refused for count in psm._counters._counts.values()) == 2)
     assert list(psm.read(0))[:-1] == []
     time.sleep(0.2)
     console.send(STATE_COMMAND, order("enable"))
@@ -329,7 +328,7 @@ def test_a_console_that_stops_reading_holds_up_nobody(ros, tmp_path, console):
 def test_two_gateways_of_one_name(ros, psm, tmp_path, console, caplog):
     console.listen(EVENT, STATE_TYPE)
     with showing(ros, tmp_path, **ARM, namespace="other"):
-        assert until(lambda: "another program is '/trocar_ros' there" in caplog.text)
+        assert until(lambda: "has the name '/trocar_ros'" in caplog.text)
     psm.write(EVENT[1:], OperatingState(state="ENABLED"))
     assert console.heard(EVENT, 5.0)["state"] == "ENABLED"
     with showing(ros, tmp_path, "second", **ARM, namespace="other") as other:
@@ -366,7 +365,7 @@ def test_a_console_that_cannot_be_reached_is_told_of_once(ros, psm, console, cap
         for topic in (COMMAND, STATE_COMMAND):
             known.unregisterPublisher("/unknown", topic, "http://nowhere.invalid:1/")
         assert until(lambda: not any("nowhere" in uri for uri in psm._transport._subscriptions._links))
-    assert caplog.text.count("is not reached") == 1
+    assert caplog.text.count("cannot be reached") == 1
 
 
 def test_a_master_that_comes_later_and_one_that_starts_again(tmp_path, caplog):

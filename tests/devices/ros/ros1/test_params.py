@@ -52,7 +52,7 @@ def test_it_listens_at_the_address_towards_its_master_only(tmp_path):
     [
         (
             {"master": "http://nowhere.invalid:11311"},
-            "no way to the ROS master at 'http://nowhere.invalid:11311'",
+            "no route to the ROS master at 'http://nowhere.invalid:11311'",
         ),
         ({"master": "http://127.0.0.1:11311", "ip": "192.0.2.1"}, "cannot listen at 192.0.2.1"),
     ],

@@ -6,24 +6,24 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 
 from devices.ros.ros1 import registration as ros1_registration
-from devices.ros.ros1.api import Answer, ProgramServer, said
-from devices.ros.ros1.registration import Registration, Thing
-from tests.devices.ros.rospy_peer import until
+from devices.ros.ros1.registration import Entry, Registration
+from devices.ros.ros1.xmlrpc_api import ApiResult, ApiServer, success
+from tests.devices.ros.helpers import until
 
 MADE_KNOWN = [[[1, "", []]], [[1, "", []]]]
 
 
 @pytest.fixture(autouse=True)
 def _often(monkeypatch):
-    monkeypatch.setattr(ros1_registration, "_LOOK_S", 0.02)
+    monkeypatch.setattr(ros1_registration, "_CHECK_S", 0.02)
 
 
 def registers(uri):
     """Return a node that registers a publisher and a subscriber, and what it is told of publishers."""
     told = []
     registration = Registration(uri, "/node", "http://127.0.0.1:1/")
-    registration.add(Thing("Publisher", "/a", ("std_msgs/String",)))
-    registration.add(Thing("Subscriber", "/b", ("std_msgs/String",), lambda uris: told.append(sorted(uris))))
+    registration.add(Entry("Publisher", "/a", ("std_msgs/String",)))
+    registration.add(Entry("Subscriber", "/b", ("std_msgs/String",), lambda uris: told.append(sorted(uris))))
     return registration, told
 
 
@@ -42,10 +42,10 @@ def registers(uri):
 def test_an_answer_that_is_none_is_asked_for_again(answer, caplog):
     answers = iter([answer])
     calls = {
-        "lookupNode": lambda *_: Answer(-1, "unknown", 0),
+        "lookupNode": lambda *_: ApiResult(-1, "unknown", 0),
         "system.multicall": lambda *_: next(answers, MADE_KNOWN),
     }
-    master = ProgramServer("127.0.0.1", calls)
+    master = ApiServer("127.0.0.1", calls)
     registration, told = registers(master.uri)
     try:
         assert until(lambda: told), caplog.text
@@ -57,8 +57,8 @@ def test_an_answer_that_is_none_is_asked_for_again(answer, caplog):
 
 @pytest.mark.parametrize("uri", ["rosrpc://127.0.0.1:5/", "nowhere", "http://[::1:5/"])
 def test_a_node_of_its_name_at_an_address_that_is_none_is_no_other(uri):
-    master = ProgramServer(
-        "127.0.0.1", {"lookupNode": lambda *_: said(uri), "system.multicall": lambda *_: MADE_KNOWN}
+    master = ApiServer(
+        "127.0.0.1", {"lookupNode": lambda *_: success(uri), "system.multicall": lambda *_: MADE_KNOWN}
     )
     registration, told = registers(master.uri)
     try:

@@ -14,8 +14,9 @@ from hub.planning.wiring import make_plan
 from hub.session.session import Session
 from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Scenario
+from tests.devices.ros.helpers import until
 from tests.devices.ros.ideal_robot import IdealRobot, motion
-from tests.devices.ros.rospy_peer import Program, master, needs_rospy, until
+from tests.devices.ros.rospy_peer import Program, master, needs_rospy
 
 pytest.importorskip("ruckig")
 pytestmark = needs_rospy

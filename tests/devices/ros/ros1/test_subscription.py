@@ -10,12 +10,12 @@ from queue import Queue
 import pytest
 
 from devices.ros.ros1 import subscription as ros1_subscription
-from devices.ros.ros1.api import Answer, ProgramServer, said
 from devices.ros.ros1.transport import Ros1Transport
+from devices.ros.ros1.xmlrpc_api import ApiResult, ApiServer, success
 from devices.ros.topics.row import Row
 from schemas.codec import encode
 from schemas.ros import StringMessage
-from tests.devices.ros.rospy_peer import until
+from tests.devices.ros.helpers import until
 from tests.hub.authorities import free_port
 
 TOPIC, WORD = "/PSM1/set_tool_type", StringMessage.ros_type
@@ -34,11 +34,11 @@ def node(name):
 @pytest.fixture
 def listening(monkeypatch):
     """A node that listens, and a queue of when its senders were connected (0: what they say is meant now)."""
-    monkeypatch.setattr(ros1_subscription, "_SOONEST_S", 0.05)
+    monkeypatch.setattr(ros1_subscription, "_FIRST_RETRY_S", 0.05)
     with node("/listener") as listener:
-        linked = Queue()
-        listener.subscribe(HEARD, lambda payload, client, /, *, linked_ns=0: linked.put(linked_ns))
-        yield listener, linked
+        connected = Queue()
+        listener.subscribe(HEARD, lambda payload, client, /, *, connected_ns=0: connected.put(connected_ns))
+        yield listener, connected
 
 
 @pytest.fixture
@@ -52,29 +52,29 @@ def say(publisher):
 
 
 def is_told_of(listener, *uris, by_answer=False):
-    listener._subscriptions.update(TOPIC, uris, there_before=by_answer)
+    listener._subscriptions.update(TOPIC, uris, published_before=by_answer)
 
 
 def test_one_that_comes_later_means_what_it_has_kept(listening, publisher):
-    listener, linked = listening
+    listener, connected = listening
     is_told_of(listener, by_answer=True)
     say(publisher)
     is_told_of(listener, publisher._server.uri)
-    assert linked.get(timeout=5.0) == 0
+    assert connected.get(timeout=5.0) == 0
 
 
 @pytest.mark.parametrize("by_answer", [True, False])
 def test_one_that_may_have_been_there_before_does_not(listening, publisher, by_answer):
-    listener, linked = listening
+    listener, connected = listening
     say(publisher)
     # False: another one has made itself known while we did
     is_told_of(listener, publisher._server.uri, by_answer=by_answer)
     is_told_of(listener, publisher._server.uri, by_answer=not by_answer)
-    assert linked.get(timeout=5.0) > 0
+    assert connected.get(timeout=5.0) > 0
 
 
 def test_one_that_was_not_reached_at_first_does_not(listening, publisher):
-    listener, linked = listening
+    listener, connected = listening
     is_told_of(listener, by_answer=True)
     is_told_of(listener, publisher._server.uri)  # and does not publish it yet
     assert until(
@@ -83,7 +83,7 @@ def test_one_that_was_not_reached_at_first_does_not(listening, publisher):
         )
     )
     say(publisher)
-    assert linked.get(timeout=5.0) > 0
+    assert connected.get(timeout=5.0) > 0
 
 
 NOWHERE = [
@@ -95,13 +95,16 @@ NOWHERE = [
 ]
 
 
-@pytest.mark.parametrize("answer", [*(said(place) for place in NOWHERE), Answer(0, "", 0), "none"], ids=repr)
+@pytest.mark.parametrize(
+    "answer", [*(success(place) for place in NOWHERE), ApiResult(0, "", 0), "none"], ids=repr
+)
 def test_one_that_names_no_place_is_asked_again(listening, answer):
     listener, _ = listening
     with socket.create_server(("127.0.0.1", 0)) as server:
         answers = iter([answer])
-        program = ProgramServer(
-            "127.0.0.1", {"requestTopic": lambda *_: next(answers, said(["TCPROS", *server.getsockname()]))}
+        program = ApiServer(
+            "127.0.0.1",
+            {"requestTopic": lambda *_: next(answers, success(["TCPROS", *server.getsockname()]))},
         )
         try:
             is_told_of(listener, program.uri)
@@ -127,7 +130,7 @@ def test_a_failure_nobody_thought_of_is_not_made_again_with_the_same_bytes(liste
     listener, _ = listening
     taken = []
 
-    def fail(payload, client, /, *, linked_ns=0):
+    def fail(payload, client, /, *, connected_ns=0):
         taken.append(payload)
         raise RuntimeError("unthought of")
 

@@ -4,13 +4,13 @@ import pytest
 
 from devices.ros.params import GatewayParams
 from devices.ros.ros1.types import Wire, checksum, definition, ros1_name, service_checksum
-from devices.ros.topics.face import face
+from devices.ros.topics.dvrk_table import dvrk_table
 from schemas.codec import encode, message_type
 from schemas.errors import MessageError
 from schemas.ros import Header, JointState, Time
 from tests.devices.ros.crtk_table import WHOLE, sample
 
-TOPICS = {row.type: row for row in face(GatewayParams.model_validate(WHOLE)) if row.way != "serve"}
+TOPICS = {row.type: row for row in dvrk_table(GatewayParams.model_validate(WHOLE)) if row.way != "serve"}
 NOETIC = {
     "std_msgs/msg/Empty": "d41d8cd98f00b204e9800998ecf8427e",
     "std_msgs/msg/String": "992ce8a1687cec8c8bd883ec73ca41d1",

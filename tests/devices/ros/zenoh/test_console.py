@@ -13,6 +13,7 @@ from hub.transport.zenoh_session import open_session
 from schemas.crtk import OperatingState
 from schemas.keys import Keys
 from schemas.ros import StringMessage
+from tests.devices.ros.helpers import received, until
 from tests.devices.ros.zenoh.test_gateway import (
     ARM,
     COMMAND,
@@ -23,7 +24,6 @@ from tests.devices.ros.zenoh.test_gateway import (
     joints,
     router,
     showing,
-    until,
 )
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built
 from tests.hub.authorities import Authority, free_port
@@ -83,7 +83,7 @@ def test_who_has_the_certificate_of_a_console_may_do_all_that_ros_programs_do(ga
         gateway.write("PSM1/status", StringMessage(data="here"))
         assert until(lambda: heard and events)
         publish(joints())
-        assert until(lambda: any(sample.port == COMMAND[1:] for sample in gateway.read(0)))
+        assert until(lambda: received(gateway, COMMAND))
         assert [client.name for client in gateway._transport.clients()] == ["/console"]
         nowhere = {
             "position": dict.fromkeys("xyz", 0.0),
@@ -133,7 +133,7 @@ def test_a_gateway_on_another_machine_is_seen_at_the_hub(tmp_path):
                 gateway.write(EVENT[1:], OperatingState(state="ENABLED"))
                 assert until(lambda: gateway.write(STATE[1:], np.zeros(18)) or (heard and states))
                 console.publisher(COMMAND, JOINTS)(joints())
-                assert until(lambda: any(sample.port == COMMAND[1:] for sample in gateway.read(0)))
+                assert until(lambda: received(gateway, COMMAND))
         finally:
             gate.close()
 

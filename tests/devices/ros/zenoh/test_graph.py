@@ -2,83 +2,83 @@
 
 from devices.ros.transport import Client
 from devices.ros.zenoh.graph import Graph, gid_of
-from devices.ros.zenoh.layout import VOLATILE, Endpoint
+from devices.ros.zenoh.layout import VOLATILE, GraphToken
 
 OURS, ONE, OTHER = "aaaa", "bbbb", "cccc"
 COMMAND, STATE = "/PSM1/servo_jp", "/PSM1/measured_js"
 
 
 def node(session, name="/console"):
-    return Endpoint(session, 0, "NN", name).token(0)
+    return GraphToken(session, 0, "NN", name).key(0)
 
 
-def endpoint(session, topic, kind="MP", number=1, name="/console"):
-    return Endpoint(
+def entity(session, topic, kind="MP", number=1, name="/console"):
+    return GraphToken(
         session, number, kind, name, topic, "sensor_msgs/msg/JointState", "RIHS01_0", VOLATILE
-    ).token(0)
+    ).key(0)
 
 
 def graph(*tokens):
     it = Graph(OURS)
     for token in tokens:
-        it.came(token)
+        it.add(token)
     return it
 
 
-def test_programs_are_known_by_what_they_have_to_do_with():
+def test_programs_are_known_by_the_topics_they_publish_or_subscribe_to():
     it = graph(
         node(OURS, "/dvrk"),
-        endpoint(OURS, STATE, name="/dvrk"),
+        entity(OURS, STATE, name="/dvrk"),
         node(ONE),
-        endpoint(ONE, STATE, "MS"),
+        entity(ONE, STATE, "MS"),
         node(OTHER, "/rviz"),
-        endpoint(OTHER, "/other"),
+        entity(OTHER, "/other"),
     )
     assert it.clients({COMMAND, STATE}) == (Client("/console", ONE),)
 
 
 def test_two_programs_of_one_name_have_different_ones():
-    it = graph(node(ONE), endpoint(ONE, STATE), node(OTHER), endpoint(OTHER, STATE))
+    it = graph(node(ONE), entity(ONE, STATE), node(OTHER), entity(OTHER, STATE))
     assert [client.name for client in it.clients({STATE})] == ["/console", "/console (cccc)"]
 
 
 def test_a_program_that_comes_back_has_its_name_again():
-    it = graph(node(ONE), endpoint(ONE, STATE))
-    it.went(endpoint(ONE, STATE))
+    it = graph(node(ONE), entity(ONE, STATE))
+    it.remove(entity(ONE, STATE))
     assert it.clients({STATE}) == ()
-    it.went(node(ONE))
-    it.came(node(OTHER))
-    it.came(endpoint(OTHER, STATE))
+    it.remove(node(ONE))
+    it.add(node(OTHER))
+    it.add(entity(OTHER, STATE))
     assert it.clients({STATE}) == (Client("/console", OTHER),)
 
 
 def test_a_publisher_is_known_by_the_id_that_is_made_of_its_token():
-    it = graph(endpoint(ONE, COMMAND), endpoint(OTHER, COMMAND, name="/second"))
-    assert it.sender(COMMAND, gid_of(endpoint(OTHER, COMMAND, name="/second"))) == "/second"
-    assert it.sender(COMMAND, gid_of(endpoint(ONE, COMMAND))) == "/console"
+    it = graph(entity(ONE, COMMAND), entity(OTHER, COMMAND, name="/second"))
+    assert it.sender(COMMAND, gid_of(entity(OTHER, COMMAND, name="/second"))) == "/second"
+    assert it.sender(COMMAND, gid_of(entity(ONE, COMMAND))) == "/console"
 
 
 def test_one_program_has_one_name_on_all_topics():
-    it = graph(endpoint(ONE, COMMAND, name="/first"), endpoint(ONE, STATE, number=2, name="/second"))
+    it = graph(entity(ONE, COMMAND, name="/first"), entity(ONE, STATE, number=2, name="/second"))
     assert it.sender(COMMAND, b"0" * 16) == it.sender(STATE, b"1" * 16) == "/first"
 
 
 def test_a_publisher_with_an_id_of_its_own_is_known_as_the_only_one_left():
-    it = graph(endpoint(ONE, COMMAND))
+    it = graph(entity(ONE, COMMAND))
     assert it.sender(COMMAND, b"0" * 16) == "/console"
-    it.came(endpoint(OTHER, COMMAND, name="/second"))
+    it.add(entity(OTHER, COMMAND, name="/second"))
     assert it.sender(COMMAND, b"0" * 16) == "/console"
     assert it.sender(COMMAND, b"1" * 16) == "/second"
 
 
 def test_two_of_them_that_nothing_tells_apart_go_by_their_ids():
-    it = graph(endpoint(ONE, COMMAND), endpoint(OTHER, COMMAND, name="/second"))
+    it = graph(entity(ONE, COMMAND), entity(OTHER, COMMAND, name="/second"))
     assert it.sender(COMMAND, b"0" * 16) == f"publisher {(b'0' * 16).hex()}"
     assert it.sender(COMMAND, b"1" * 16) != it.sender(COMMAND, b"0" * 16)
 
 
 def test_the_sender_of_a_program_that_has_gone_is_forgotten():
-    it = graph(endpoint(ONE, COMMAND))
+    it = graph(entity(ONE, COMMAND))
     assert it.sender(COMMAND, b"0" * 16) == "/console"
-    it.went(endpoint(ONE, COMMAND))
+    it.remove(entity(ONE, COMMAND))
     assert it.sender(COMMAND, b"0" * 16).startswith("publisher ")

@@ -7,28 +7,34 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from devices.ros.params import GatewayParams
-from devices.ros.topics.face import face
+from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.zenoh.graph import gid_of
-from devices.ros.zenoh.layout import LATCHED, VOLATILE, Attachment, Endpoint, graph_key, key, type_hash
+from devices.ros.zenoh.layout import LATCHED, VOLATILE, Attachment, GraphToken, graph_key, key, type_hash
 from devices.ros.zenoh.service_hash import service_hash
 from schemas.errors import MessageError
 from tests.devices.ros.zenoh.zenoh_peer import TYPES
 
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 NODE = "@ros2_lv/0/914ec2c920f5151f26394cf0ba959999/0/0/NN/%/%/p_tl"
-PUBLISHER = f"@ros2_lv/0/914ec2c920f5151f26394cf0ba959999/0/4/MP/%/%/p_tl/%q_transient/std_msgs::msg::dds_::String_/{STRING_HASH}/:1:,10:,:,:,,"
+PUBLISHER = (
+    "@ros2_lv/0/914ec2c920f5151f26394cf0ba959999/0/4/MP/%/%/p_tl/%q_transient"
+    f"/std_msgs::msg::dds_::String_/{STRING_HASH}/:1:,10:,:,:,,"
+)
 SENT = bytes.fromhex("15000000000000008903674cf9a2dc1810b9249d3fec6b1be4c0c8a0e3eb3550bb")
-NAMESPACED = f"@ros2_lv/7/6977b59f87229328a8d406ad77b301a6/0/11/MP/%/%cell4/gw/%cell4%chatter/std_msgs::msg::dds_::String_/{STRING_HASH}/::,7:,:,:,,"
+NAMESPACED = (
+    "@ros2_lv/7/6977b59f87229328a8d406ad77b301a6/0/11/MP/%/%cell4/gw/%cell4%chatter"
+    f"/std_msgs::msg::dds_::String_/{STRING_HASH}/::,7:,:,:,,"
+)
 """As captured from `ros2 topic pub` of Jazzy: a node, its latched publisher, the attachment of a message of
 that, and a publisher in a namespace.
 """
 
 
 def test_tokens_are_those_of_a_real_node():
-    node = Endpoint.of(NODE)
-    assert node == Endpoint("914ec2c920f5151f26394cf0ba959999", 0, "NN", "/p_tl")
-    assert node.token(0) == NODE
-    publisher = Endpoint.of(PUBLISHER)
+    node = GraphToken.parsed(NODE)
+    assert node == GraphToken("914ec2c920f5151f26394cf0ba959999", 0, "NN", "/p_tl")
+    assert node.key(0) == NODE
+    publisher = GraphToken.parsed(PUBLISHER)
     assert (publisher.number, publisher.kind, publisher.node, publisher.topic) == (
         4,
         "MP",
@@ -36,7 +42,7 @@ def test_tokens_are_those_of_a_real_node():
         "/q_transient",
     )
     assert (
-        Endpoint(
+        GraphToken(
             publisher.session,
             4,
             "MP",
@@ -45,11 +51,11 @@ def test_tokens_are_those_of_a_real_node():
             "std_msgs/msg/String",
             STRING_HASH,
             ":1:,10:,:,:,,",
-        ).token(0)
+        ).key(0)
         == PUBLISHER
     )
-    assert Endpoint.of(NAMESPACED).node == "/cell4/gw"
-    assert Endpoint.of(NAMESPACED).topic == "/cell4/chatter"
+    assert GraphToken.parsed(NAMESPACED).node == "/cell4/gw"
+    assert GraphToken.parsed(NAMESPACED).topic == "/cell4/chatter"
 
 
 def test_ids_and_attachments_are_those_of_a_real_node():
@@ -70,7 +76,7 @@ def test_ids_and_attachments_are_those_of_a_real_node():
     ],
 )
 def test_other_tokens_are_left_alone(token):
-    assert Endpoint.of(token) is None
+    assert GraphToken.parsed(token) is None
 
 
 @given(st.binary(max_size=64))
@@ -102,7 +108,7 @@ def test_every_type_of_the_table_has_a_hash():
     everything = GatewayParams.model_validate(
         {"arms": {"PSM1": {}, "ECM": {}}, "listen": ["MTMR"], "teleoperations": ["MTMR_PSM1"]}
     )
-    for type_ in {row.type for row in face(everything)}:
+    for type_ in {row.type for row in dvrk_table(everything)}:
         assert type_hash(type_).startswith("RIHS01_")
         if type_ in TYPES.types:  # of the peer, which has the types from rosbags and their texts from CRTK
             assert type_hash(type_) == TYPES.hash_rihs01(type_), type_

@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from tests.devices.ros.zenoh.test_gateway import COMMAND, JOINTS, STATE, joints, until
+from tests.devices.ros.helpers import until
+from tests.devices.ros.zenoh.test_gateway import COMMAND, JOINTS, STATE, joints
 from tests.devices.ros.zenoh.zenoh_peer import Peer
 from tests.hub.conftest import install_plugin, prepare, toys
 
@@ -30,11 +31,11 @@ ECHO = '''
 
 import numpy as np
 
-from devices.ros.topics.face import face
+from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.params import GatewayParams
 from hub.participant import Stepped, state_hash
 
-ROWS = {row.topic: row.port for row in face(GatewayParams.model_validate({"arms": {"PSM1": {}}}))}
+ROWS = {row.topic: row.port for row in dvrk_table(GatewayParams.model_validate({"arms": {"PSM1": {}}}))}
 
 
 class Echo(Stepped):

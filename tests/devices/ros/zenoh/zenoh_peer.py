@@ -1,8 +1,8 @@
 """A ROS 2 program on Zenoh that shares nothing with the gateway: written from rmw_zenoh's docs/design.md
 alone, on eclipse-zenoh and rosbags.
 
-As a program, `python -m tests.devices.ros.zenoh_peer ENDPOINT DOMAIN`, it says that it is ready, and listens
-to all topics until it is killed.
+As a program, `python -m tests.devices.ros.zenoh.zenoh_peer ENDPOINT DOMAIN`, it prints that it is ready, and
+subscribes to all topics until it is killed.
 """
 
 import json
@@ -101,7 +101,8 @@ class Peer:
     def _token(self, kind, topic, type_, hash_, latched):
         self.count += 1
         quality = ":1:,1:,:,:,," if latched else "::,10:,:,:,,"
-        key = f"@ros2_lv/{self.domain}/{self.id}/0/{self.count}/{kind}/%/%/{self.name}/{topic.replace('/', '%')}/{dds(type_)}/{hash_}/{quality}"
+        entity = f"@ros2_lv/{self.domain}/{self.id}/0/{self.count}/{kind}/%/%/{self.name}"
+        key = f"{entity}/{topic.replace('/', '%')}/{dds(type_)}/{hash_}/{quality}"
         self.kept.append(self.session.liveliness().declare_token(key))
 
     def key(self, topic, type_):

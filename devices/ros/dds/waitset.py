@@ -1,4 +1,4 @@
-"""What arrives on readers of Cyclone DDS, taken in a thread of our own."""
+"""Takes samples from readers of Cyclone DDS, in a thread of our own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cyclonedds.domain import DomainParticipant
 from cyclonedds.sub import DataReader
 from cyclonedds.util import duration
 
-__all__ = ["Arrivals"]
+__all__ = ["ReaderWaitSet"]
 
 log = logging.getLogger(__name__)
 
@@ -22,39 +22,39 @@ _AT_ONCE = 64
 _LONGEST_WAIT_NS = duration(hours=1)
 
 
-class Arrivals(WaitSet):
-    """Waits for readers and hands on what they have, those added first before others.
+class ReaderWaitSet(WaitSet):
+    """Waits for readers and passes on their samples, those of readers added first before others.
 
-    Not a listener: that is called in the thread which receives for all, and there it would wait for Python's
-    interpreter, which a simulation in the same process holds for milliseconds.
+    Not a listener: that is called in the thread which receives for all readers, and there it would wait for
+    Python's interpreter, which a simulation in the same process holds for milliseconds.
     """
 
     def __init__(self, participant: DomainParticipant, name: str) -> None:
-        """Take the participant whose readers they are, and the thread's name, and begin."""
+        """Start the thread `name` for readers of `participant`."""
         super().__init__(participant)
-        self._taken: list[Callable[[], None]] = []
+        self._readers: list[Callable[[], None]] = []
         self._ended = GuardCondition(participant)
         self._waitset_attach(self._ref, self._ended._ref, -1)
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def add(self, reader: DataReader[Any] | BuiltinDataReader, take: Callable[[Any], None]) -> None:
-        """Call `take` with every sample of a reader, from now on; it must not raise."""
+    def add(self, reader: DataReader[Any] | BuiltinDataReader, on_sample: Callable[[Any], None]) -> None:
+        """Call `on_sample`, which must not raise, with every sample of a reader from now on."""
         reader.set_status_mask(DDSStatus.DataAvailable)
 
-        def all_there() -> None:
+        def take_all() -> None:
             samples = reader.take(_AT_ONCE)
             while samples:
                 for sample in samples:
-                    take(sample)
+                    on_sample(sample)
                 samples = reader.take(_AT_ONCE)
 
-        self._taken.append(all_there)
-        self._waitset_attach(self._ref, reader._ref, len(self._taken) - 1)
+        self._readers.append(take_all)
+        self._waitset_attach(self._ref, reader._ref, len(self._readers) - 1)
 
     def _run(self) -> None:
         while True:
-            triggered = (ctypes.c_ssize_t * (len(self._taken) + 1))()
+            triggered = (ctypes.c_ssize_t * (len(self._readers) + 1))()
             count = self._waitset_wait(
                 self._ref,
                 ctypes.cast(triggered, ctypes.POINTER(ctypes.c_void_p)),
@@ -66,16 +66,15 @@ class Arrivals(WaitSet):
                 return
             for number in numbers:
                 try:
-                    self._taken[number]()
+                    self._readers[number]()
                 except DDSException as error:
                     log.warning("a reader of DDS fails: %s", error)
-                except (
-                    Exception
-                ):  # one sample that goes wrong in a way nobody thought of is not to end all hearing
+                # an unforeseen error in one sample must not end the thread
+                except Exception:
                     log.exception("a sample on DDS cannot be taken")
 
     def close(self) -> None:
-        """Take nothing more."""
+        """Take no more samples."""
         self._ended.set(True)
         if self._thread is not threading.current_thread():
             self._thread.join(timeout=2.0)

@@ -1,4 +1,4 @@
-"""How much goes through a gateway: what `trocar ros` shows."""
+"""Message counts, rates and clients of a gateway: its status, which `trocar ros` shows."""
 
 from __future__ import annotations
 
@@ -9,38 +9,36 @@ from devices.ros.topics.row import Row
 from devices.ros.transport import Client
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
 
-__all__ = ["Count", "Traffic"]
+__all__ = ["Count", "StatusCounters"]
 
 
 class Count:
-    """Of one row: messages so far, those of them that were refused, and why the last one was."""
+    """Of one row: messages so far, how many of them were refused, and why the last one was."""
 
     __slots__ = ("messages", "reason", "refused")
 
     def __init__(self) -> None:
-        """Begin with none."""
         self.messages = self.refused = 0
         self.reason = ""
 
 
-class Traffic:
-    """Of all rows of one gateway."""
+class StatusCounters:
+    """The counts of all rows of one gateway."""
 
     def __init__(self, kind: str, rows: Iterable[Row]) -> None:
-        """Take the gateway's kind and table."""
         self._kind = kind
         self._counts = {row: Count() for row in rows}
         self._before = dict.fromkeys(self._counts, 0)
-        self._looked_ns = monotonic_ns()
+        self._asked_ns = monotonic_ns()
 
     def __getitem__(self, row: Row) -> Count:
-        """Return what to count a row's messages with."""
+        """Return the count of a row."""
         return self._counts[row]
 
     def status(self, clients: Iterable[Client]) -> GatewayStatus:
-        """Return what has gone through, with rates since the last time this was asked."""
+        """Return the status, with rates since the last call."""
         now_ns = monotonic_ns()
-        seconds, self._looked_ns = max(now_ns - self._looked_ns, 1) / 1e9, now_ns
+        seconds, self._asked_ns = max(now_ns - self._asked_ns, 1) / 1e9, now_ns
         topics: list[GatewayTopic] = []
         for row, count in self._counts.items():
             if not count.messages:
@@ -58,6 +56,6 @@ class Traffic:
             )
         return GatewayStatus(
             kind=self._kind,
-            clients=[GatewayClient(name=c.name, address=c.address) for c in clients],
+            clients=[GatewayClient(name=client.name, address=client.address) for client in clients],
             topics=topics,
         )

@@ -1,6 +1,4 @@
-"""Messages that a program has kept from before it was connected: commands are not heeded, states of real arms
-are.
-"""
+"""Latched messages from before a connection: commands are refused, states of real arms accepted."""
 
 import time
 
@@ -11,6 +9,7 @@ from devices.ros.params import GatewayParams
 from schemas.codec import encode
 from schemas.crtk import OperatingState, StringStamped
 from schemas.ros import EmptyMessage, Header, JointState, StringMessage, Time
+from tests.devices.ros.helpers import received
 from tests.devices.ros.memory import MemoryGateway
 
 SECOND = 10**9
@@ -29,9 +28,9 @@ def gateway(tmp_path):
         yield it
 
 
-def came_in(gateway, topic, message, linked_ns):
-    gateway.transport.takers[topic](encode(message), "/console", linked_ns=linked_ns)
-    return any(sample.port == topic[1:] for sample in gateway.read(0))
+def accepts(gateway, topic, message, connected_ns):
+    gateway.transport.receivers[topic](encode(message), "/console", connected_ns=connected_ns)
+    return bool(received(gateway, topic))
 
 
 @pytest.mark.parametrize(
@@ -43,23 +42,23 @@ def came_in(gateway, topic, message, linked_ns):
         ("/PSM1/set_tool_type", StringMessage(data="LARGE_NEEDLE_DRIVER_400006")),
     ],
 )
-def test_a_command_without_a_stamp_is_told_and_not_heeded(gateway, topic, message):
-    assert not came_in(gateway, topic, message, time.time_ns())
+def test_a_command_without_a_stamp_is_refused_with_a_warning(gateway, topic, message):
+    assert not accepts(gateway, topic, message, time.time_ns())
     (warning,) = gateway.transport.heard("/PSM1/warning")
-    assert "kept by /console from before it was connected" in warning.data
-    assert came_in(gateway, topic, message, 0), "the same, when it is given"
+    assert "published by /console before it was connected" in warning.data
+    assert accepts(gateway, topic, message, 0), "the same, published after it was connected"
 
 
 def test_the_stamp_says_whether_it_is_from_before(gateway):
     now = time.time_ns()
-    assert not came_in(
+    assert not accepts(
         gateway, "/PSM1/move_jp", JointState(header=stamped(now - SECOND), position=JOINTS), now
     )
-    assert came_in(gateway, "/PSM1/move_jp", JointState(header=stamped(now + 1), position=JOINTS), now)
+    assert accepts(gateway, "/PSM1/move_jp", JointState(header=stamped(now + 1), position=JOINTS), now)
 
 
 def test_what_a_real_arm_has_kept_is_its_state(gateway):
-    assert came_in(
+    assert accepts(
         gateway,
         "/MTML/operating_state",
         OperatingState(header=stamped(SECOND), state="ENABLED"),

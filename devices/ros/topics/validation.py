@@ -1,6 +1,4 @@
-"""What a message from outside must be before it enters the simulation, beyond being one of its type with
-finite numbers.
-"""
+"""What a ROS message must satisfy beyond its type and finite numbers before it enters the simulation."""
 
 from __future__ import annotations
 
@@ -15,15 +13,16 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import JointState, PoseStamped, Quaternion
 
-__all__ = ["as_signal", "check"]
+__all__ = ["as_signal", "validate"]
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of the norm, as for the values of signals (schemas.vectors)."""
 
 
-def check(message: Message, row: Row) -> None:
-    """Raise MessageError if a message has a wrong number of joints (those that the row's port names) or a
-    quaternion that is none.
+def validate(message: Message, row: Row) -> None:
+    """Check the number of joints (those that the row's port names) and the norms of quaternions.
+
+    Raises MessageError.
     """
     if isinstance(message, JointState):
         _check_joints(message, row)
@@ -64,9 +63,7 @@ def _check_quaternion(q: Quaternion) -> None:
 
 
 def as_signal(message: Message, port: Port) -> Message:
-    """Return what a real arm has told as the signal `port` has it: joints by our names, zeros for what it
-    does not state.
-    """
+    """Return a real arm's message as the signal `port` has it: our joint names, zeros for missing fields."""
     if not isinstance(message, JointState):
         return message
     stated = {field: getattr(message, field) for field in port.fields}

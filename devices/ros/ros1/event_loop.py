@@ -1,6 +1,4 @@
-"""One thread that waits for all sockets of a ROS 1 node: for bytes to read, for room to write, for programs
-that connect.
-"""
+"""One thread that waits for all sockets of a ROS 1 node: to read, to write, to accept connections."""
 
 from __future__ import annotations
 
@@ -13,20 +11,20 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
-__all__ = ["Ears", "Loop"]
+__all__ = ["EventLoop", "SocketHandler"]
 
 log = logging.getLogger(__name__)
 
 
-class Ears(Protocol):
-    """What owns a socket."""
+class SocketHandler(Protocol):
+    """The owner of a socket."""
 
     def readable(self) -> None:
-        """Read what there is, without waiting."""
+        """Read what has arrived, without blocking."""
         ...
 
     def writable(self) -> None:
-        """Write what has waited for room, without waiting. Called only after `Loop.watch(..., writing=True)`."""
+        """Write what is queued, without blocking. Called only after `EventLoop.watch(..., writing=True)`."""
         ...
 
     def close(self) -> None:
@@ -34,11 +32,11 @@ class Ears(Protocol):
         ...
 
 
-class Loop:
-    """Calls the owners of sockets in one thread. Other threads hand it what is to be done there."""
+class EventLoop:
+    """Calls the owners of sockets in one thread; other threads schedule calls there."""
 
     def __init__(self, name: str) -> None:
-        """Take the thread's name, and begin."""
+        """Start the thread `name`."""
         self._selector = selectors.DefaultSelector()
         self._calls: deque[Callable[[], None]] = deque()
         self._wake, self._woken = socket.socketpair()
@@ -50,23 +48,21 @@ class Loop:
         self._thread.start()
 
     def call(self, do: Callable[[], None]) -> None:
-        """Have `do` called in the loop's thread, soon; from any thread."""
+        """Schedule `do` in the loop's thread; from any thread."""
         self._calls.append(do)
-        with suppress(OSError):  # it is full of such bytes, or closed
+        with suppress(OSError):  # full of such bytes, or closed
             self._wake.send(b"\0")
 
-    def watch(self, sock: socket.socket, ears: Ears, *, writing: bool = False) -> None:
-        """Call `ears` when there is something to read on `sock` and, if `writing`, room to write; in the
-        loop's thread only.
-        """
+    def watch(self, sock: socket.socket, handler: SocketHandler, *, writing: bool = False) -> None:
+        """Call `handler` when `sock` can be read or, if `writing`, written; in the loop's thread only."""
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writing else 0)
         if sock in self._selector.get_map():
-            self._selector.modify(sock, events, ears)
+            self._selector.modify(sock, events, handler)
         else:
-            self._selector.register(sock, events, ears)
+            self._selector.register(sock, events, handler)
 
     def forget(self, sock: socket.socket) -> None:
-        """Watch a socket no more, before it is closed; in the loop's thread only."""
+        """Stop watching a socket, before it is closed; in the loop's thread only."""
         if sock in self._selector.get_map():
             self._selector.unregister(sock)
 
@@ -84,16 +80,14 @@ class Loop:
         with suppress(BlockingIOError):
             self._woken.recv(4096)
 
-    def _serve(self, ears: Ears, events: int) -> None:
+    def _serve(self, handler: SocketHandler, events: int) -> None:
         if events & selectors.EVENT_WRITE:
-            self._guarded(ears.writable)
+            self._guarded(handler.writable)
         if events & selectors.EVENT_READ:
-            self._guarded(ears.readable)
+            self._guarded(handler.readable)
 
     def _guarded(self, do: Callable[[], None]) -> None:
-        """Call what must not end the loop: one program that goes wrong in a way nobody thought of is not to
-        cut off the others.
-        """
+        """Call `do`; an unforeseen error with one program must not end the loop for the others."""
         try:
             do()
         except Exception:
@@ -106,7 +100,7 @@ class Loop:
         self._ending = True
 
     def close(self) -> None:
-        """Close all sockets that are watched, and end the thread."""
+        """Close all watched sockets, and end the thread."""
         self.call(self._end)
         if self._thread is not threading.current_thread():
             self._thread.join(timeout=2.0)

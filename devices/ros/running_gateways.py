@@ -1,4 +1,4 @@
-"""What the gateways of this machine's sessions tell of themselves."""
+"""Which gateways run in the sessions of this machine, from the status that each publishes once a second."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from schemas.trocar_msgs import GatewayStatus
 
 __all__ = ["running_gateways"]
 
-_WATCH_S = 1.5
-"""Every gateway tells once a second."""
+_WAIT_S = 1.5
+"""Every gateway publishes its status once a second."""
 
 
 def running_gateways(endpoints: Iterable[str]) -> Mapping[tuple[str, str], GatewayStatus]:
-    """Return the status of every gateway, by session and name, of the hubs that listen on `endpoints`;
-    whoever else listens there is passed over.
+    """Return the status of every gateway, by session and name, of the hubs that listen on `endpoints`.
+
+    An endpoint where something else listens is passed over.
     """
     found: dict[tuple[str, str], GatewayStatus] = {}
     lock = Lock()
 
-    def take(sample: zenoh.Sample) -> None:
+    def receive(sample: zenoh.Sample) -> None:
         _, session, _, name, *_ = str(sample.key_expr).split("/")
         with suppress(MessageError), lock:
             found[session, name] = decode(GatewayStatus, sample.payload.to_bytes())
@@ -39,11 +40,11 @@ def running_gateways(endpoints: Iterable[str]) -> Mapping[tuple[str, str], Gatew
         with suppress(ConnectError, zenoh.ZError):
             client = open_session("client", connect=[endpoint])
             client.declare_subscriber(
-                Keys("*").output("device", "*", "gateway"), Callback(take, indirect=True)
+                Keys("*").output("device", "*", "gateway"), Callback(receive, indirect=True)
             )
             clients.append(client)
     if clients:
-        sleep(_WATCH_S)
+        sleep(_WAIT_S)
     for client in clients:
         client.close()
     with lock:

@@ -6,12 +6,12 @@ from pydantic import ValidationError
 from controllers.motion.controller import MotionController
 from controllers.motion.params import MotionParams
 from devices.ros.params import GatewayParams
-from devices.ros.topics.face import NOT_SERVED, face
+from devices.ros.topics.dvrk_table import NOT_SERVED, dvrk_table
 from schemas.codec import message_type
 from tests.devices.ros.crtk_table import PYTHON_CLIENT, WHOLE
 
 PARAMS = GatewayParams.model_validate(WHOLE)
-ROWS = {row.topic: row for row in face(PARAMS)}
+ROWS = {row.topic: row for row in dvrk_table(PARAMS)}
 
 ARM_NAMES = {
     "subscribe": (
@@ -45,7 +45,7 @@ def test_python_clients_find_a_peer_for_all_they_declare() -> None:
 
 
 def test_topics_and_ports_are_unique_and_of_known_types() -> None:
-    rows = face(PARAMS)
+    rows = dvrk_table(PARAMS)
     ports = [row.port for row in rows if row.port is not None]
     assert len({row.topic for row in rows}) == len(rows)
     assert len({port.name for port in ports}) == len(ports)
@@ -61,12 +61,12 @@ def test_topics_and_ports_are_unique_and_of_known_types() -> None:
 @pytest.mark.parametrize("mounting", ["free", "cart"])
 @pytest.mark.parametrize("reference", ["camera", "base", "world"])
 def test_it_fits_the_motion_controller(mounting: str, reference: str) -> None:
-    """What both have is of one type, frame and size, and whatever motion tells or takes of an arm is in the
-    table, but for what the real bridge lacks.
-    """
+    """Every port of an arm has a row of the same type, frame and size, but for what the real bridge lacks."""
     told = {name: WHOLE[name] for name in ("arms",)} | {"mounting": mounting, "reference": reference}
     rows = {
-        row.port.name: row.port for row in face(GatewayParams.model_validate(told)) if row.port is not None
+        row.port.name: row.port
+        for row in dvrk_table(GatewayParams.model_validate(told))
+        if row.port is not None
     }
     ports = MotionController("motion", MotionParams.model_validate(told)).ports
     for port in ports:
@@ -106,11 +106,11 @@ def test_a_real_arm_is_the_other_way_round() -> None:
 
 
 def test_a_namespace_is_of_what_is_simulated() -> None:
-    topics = {row.topic for row in face(GatewayParams.model_validate(WHOLE | {"namespace": "sim"}))}
+    topics = {row.topic for row in dvrk_table(GatewayParams.model_validate(WHOLE | {"namespace": "sim"}))}
     assert {"/sim/PSM1/measured_js", "/sim/tf", "/MTML/measured_js"} <= topics
     assert all(
         row.name == ROWS[row.topic.removeprefix("/sim")].name
-        for row in face(GatewayParams.model_validate({"namespace": "sim"}))
+        for row in dvrk_table(GatewayParams.model_validate({"namespace": "sim"}))
         if row.owner
     )
 
@@ -126,7 +126,7 @@ def test_a_description_that_is_not_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("topic", "leads"),
+    ("topic", "moves"),
     [
         ("servo_jp", True),
         ("jaw/move_jp", True),
@@ -135,14 +135,16 @@ def test_a_description_that_is_not_there() -> None:
         ("state_command", False),
     ],
 )
-def test_what_leads_an_arm(topic: str, leads: bool) -> None:
-    assert ROWS[f"/PSM1/{topic}"].leads is leads
+def test_which_commands_move_an_arm(topic: str, moves: bool) -> None:
+    assert ROWS[f"/PSM1/{topic}"].moves is moves
 
 
 def test_real_pedals_come_in_instead_of_going_out():
     rows = [
         row
-        for row in face(GatewayParams.model_validate({"listen": ["footpedals"], "namespace": "simulation"}))
+        for row in dvrk_table(
+            GatewayParams.model_validate({"listen": ["footpedals"], "namespace": "simulation"})
+        )
         if row.owner == "footpedals"
     ]
     assert {row.way for row in rows} == {"subscribe"}

@@ -33,7 +33,7 @@ STATUS = GatewayStatus(
 
 @pytest.fixture
 def endpoint() -> Generator[str]:
-    """A hub with a gateway that tells every tenth of a second, and with one that tells nonsense."""
+    """A hub with a gateway that publishes its status every 0.1 s, and with one that publishes nonsense."""
     endpoint, over = free_endpoint(range(1)), threading.Event()
 
     def tell() -> None:
@@ -53,7 +53,7 @@ def test_people_see_who_is_connected_and_what_goes_through(endpoint: str) -> Non
     shown = CliRunner().invoke(app, ["--connect", endpoint], env={"COLUMNS": "160"}).stdout
     assert "ros (ros2-dds) in session 'surgery', connected: /console (10.0.0.7)" in shown
     lines = [line.split() for line in shown.splitlines()]
-    assert ["/PSM1/measured_js", "told", "100.0", "1000"] in lines
+    assert ["/PSM1/measured_js", "published", "100.0", "1000"] in lines
     assert "5 values in position, expected 6" in shown
     assert "broken" not in shown
 

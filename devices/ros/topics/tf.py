@@ -1,6 +1,4 @@
-"""What ROS programs are told of the whole cart at once: /tf, from the cart to each tip and camera, and
-/joint_states.
-"""
+"""`/tf`: the frames of all simulated arms and cameras, from the cart or the world to each tip."""
 
 from __future__ import annotations
 
@@ -10,44 +8,34 @@ from struct import Struct
 import numpy as np
 
 from devices.ros.params import GatewayParams
-from devices.ros.topics.outgoing import Source, State
+from devices.ros.topics.publications import State
 from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.ecm import tip
 from robots.dvrk.endoscope import BASELINE, optical_in_roll
 from robots.dvrk.mounted import MountedArm, MountedEcm
 from schemas.codec import encode
-from schemas.ports import Port
 from schemas.ros import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3
-from schemas.vectors import Vector, VectorCodec
+from schemas.vectors import Vector
 
-__all__ = ["scenery", "stride"]
+__all__ = ["TF_PERIOD_NS", "TransformTree"]
 
-_JOINT_STATE = "sensor_msgs/msg/JointState"
-_TF_PERIOD_NS = 20_000_000
+TF_PERIOD_NS = 20_000_000
 """As on the dVRK (docs/pages/development/middleware.rst)."""
 _STAMP = Struct("<iI")
 _Edge = tuple[str, str, Callable[[], Vector | None]]
-"""Parent frame, child frame, and what returns the pose, shape (7,), of the one in the other."""
+"""Parent frame, child frame, and a function that returns the pose, shape (7,), of the child in the parent."""
 
 
-def scenery(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, Source]:
-    """Return what is published of it, by the names of topics; `states` by the names of their ports."""
-    return {"tf": _Transforms(params, states), "joint_states": _JointStates(params, states)}
+class TransformTree:
+    """The tree of frames, as messages.
 
-
-def stride(name: str, period_ns: int) -> int:
-    """Return at every how many of a gateway's periods topic `name` is published."""
-    return max(1, round(_TF_PERIOD_NS / period_ns)) if name == "tf" else 1
-
-
-class _Transforms:
-    """The tree of frames: world or cart, `<arm>_base`, `<arm>` (its tip), and under the endoscope's tip the
-    left camera's optical frame.
+    World or cart, `<arm>_base`, `<arm>` (its tip), and under the endoscope's tip the left camera's optical
+    frame.
     """
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
-        """Take what is shown, and the states by the names of their ports."""
+        """`states`: by the names of their ports."""
         self._edges: list[_Edge] = []
         for name, arm in params.arms.shown.items():
             self._edges += [
@@ -75,12 +63,13 @@ class _Transforms:
 
 
 class _Template:
-    """The bytes of a TFMessage between given frames, of which only stamps and poses change: 21 us instead of
-    540 through the models.
+    """The bytes of a TFMessage between given frames, of which only stamps and poses change.
+
+    Filling them in takes 21 us, encoding through the models 540.
     """
 
     def __init__(self, edges: tuple[tuple[str, str], ...]) -> None:
-        """Serialise once, with numbers that occur nowhere else, to find where the stamps and the poses stand."""
+        """Encode once, with numbers that occur nowhere else, to find the offsets of stamps and poses."""
         self.edges = edges
         marks = np.random.default_rng(0).random((len(edges), 7))
         stamps = [Time(sec=10**9 + index, nanosec=10**8 + index) for index in range(len(edges))]
@@ -104,9 +93,7 @@ class _Template:
 
 
 def _base(name: str, arm: MountedArm, params: GatewayParams, states: Mapping[str, State]) -> _Edge:
-    """Return the edge to an arm's base: as the motion controller tells it where it can move, else as the
-    scenario has it.
-    """
+    """Return the edge to an arm's base: its pose is the motion controller's if it can move, else fixed."""
     child = f"{name}_base"
     if params.mounting == "cart":
         return "Cart", child, _newest(states[f"SUJ/{name}/local/measured_cp"])
@@ -134,37 +121,3 @@ def _fixed(pose: Vector) -> Callable[[], Vector | None]:
 def _transform(pose: Vector) -> Transform:
     x, y, z, qx, qy, qz, qw = pose.tolist()
     return Transform(translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw))
-
-
-class _JointStates:
-    """The joints of all arms and of what they hold, called `<arm>_<joint>` as in the robot's description."""
-
-    def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
-        """Take what is shown, and the states by the names of their ports."""
-        found = (
-            (arm, states.get(f"{arm}/{part}measured_js"))
-            for arm in params.arms.shown
-            for part in ("", "jaw/", "hand/")
-        )
-        self._parts = [(arm, state) for arm, state in found if state is not None]
-        self._known: tuple[str, ...] = ()
-        self._codec: VectorCodec | None = None
-
-    def cdr(self, stamp_ns: int) -> bytes | None:
-        """Return the joints that are known now, as a JointState; None if there are none."""
-        known = [(arm, state, value) for arm, state in self._parts if (value := state.value) is not None]
-        if not known:
-            return None
-        names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
-        if self._codec is None or names != self._known:
-            fields = ("position", "velocity", "effort")
-            self._known, self._codec = (
-                names,
-                VectorCodec(
-                    Port(
-                        name="joint_states", causality="input", type=_JOINT_STATE, names=names, fields=fields
-                    )
-                ),
-            )
-        rows = [value.reshape(3, -1) for _, _, value in known]  # position, velocity, effort of each arm
-        return self._codec.encode(np.concatenate(rows, axis=1).ravel(), stamp_ns)

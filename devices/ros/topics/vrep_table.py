@@ -1,9 +1,8 @@
-"""The topics of the authors' simulator, as the table of a gateway with `profile: paper`; a participant of
-kind `paper` is behind it.
+"""The table of a gateway with `profile: paper`: the topics of the authors' simulator, in V-REP.
 
-Names and types as in the scripts of their scenes (unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with what
-their Python client says beside (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names
-there.
+Behind it is a participant of kind `paper`. Names and types as in the scripts of their scenes
+(unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with the topics that their Python client publishes in
+addition (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names there.
 """
 
 from __future__ import annotations
@@ -15,27 +14,25 @@ from devices.ros.topics.row import Row
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.ports import Port
+from schemas.ros import BoolMessage, CameraInfo, Image, JointState, Pose, StringMessage
 
-__all__ = ["paper_face"]
+__all__ = ["vrep_table"]
 
-_JOINT_STATE, _STRING, _BOOL, _POSE = (
-    "sensor_msgs/msg/JointState",
-    "std_msgs/msg/String",
-    "std_msgs/msg/Bool",
-    "geometry_msgs/msg/Pose",
-)
+_JOINT_STATE, _STRING, _BOOL = JointState.ros_type, StringMessage.ros_type, BoolMessage.ros_type
 _DESIRED = ("state_joint_desired", "set_position_joint", "set_position_goal_joint")
 _SETUP_JOINTS = 14
 """Right (5), left (5), camera (4)."""
 _STITCHES = {
-    **dict.fromkeys(("suture_position_dx", "suture_position_sx", "user_position", "user_position_2"), _POSE),
+    **dict.fromkeys(
+        ("suture_position_dx", "suture_position_sx", "user_position", "user_position_2"), Pose.ros_type
+    ),
     "delete_stitches": _BOOL,
     "state_current": _STRING,
 }
-"""What their suture planner says; heard and recorded, nothing is drawn of it."""
+"""What their suture planner publishes: received and recorded, not drawn."""
 
 
-def paper_face(params: GatewayParams) -> tuple[Row, ...]:
+def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
     """Return every row for the arms that `params` show."""
     return (
         *(row for name, arm in params.arms.shown.items() for row in _arm(name, arm)),
@@ -43,27 +40,24 @@ def paper_face(params: GatewayParams) -> tuple[Row, ...]:
         _event("dvrk/setup_joint", "robot_state", _STRING),
         *(row for eye in ("left", "right") for row in _camera(eye)),
         Row("/release_needle", _BOOL, "subscribe", _output("release_needle", _BOOL)),
-        *(_heard("suture_planner", name, type_) for name, type_ in _STITCHES.items()),
+        *(_command("suture_planner", name, type_) for name, type_ in _STITCHES.items()),
     )
 
 
 def _arm(arm: CartArm, mounted: MountedPsm | MountedEcm) -> Iterator[Row]:
     owner, joints = f"dvrk/{arm}", len(mounted.chain.joints)
     yield _state(owner, "state_joint_current", size=joints, fields=("position", "velocity"))
-    yield from (_heard(owner, name, _JOINT_STATE) for name in _DESIRED)
+    yield from (_command(owner, name, _JOINT_STATE) for name in _DESIRED)
     if isinstance(mounted, MountedPsm):
         yield _event(owner, "current_state" if arm == "PSM1" else "robot_state", _STRING, latched=True)
-        yield _heard(owner, "set_robot_state", _STRING)
+        yield _command(owner, "set_robot_state", _STRING)
         if mounted.tool.jaw is not None:
             yield _state(owner, "state_jaw_current")
-            yield _heard(owner, "state_jaw_desired", _JOINT_STATE)
+            yield _command(owner, "state_jaw_desired", _JOINT_STATE)
 
 
 def _camera(eye: str) -> Iterator[Row]:
-    for name, type_ in (
-        ("image_raw", "sensor_msgs/msg/Image"),
-        ("camera_info", "sensor_msgs/msg/CameraInfo"),
-    ):
+    for name, type_ in (("image_raw", Image.ros_type), ("camera_info", CameraInfo.ros_type)):
         yield _event("stereo", f"{eye}/{name}", type_)
 
 
@@ -85,7 +79,7 @@ def _event(owner: str, name: str, type_: str, *, latched: bool = False) -> Row:
     return Row(f"/{owner}/{name}", type_, "publish", port, latched=latched, owner=owner)
 
 
-def _heard(owner: str, name: str, type_: str) -> Row:
+def _command(owner: str, name: str, type_: str) -> Row:
     return Row(f"/{owner}/{name}", type_, "subscribe", _output(f"{owner}/{name}", type_), owner=owner)
 
 

@@ -1,9 +1,9 @@
-"""Keeps a servo process running with every stylus that can be had, and looks for those that cannot.
+"""Keeps a servo process running with every stylus that is available, and looks for those that are lost.
 
 All styluses of a host are in one process. When one of them is lost, the process is replaced by one with the
-others: HDAPI recovers in a new process only. Whether a lost one is back is found out by a second process
-beside the first, so that nobody who works loses force for it; it is taken in when no other hand holds its
-dead-man.
+others: HDAPI recovers in a new process only. A second process beside the first finds out whether a lost
+stylus is available again, so that no hand loses force meanwhile; the stylus is used again when no other
+hand holds its dead-man.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from devices.openhaptics.process import ServoProcess
 from devices.openhaptics.stylus import Phase, Spec
 from schemas.errors import DeviceError
 
-__all__ = ["Lost", "Watch"]
+__all__ = ["Lost", "Supervisor"]
 
 log = logging.getLogger(__name__)
 
 _FIRST_RETRY, _LAST_RETRY = 0.25, 4.0
 """After this time (s) a lost stylus is tried again; each time twice as long ..."""
 _LASTING = 10.0
-"""... until it was had for this long."""
+"""... until it was available for this long."""
 _LOADING, _OPENING, _SILENCE = 20.0, 10.0, 1.0
 """How long a process may take (s) to load the library, until its first frame, and between frames."""
 _ENDING = 1.0
@@ -40,7 +40,7 @@ _NO_PRIORITY = (
 
 @dataclass
 class Lost:
-    """Why a stylus cannot be had."""
+    """Why a stylus is not available."""
 
     phase: Phase
     code: int
@@ -48,21 +48,21 @@ class Lost:
     retry: float
     """When it is tried again, s of time.perf_counter."""
     found: bool = False
-    """It can be had again, and waits to be taken in."""
+    """It is available again, and waits for the next servo process."""
 
 
-class Watch:
+class Supervisor:
     """The servo processes of one device. All methods are for one thread."""
 
     def __init__(
         self, library: Path, specs: Mapping[str, Spec], opened: Callable[[ServoProcess, dict[str, Any]], None]
     ) -> None:
-        """`opened` is told of every stylus that was opened: by which process, and what that said of it."""
+        """`opened` is called for every stylus that was opened, with its process and the message of that."""
         self._library, self._specs, self._opened = library, dict(specs), opened
         self.lost: dict[str, Lost] = {}
         self._process: ServoProcess | None = None
         self._probe: Probe | None = None
-        self._started = self._heard = 0.0
+        self._started = self._last_frame = 0.0
         self._ending: float | None = None
         self._has_ticked = False
         self._held = dict.fromkeys(specs, False)
@@ -71,7 +71,7 @@ class Watch:
 
     @property
     def process(self) -> ServoProcess | None:
-        """The process that has the styluses now."""
+        """The process that holds the styluses now."""
         return self._process
 
     def start(self, now: float) -> None:
@@ -87,16 +87,16 @@ class Watch:
             )
             raise DeviceError(said[0].get("failed", silent) if said else silent)
         for message in said[1:]:
-            self._hear(self._process, message, now)
+            self._on_message(self._process, message, now)
 
     def poll(self, now: float) -> dict[str, list[State]]:
-        """Look after the processes; return the new states of each stylus that is open, oldest first."""
+        """Supervise the processes; return the new states of each stylus that is open, oldest first."""
         states: dict[str, list[State]] = {}
         if self._process is not None:
             states = self._attend(self._process, now)
         if self._probe is not None and (found := self._probe.poll(now)) is not None:
             self._probe = None
-            self._take_note(found, now)
+            self._use(found, now)
         self._retry(now)
         return states
 
@@ -109,19 +109,19 @@ class Watch:
 
     def _start(self, names: list[str], now: float) -> None:
         self._process = ServoProcess(self._library, [self._specs[name] for name in names])
-        self._started = self._heard = now
+        self._started = self._last_frame = now
         self._ending, self._has_ticked = None, False
         self._held = dict.fromkeys(self._specs, False)
 
     def _attend(self, process: ServoProcess, now: float) -> dict[str, list[State]]:
         for message in process.said():
-            self._hear(process, message, now)
+            self._on_message(process, message, now)
         states: dict[str, list[State]] = {}
         for name in process.names:
             new = [State.of(record) for record in process.states[name].read()]
             if not new:
                 continue
-            self._heard, self._has_ticked = now, True
+            self._last_frame, self._has_ticked = now, True
             last = new[-1]
             self._held[name] = bool(last.permitted)
             if Phase(last.phase).is_lost:
@@ -132,7 +132,7 @@ class Watch:
         self._check(process, now)
         return states
 
-    def _hear(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
+    def _on_message(self, process: ServoProcess, message: dict[str, Any], now: float) -> None:
         if "absent" in message:
             self._lose(message["stylus"], *absence(message["absent"]), "", now)
             if self.lost.keys() >= set(process.names):
@@ -147,9 +147,9 @@ class Watch:
             log.warning(_NO_PRIORITY)
 
     def _check(self, process: ServoProcess, now: float) -> None:
-        """Take note of a process that has ended, and end one that hangs."""
+        """Handle a process that has ended, and end one that hangs."""
         ended, patience = not process.is_alive, _SILENCE if self._has_ticked else _OPENING
-        if not ended and self._ending is None and now - self._heard > patience:
+        if not ended and self._ending is None and now - self._last_frame > patience:
             self._end(process, now)
             for name in process.names:
                 self._lose(name, Phase.FAULT, 0, f"no frame for {patience:g} s", now)
@@ -177,7 +177,7 @@ class Watch:
         self.lost[name] = Lost(phase, code, cause, now + delay)
 
     def _retry(self, now: float) -> None:
-        """Start what can be started."""
+        """Start the servo process or a probe, if a lost stylus is due."""
         due = [
             name
             for name in self._specs
@@ -196,8 +196,8 @@ class Watch:
             elif self._probe is None:
                 self._probe = Probe(ServoProcess(self._library, [self._specs[name] for name in due]), now)
 
-    def _take_note(self, found: Mapping[str, Finding | None], now: float) -> None:
-        """Take in what a probe has found of lost styluses."""
+    def _use(self, found: Mapping[str, Finding | None], now: float) -> None:
+        """Use what a probe has found of lost styluses."""
         for name, finding in found.items():
             lost = self.lost[name]
             if finding is not None and not finding.phase.is_lost:

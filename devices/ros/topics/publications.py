@@ -1,4 +1,4 @@
-"""What the simulation tells, on its way to ROS: the newest value of each state, and events at once."""
+"""What the simulation gives ROS programs: the newest value of each state at a period, and events at once."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Protocol
 
-from devices.ros.topics.stamps import Stamps, stamped
-from devices.ros.traffic import Count
+from devices.ros.status import Count
+from devices.ros.topics.stamps import Stamps
 from devices.ros.transport import Publisher
+from devices.samples import stamped
 from hub.participant import Value
 from schemas.codec import encode
 from schemas.errors import DeviceError
@@ -17,32 +18,39 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["Event", "Outgoing", "Periodic", "Source", "State"]
+__all__ = ["EventTopic", "MessageSource", "PeriodicTopic", "Publications", "State"]
 
-_SILENT_NS = 1_000_000_000
-"""A state that is older is not published any more: a program is to see that nothing comes, as a CRTK client
-does after this time (its connection_timeout).
+_MAX_AGE_NS = 1_000_000_000
+"""An older state is not published any more: a program must see that nothing arrives, as a CRTK client does
+after this time (its connection_timeout).
 """
+
+
+class MessageSource(Protocol):
+    """What is published at every period."""
+
+    def cdr(self, stamp_ns: int) -> bytes | None:
+        """Return the present message with this stamp; None if there is nothing to publish."""
+        ...
 
 
 class State:
     """The newest value of a signal from the simulation. Written by one thread, read by another."""
 
     def __init__(self, port: Port) -> None:
-        """Take the port on which it comes."""
         self.port = port
         self._codec = VectorCodec(port)
         self._newest: tuple[Vector, int] | None = None
 
     def write(self, value: Vector) -> None:
-        """Take the newest value."""
+        """Set the newest value."""
         self._newest = value, monotonic_ns()
 
     @property
     def value(self) -> Vector | None:
-        """The newest value; None if none has come within a second."""
+        """The newest value; None if none was written within a second."""
         newest = self._newest
-        return newest[0] if newest is not None and monotonic_ns() - newest[1] < _SILENT_NS else None
+        return newest[0] if newest is not None and monotonic_ns() - newest[1] < _MAX_AGE_NS else None
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the newest value as a message with this stamp; None if there is none."""
@@ -50,34 +58,25 @@ class State:
         return None if value is None else self._codec.encode(value, stamp_ns)
 
 
-class Source(Protocol):
-    """What is published all the time."""
+class PeriodicTopic:
+    """One topic that is published at the gateway's period, or at every n-th of them."""
 
-    def cdr(self, stamp_ns: int) -> bytes | None:
-        """Return the message of now with this stamp; None if there is nothing to say."""
-        ...
-
-
-class Periodic:
-    """One topic that is published all the time."""
-
-    def __init__(self, source: Source, publish: Publisher, count: Count, every: int = 1) -> None:
-        """Take what is published, where, what counts it, and at every how many periods."""
+    def __init__(self, source: MessageSource, publish: Publisher, count: Count, every: int = 1) -> None:
+        """`every`: number of periods from one message to the next."""
         self._source, self._publish, self._count, self._every = source, publish, count, every
         self._stamps = Stamps()
 
     def publish(self, period: int) -> None:
-        """Publish what there is, if it is due in this period."""
+        """Publish the present message, if it is due in this period and there is one."""
         if period % self._every == 0 and (payload := self._source.cdr(self._stamps.next_ns())) is not None:
             self._publish(payload)
             self._count.messages += 1
 
 
-class Event:
-    """One topic of which every message is published at once, by whatever thread brings it."""
+class EventTopic:
+    """One topic of which every message is published at once, in the thread that writes it."""
 
     def __init__(self, publish: Publisher, count: Count) -> None:
-        """Take where it goes, and what counts its messages."""
         self._publish, self._count, self._stamps = publish, count, Stamps()
         self._publishing = threading.Lock()
 
@@ -90,11 +89,11 @@ class Event:
                     self._count.messages += 1
 
 
-class Outgoing:
+class Publications:
     """The thread that publishes all states at the gateway's period, whatever the simulation's is."""
 
-    def __init__(self, name: str, topics: Sequence[Periodic], period_ns: int) -> None:
-        """Take the gateway's name, what is published and how often, and begin."""
+    def __init__(self, name: str, topics: Sequence[PeriodicTopic], period_ns: int) -> None:
+        """Start to publish; `name`: the gateway's."""
         self._topics, self._period_ns = topics, period_ns
         self._ending = threading.Event()
         self._failure: Exception | None = None
@@ -108,9 +107,9 @@ class Outgoing:
                 for topic in self._topics:
                     topic.publish(period)
                 period += 1
-                # at most one period is caught up
+                # after a delay at most one period is made up for
                 due_ns = max(due_ns + self._period_ns, monotonic_ns() - self._period_ns)
-        except Exception as error:  # noqa: BLE001  # it is raised where the device is read
+        except Exception as error:  # noqa: BLE001 - `check` raises it where the device is read
             self._failure = error
 
     def check(self) -> None:
@@ -121,7 +120,7 @@ class Outgoing:
             ) from self._failure
 
     def close(self) -> None:
-        """Publish no more."""
+        """Stop publishing."""
         self._ending.set()
         if self._thread is not threading.current_thread():
             self._thread.join(timeout=2.0)

@@ -24,8 +24,9 @@ from devices.ros.dds import rtps as dds_rtps
 from devices.ros.dds.domain import configuration, domain
 from devices.ros.dds.gateway import DdsGateway
 from devices.ros.dds.graph import Graph, entities_info
-from devices.ros.topics.face import face
+from devices.ros.topics.dvrk_table import dvrk_table
 from schemas.errors import DeviceError, MessageError
+from tests.devices.ros.helpers import until
 from tests.devices.ros.rclpy_peer import free_domain
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
@@ -74,13 +75,6 @@ class Response(IdlStruct, typename="crtk_msgs.srv.dds_.QueryForwardKinematics_Re
     message: str
 
 
-def until(condition, seconds=5.0):
-    end = time.monotonic() + seconds
-    while not (held := condition()) and time.monotonic() < end:
-        time.sleep(0.005)
-    return held
-
-
 def opened(number, directory, name="ros", **params):
     gateway = DdsGateway(name, DdsGateway.params_model.model_validate(ARM | {"domain": number} | params))
     gateway.open(directory)
@@ -109,20 +103,20 @@ def test_requests_of_rmw_cyclonedds_are_answered_once_with_what_came_before_them
 
 
 def test_a_datagram_that_goes_wrong_ends_no_service(gateway, caplog):
-    calls = gateway._transport._calls
-    torn = dds_rtps.data(b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7", 1, b"", {0x71: b""})
+    services = gateway._transport._services
+    torn = dds_rtps.encode_data(b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7", 1, b"", {0x71: b""})
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for payload in (
             b"",
             b"RTPS",
-            dds_rtps.message(b"\x01\x0f" + bytes(10), bytes(12), [torn]),
+            dds_rtps.encode_message(b"\x01\x0f" + bytes(10), bytes(12), [torn]),
             bytes(range(256)),
         ):
-            other.sendto(payload, ("127.0.0.1", calls._socket.getsockname()[1]))
-    calls._take = lambda *_: 1 / 0
-    assert until(lambda: "ZeroDivisionError" in caplog.text), "it hears what is told every second"
-    del calls._take
-    assert calls._thread.is_alive()
+            other.sendto(payload, ("127.0.0.1", services._socket.getsockname()[1]))
+    services._receive = lambda *_: 1 / 0
+    assert until(lambda: "ZeroDivisionError" in caplog.text), "programs announce themselves every second"
+    del services._receive
+    assert services._thread.is_alive()
 
 
 def test_a_peer_that_is_not_known_is_told(tmp_path):
@@ -156,7 +150,7 @@ def test_all_is_told_to_be_of_one_node(gateway):
     )
     assert until(lambda: told.extend(reader.take(100)) or told)
     (node,) = told[-1].node_entities_info_seq
-    rows = face(gateway.params)
+    rows = dvrk_table(gateway.params)
     assert (node.node_namespace, node.node_name) == ("/", "dvrk")
     # a service has one of each
     assert len(node.writer_gid_seq) == sum(row.way != "subscribe" for row in rows)
@@ -195,7 +189,7 @@ def test_two_gateways_of_one_process_share_a_domain_if_they_say_the_same(gateway
     number = gateway.params.domain
     with opened(number, tmp_path, "second", namespace="sim") as second:
         assert {row.topic for row in second.rows} & {"/sim/PSM1/measured_js"}
-    with pytest.raises(DeviceError, match="have to say the same"):
+    with pytest.raises(DeviceError, match="must have the same"):
         opened(number, tmp_path, "third", peers=["192.0.2.9"])
 
 
@@ -236,13 +230,13 @@ class TestGraph:
     def graph(self, *participants):
         graph = Graph(bytes(16))
         for number, participant in enumerate(participants):
-            graph.came(struct.pack("<QQ", number, 1), participant, "rt/PSM1/servo_jp")
+            graph.add_endpoint(struct.pack("<QQ", number, 1), participant, "rt/PSM1/servo_jp")
         return graph
 
     def test_a_program_is_called_like_its_first_node(self):
         graph = self.graph(self.OTHER, self.THIRD)
         for participant in (self.OTHER, self.THIRD):
-            graph.told(entities_info(participant, "/lab/console", [], [bytes(16)]))
+            graph.set_nodes(entities_info(participant, "/lab/console", [], [bytes(16)]))
         assert graph.sender(self.OTHER) == "/lab/console"
         assert graph.sender(self.THIRD) == f"/lab/console ({self.THIRD[:12].hex()})"
         assert [client.name for client in graph.clients({"rt/PSM1/servo_jp"})] == [
@@ -254,11 +248,11 @@ class TestGraph:
     def test_who_has_sent_something_keeps_its_name(self):
         graph = self.graph(self.OTHER)
         before = graph.sender(self.OTHER)
-        graph.told(entities_info(self.OTHER, "/console", [], []))
+        graph.set_nodes(entities_info(self.OTHER, "/console", [], []))
         assert graph.sender(self.OTHER) == before
-        graph.went(struct.pack("<QQ", 0, 1))
+        graph.remove_endpoint(struct.pack("<QQ", 0, 1))
         assert graph.clients({"rt/PSM1/servo_jp"}) == ()
 
     def test_bytes_that_are_no_such_message_are_refused(self):
         with pytest.raises(MessageError, match="ParticipantEntitiesInfo"):
-            self.graph().told(b"\x00\x01\x00\x00\xff")
+            self.graph().set_nodes(b"\x00\x01\x00\x00\xff")

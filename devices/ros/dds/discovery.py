@@ -1,0 +1,76 @@
+"""Discovers the ROS programs of a domain: DDS's built-in topics and `ros_discovery_info` feed the graph."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Collection
+
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+    DcpsEndpoint,
+)
+from cyclonedds.core import InstanceState, Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import InvalidSample
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+from devices.ros.dds.graph import INFO_TOPIC, INFO_TYPE, Graph
+from devices.ros.dds.types import Payload, payload_type
+from devices.ros.dds.waitset import ReaderWaitSet
+from devices.ros.transport import Client
+from schemas.errors import MessageError
+
+__all__ = ["Discovery"]
+
+log = logging.getLogger(__name__)
+
+_LAST_OF_EACH = Qos(
+    Policy.Reliability.Reliable(0),
+    Policy.Durability.TransientLocal,
+    Policy.History.KeepAll,
+    Policy.DataRepresentation(use_cdrv0_representation=True),
+)
+
+
+class Discovery:
+    """Keeps the graph of one participant's domain up to date."""
+
+    def __init__(self, participant: DomainParticipant, waitset: ReaderWaitSet) -> None:
+        """Start, with readers of `participant` in `waitset`."""
+        self._graph = Graph(participant.guid.bytes)
+        self._participants: dict[int, bytes] = {}
+        """GUIDs of participants by instance handle of a remote writer or reader."""
+        for topic in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription):
+            waitset.add(BuiltinDataReader(participant, topic), self._on_endpoint)
+        info = payload_type(INFO_TYPE)
+        waitset.add(
+            DataReader(participant, Topic(participant, INFO_TOPIC, info), _LAST_OF_EACH), self._on_info
+        )
+
+    def _on_endpoint(self, endpoint: DcpsEndpoint) -> None:
+        handle, guid = endpoint.sample_info.instance_handle, endpoint.key.bytes
+        if endpoint.sample_info.instance_state == InstanceState.Alive:
+            self._participants[handle] = endpoint.participant_key.bytes
+            self._graph.add_endpoint(guid, endpoint.participant_key.bytes, endpoint.topic_name)
+        else:
+            self._participants.pop(handle, None)
+            self._graph.remove_endpoint(guid)
+
+    def _on_info(self, sample: Payload | InvalidSample) -> None:
+        if isinstance(sample, Payload):
+            try:
+                self._graph.set_nodes(sample.cdr)
+            except MessageError as error:
+                log.warning("the node names of a program are ignored: %s", error)
+
+    def sender(self, publication: int) -> str:
+        """Return the name of the program whose writer has this instance handle."""
+        participant = self._participants.get(publication)
+        return f"writer {publication:x}" if participant is None else self._graph.sender(participant)
+
+    def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
+        """Return the programs that read or write any of `topics`, which are names of DDS topics."""
+        return self._graph.clients(topics)

@@ -1,0 +1,408 @@
+"""Services over DDS: an RTPS participant of our own, with a reader and a writer per service.
+
+Programs with rmw_fastrtps tell requests apart by inline QoS, which Cyclone DDS gives no access to; so
+services need a participant of their own, of which programs see the servers and nothing else. It answers
+programs with rmw_cyclonedds, too: of two servers they would use the first that they discover. Sources of
+the identity of a request: ros2/rmw_fastrtps, rmw_fastrtps_shared_cpp/src/rmw_request.cpp and
+rmw_response.cpp; ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import struct
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from time import monotonic
+
+from devices.ros.dds.rtps import (
+    AckNack,
+    Data,
+    Gap,
+    Heartbeat,
+    Message,
+    encode_data,
+    encode_message,
+    encode_sequence_number,
+    encode_string,
+    parse_message,
+)
+from devices.ros.dds.rtps_discovery import (
+    LEASE_S,
+    MULTICAST_GROUP,
+    PUBLICATIONS_READER,
+    PUBLICATIONS_WRITER,
+    READER_NO_KEY,
+    SPDP_READER,
+    SPDP_WRITER,
+    SUBSCRIPTIONS_READER,
+    SUBSCRIPTIONS_WRITER,
+    WRITER_NO_KEY,
+    Pid,
+    announced_endpoint,
+    announced_participant,
+    disposed_endpoint_id,
+    endpoint_data,
+    is_disposed,
+    multicast_port,
+    participant_data,
+    participant_disposal,
+    unicast_ports,
+)
+from devices.ros.dds.stateful import SendSubmessages, StatefulReader, StatefulWriter
+from devices.ros.transport import ServiceHandler
+from schemas.errors import MessageError
+
+__all__ = ["ServiceParticipant"]
+
+log = logging.getLogger(__name__)
+
+_FAST_DDS, _CYCLONE_DDS, _NO_VENDOR = b"\x01\x0f", b"\x01\x10", b"\x00\x00"
+"""Vendors of participants, the first two bytes of the GUID prefix."""
+_CYCLONE_HEADER = slice(4, 20)
+"""cdds_request_header_t of requests and responses of rmw_cyclonedds, behind the encapsulation header:
+client and number of the request.
+"""
+
+_ANNOUNCE_S, _FORGET_S = 1.0, 3600.0
+"""How often we announce ourselves, and after how long a silent participant is forgotten: one that was
+stopped for longer than its lease, as in a debugger, goes on with the sequence numbers that it knows.
+"""
+_MOST_EARLY = 64
+
+
+@dataclass(frozen=True, slots=True)
+class _Service:
+    request_topic: str
+    response_topic: str
+    type: str
+    """Of both without `Request_` and `Response_`: `crtk_msgs::srv::dds_::QueryForwardKinematics_`."""
+    reader_id: bytes
+    """Of requests."""
+    writer_id: bytes
+    """Of responses."""
+    handle: ServiceHandler
+
+
+@dataclass(slots=True)
+class _ParticipantProxy:
+    """A remote participant, and our endpoints that are matched with its own."""
+
+    metatraffic: tuple[str, int]
+    """Address where it receives SPDP and SEDP."""
+    default: tuple[str, int]
+    """Address where it receives all else."""
+    announced_s: float
+    """When it announced itself last, by the monotonic clock."""
+    readers: dict[bytes, StatefulReader] = field(default_factory=dict[bytes, StatefulReader])
+    """By EntityId of the remote writer."""
+    writers: dict[tuple[bytes, bytes], StatefulWriter] = field(
+        default_factory=dict[tuple[bytes, bytes], StatefulWriter]
+    )
+    """By EntityIds of our writer and the remote reader."""
+    early: list[tuple[_Service, Data]] = field(default_factory=list["tuple[_Service, Data]"])
+    """Requests of clients whose readers of responses are not discovered yet."""
+
+
+class ServiceParticipant:
+    """The services of one domain, with a socket and a thread of their own."""
+
+    def __init__(self, domain: int, *, multicast: bool, hosts: Sequence[str]) -> None:
+        """Start discovery of a domain.
+
+        Args:
+            domain: its number.
+            multicast: whether to announce ourselves to the network.
+            hosts: addresses of machines to announce ourselves to. If that is 127.0.0.1 alone, without
+                multicast, the socket receives from this machine only.
+        """
+        self._gateway = b""
+        is_local = not multicast and all(host == "127.0.0.1" for host in hosts)
+        self._targets = [(host, port) for host in hosts for port in unicast_ports(domain)] + (
+            [(MULTICAST_GROUP, multicast_port(domain))] if multicast else []
+        )
+        self._domain = domain
+        self._guid_prefix = _NO_VENDOR + os.urandom(10)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1" if is_local else "", 0))
+        self._host = "127.0.0.1" if is_local else _own_address(domain)
+        self._services: list[_Service] = []
+        self._proxies: dict[bytes, _ParticipantProxy] = {}
+        """By GUID prefix."""
+        self._changing = threading.Lock()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="DDS services", daemon=True)
+        self._thread.start()
+
+    def ignore(self, guid: bytes) -> None:
+        """Ignore the participant with this GUID: the same gateway's on Cyclone DDS, which has no clients."""
+        with self._changing:
+            self._gateway = guid[:12]
+            self._proxies.pop(self._gateway, None)  # it may be discovered already
+
+    def serve(self, topic: str, ros_type: str, handle: ServiceHandler) -> tuple[bytes, bytes]:
+        """Offer a service.
+
+        Args:
+            topic: name of the service: `/PSM1/forward_kinematics`.
+            ros_type: `crtk_msgs/srv/QueryForwardKinematics`.
+            handle: returns the response to a request.
+
+        Returns:
+            GUIDs (16 bytes) of the reader of requests and of the writer of responses.
+        """
+        package, group, name = ros_type.split("/")
+        key = struct.pack(">I", len(self._services) + 1)[1:]
+        service = _Service(
+            f"rq{topic}Request",
+            f"rr{topic}Reply",
+            f"{package}::{group}::dds_::{name}_",
+            key + READER_NO_KEY,
+            key + WRITER_NO_KEY,
+            handle,
+        )
+        with self._changing:
+            self._services.append(service)
+            for proxy in self._proxies.values():
+                self._announce_endpoints(proxy, service)
+        return self._guid_prefix + service.reader_id, self._guid_prefix + service.writer_id
+
+    def _run(self) -> None:
+        due = monotonic()
+        while not self._ended.is_set():
+            now = monotonic()
+            if now >= due:
+                due = now + _ANNOUNCE_S
+                self._announce_participant(self._targets)
+                self._maintain(now)
+            self._socket.settimeout(max(due - monotonic(), 0.001))
+            try:
+                datagram, address = self._socket.recvfrom(65536)
+            except OSError:  # nothing has arrived, or an earlier datagram did not reach its target
+                continue
+            try:
+                self._receive(parse_message(datagram, self._guid_prefix), address[0])
+            except (MessageError, struct.error) as error:
+                log.debug("a datagram from %s is dropped: %s", address[0], error)
+            # an unforeseen error must not end the service for other programs
+            except Exception:
+                log.exception("a datagram from %s makes services fail", address[0])
+
+    def _maintain(self, now: float) -> None:
+        """Forget silent participants, and send due HEARTBEATs to the others."""
+        with self._changing:
+            self._proxies = {
+                prefix: proxy
+                for prefix, proxy in self._proxies.items()
+                if now - proxy.announced_s < _FORGET_S
+            }
+            for proxy in self._proxies.values():
+                if now - proxy.announced_s < LEASE_S:
+                    for writer in proxy.writers.values():
+                        writer.send_heartbeat()
+
+    def _receive(self, message: Message, host: str) -> None:
+        prefix = message.guid_prefix
+        if prefix[:2] not in (_FAST_DDS, _CYCLONE_DDS) or prefix == self._gateway:
+            return
+        with self._changing:
+            for part in message.submessages:
+                proxy = self._proxies.get(prefix)
+                if isinstance(part, Data) and part.writer_id == SPDP_WRITER:
+                    self._on_participant(prefix, part, host)
+                elif proxy is None:
+                    continue
+                elif isinstance(part, AckNack):
+                    if (writer := proxy.writers.get((part.writer_id, part.reader_id))) is not None:
+                        writer.on_acknack(part)
+                elif (reader := proxy.readers.get(part.writer_id)) is not None:
+                    _dispatch(reader, part)
+
+    def _on_participant(self, prefix: bytes, announcement: Data, host: str) -> None:
+        """SPDP: a participant announces itself, or its end."""
+        if is_disposed(announcement):
+            self._proxies.pop(prefix, None)
+            return
+        known = self._proxies.get(prefix)
+        if known is not None:
+            known.announced_s = monotonic()
+            return
+        metatraffic, default = ((host, port) for port in announced_participant(announcement))
+        proxy = self._proxies[prefix] = _ParticipantProxy(metatraffic, default, monotonic())
+        send = self._sender(prefix, metatraffic)
+        proxy.readers[PUBLICATIONS_WRITER] = _matched_reader(
+            send, prefix, PUBLICATIONS_READER, PUBLICATIONS_WRITER, partial(self._on_publication, prefix)
+        )
+        proxy.readers[SUBSCRIPTIONS_WRITER] = _matched_reader(
+            send, prefix, SUBSCRIPTIONS_READER, SUBSCRIPTIONS_WRITER, partial(self._on_subscription, prefix)
+        )
+        for writer_id, reader_id in (
+            (PUBLICATIONS_WRITER, PUBLICATIONS_READER),
+            (SUBSCRIPTIONS_WRITER, SUBSCRIPTIONS_READER),
+        ):
+            proxy.writers[writer_id, reader_id] = StatefulWriter(send, writer_id, reader_id)
+        self._announce_participant([metatraffic])
+        for service in self._services:
+            self._announce_endpoints(proxy, service)
+
+    def _on_publication(self, prefix: bytes, announcement: Data) -> None:
+        """SEDP: match a client's writer of requests with a reader, or remove that."""
+        proxy = self._proxies[prefix]
+        if is_disposed(announcement):
+            proxy.readers.pop(disposed_endpoint_id(announcement), None)
+            return
+        topic, writer_id = announced_endpoint(announcement)
+        for service in self._services:
+            if topic.startswith(encode_string(service.request_topic)):
+                proxy.readers[writer_id] = _matched_reader(
+                    self._sender(prefix, proxy.default),
+                    prefix,
+                    service.reader_id,
+                    writer_id,
+                    partial(self._on_request, service, prefix),
+                )
+
+    def _on_subscription(self, prefix: bytes, announcement: Data) -> None:
+        """SEDP: match a client's reader of responses with a writer, or remove that."""
+        proxy = self._proxies[prefix]
+        if is_disposed(announcement):
+            gone = disposed_endpoint_id(announcement)
+            proxy.writers = {ids: writer for ids, writer in proxy.writers.items() if ids[1] != gone}
+            return
+        topic, reader_id = announced_endpoint(announcement)
+        for service in self._services:
+            if topic.startswith(encode_string(service.response_topic)):
+                proxy.writers[service.writer_id, reader_id] = StatefulWriter(
+                    self._sender(prefix, proxy.default), service.writer_id, reader_id
+                )
+        early, proxy.early = proxy.early, []
+        for service, request in early:
+            self._on_request(service, prefix, request)
+
+    def _on_request(self, service: _Service, prefix: bytes, request: Data) -> None:
+        """Send the response: to the client that the inline QoS names, or to all clients of the participant.
+
+        Of those with rmw_cyclonedds each looks for its own header.
+        """
+        proxy, payload = self._proxies[prefix], request.payload
+        if prefix.startswith(_FAST_DDS):
+            qos = request.inline_qos
+            client = qos.get(Pid.RELATED_SAMPLE_IDENTITY) or qos.get(Pid.RELATED_SAMPLE_IDENTITY_EPROSIMA)
+            reader_guid = (client or b"")[:16]
+            identity = reader_guid + encode_sequence_number(request.sequence_number)
+            header, inline_qos = (
+                b"",
+                {
+                    int(Pid.RELATED_SAMPLE_IDENTITY): identity,
+                    int(Pid.RELATED_SAMPLE_IDENTITY_EPROSIMA): identity,
+                },
+            )
+            writers = [
+                writer
+                for ids, writer in proxy.writers.items()
+                if ids == (service.writer_id, reader_guid[12:])
+            ]
+        else:
+            header, inline_qos = payload[_CYCLONE_HEADER], {}
+            payload = payload[: _CYCLONE_HEADER.start] + payload[_CYCLONE_HEADER.stop :]
+            writers = [writer for ids, writer in proxy.writers.items() if ids[0] == service.writer_id]
+        if not writers:
+            proxy.early = [*proxy.early, (service, request)][-_MOST_EARLY:]
+            return
+        try:
+            response = service.handle(payload)
+        except MessageError as error:
+            log.warning("%s: a request is not answered: %s", service.request_topic, error)
+            return
+        for writer in writers:
+            writer.write(
+                response[: _CYCLONE_HEADER.start] + header + response[_CYCLONE_HEADER.start :], inline_qos
+            )
+
+    def _announce_participant(self, targets: Sequence[tuple[str, int]]) -> None:
+        """SPDP: announce ourselves."""
+        payload = participant_data(self._guid_prefix, self._domain, self._host, self._socket.getsockname()[1])
+        data = encode_data(SPDP_WRITER, SPDP_READER, 1, payload)
+        self._send(encode_message(self._guid_prefix, bytes(12), [data]), targets)
+
+    def _announce_endpoints(self, proxy: _ParticipantProxy, service: _Service) -> None:
+        """SEDP: announce the reader of requests and the writer of responses."""
+        for ids, entity_id, topic, type_ in (
+            (
+                (PUBLICATIONS_WRITER, PUBLICATIONS_READER),
+                service.writer_id,
+                service.response_topic,
+                f"{service.type}Response_",
+            ),
+            (
+                (SUBSCRIPTIONS_WRITER, SUBSCRIPTIONS_READER),
+                service.reader_id,
+                service.request_topic,
+                f"{service.type}Request_",
+            ),
+        ):
+            proxy.writers[ids].write(endpoint_data(self._guid_prefix, entity_id, topic, type_), {})
+
+    def _sender(self, prefix: bytes, address: tuple[str, int]) -> SendSubmessages:
+        return lambda submessages: self._send(
+            encode_message(self._guid_prefix, prefix, submessages), [address]
+        )
+
+    def _send(self, datagram: bytes, targets: Sequence[tuple[str, int]]) -> None:
+        for target in targets:
+            try:
+                self._socket.sendto(datagram, target)
+            except OSError as error:  # the other targets may be reachable
+                log.debug("nothing can be sent to %s: %s", target, error)
+
+    def close(self) -> None:
+        """Leave the domain. May be called twice."""
+        if not self._ended.is_set():
+            self._ended.set()
+            self._thread.join(timeout=2.0)
+            data = encode_data(SPDP_WRITER, SPDP_READER, 2, b"", participant_disposal(self._guid_prefix))
+            self._send(
+                encode_message(self._guid_prefix, bytes(12), [data]),
+                [proxy.metatraffic for proxy in self._proxies.values()],
+            )
+            self._socket.close()
+
+
+def _matched_reader(
+    send: SendSubmessages,
+    prefix: bytes,
+    reader_id: bytes,
+    writer_id: bytes,
+    deliver: Callable[[Data], None],
+) -> StatefulReader:
+    """Return a reader that is matched with a remote writer.
+
+    Cyclone DDS sends a HEARTBEAT by itself, and takes the request for one as malformed.
+    """
+    reader = StatefulReader(send, reader_id, writer_id, deliver)
+    if prefix.startswith(_FAST_DDS):
+        reader.request_heartbeat()
+    return reader
+
+
+def _dispatch(reader: StatefulReader, part: Data | Heartbeat | Gap) -> None:
+    if isinstance(part, Data):
+        reader.on_data(part)
+    elif isinstance(part, Heartbeat):
+        reader.on_heartbeat(part)
+    else:
+        reader.on_gap(part)
+
+
+def _own_address(domain: int) -> str:
+    """Return this machine's address on the network that multicast goes to."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((MULTICAST_GROUP, multicast_port(domain)))  # sends nothing
+        except OSError:
+            return "127.0.0.1"
+        return str(probe.getsockname()[0])

@@ -1,0 +1,138 @@
+"""Reliable transfer of RTPS: StatefulWriter and StatefulReader (OMG DDSI-RTPS 2.5, 8.4.9 and 8.4.12).
+
+Each is matched with exactly one remote endpoint, so ReaderProxy and WriterProxy of the standard are part of
+it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+
+from devices.ros.dds.rtps import (
+    AckNack,
+    Data,
+    Gap,
+    Heartbeat,
+    encode_acknack,
+    encode_data,
+    encode_heartbeat,
+)
+
+__all__ = ["SendSubmessages", "StatefulReader", "StatefulWriter"]
+
+SendSubmessages = Callable[[Sequence[bytes]], None]
+"""Sends submessages to the participant of the matched endpoint."""
+
+_HISTORY = 64
+"""Samples that a writer keeps for retransmission, and that a reader keeps while earlier ones are missing."""
+
+
+class StatefulWriter:
+    """Writes to one remote reader.
+
+    It has sequence numbers of its own: otherwise samples for other readers would be gaps to this one.
+    """
+
+    def __init__(self, send: SendSubmessages, writer_id: bytes, reader_id: bytes) -> None:
+        """`writer_id` and `reader_id`: EntityIds, 4 bytes."""
+        self._send, self._writer_id, self._reader_id = send, writer_id, reader_id
+        self._history: deque[tuple[int, bytes, Mapping[int, bytes]]] = deque(maxlen=_HISTORY)
+        self._last = self._acknowledged = self._heartbeats = 0
+
+    def write(self, payload: bytes, inline_qos: Mapping[int, bytes]) -> None:
+        """Send a sample, with a HEARTBEAT."""
+        self._last += 1
+        self._history.append((self._last, payload, inline_qos))
+        data = encode_data(self._writer_id, self._reader_id, self._last, payload, inline_qos)
+        self._send([data, self._heartbeat()])
+
+    def _heartbeat(self) -> bytes:
+        self._heartbeats += 1
+        first = self._history[0][0] if self._history else self._last + 1
+        return encode_heartbeat(self._writer_id, self._reader_id, first, self._last, self._heartbeats)
+
+    def send_heartbeat(self) -> None:
+        """Send a HEARTBEAT, if the reader has not acknowledged all samples."""
+        if self._acknowledged < self._last:
+            self._send([self._heartbeat()])
+
+    def on_acknack(self, acknack: AckNack) -> None:
+        """Send the requested samples again."""
+        self._acknowledged = max(self._acknowledged, acknack.base - 1)
+        missing = set(acknack.missing)
+        again = [
+            encode_data(self._writer_id, self._reader_id, number, payload, inline_qos)
+            for number, payload, inline_qos in self._history
+            if number in missing
+        ]
+        if again or not acknack.base:  # 0: a reader that has had no HEARTBEAT yet
+            self._send([*again, self._heartbeat()])
+
+
+class StatefulReader:
+    """Reads from one remote writer, and delivers the samples in order."""
+
+    def __init__(
+        self,
+        send: SendSubmessages,
+        reader_id: bytes,
+        writer_id: bytes,
+        deliver: Callable[[Data], None],
+    ) -> None:
+        """`reader_id` and `writer_id`: EntityIds, 4 bytes."""
+        self._send, self._reader_id, self._writer_id, self._deliver = send, reader_id, writer_id, deliver
+        self._expected, self._acknacks = 1, 0
+        self._early: dict[int, Data | None] = {}
+        """Samples that arrived before their turn, by sequence number; None: irrelevant by a GAP."""
+
+    def request_heartbeat(self) -> None:
+        """Send an ACKNACK of base 0, to which the writer answers with a HEARTBEAT.
+
+        Samples may have been sent before this reader existed, and writers send HEARTBEATs only every few
+        seconds.
+        """
+        self._acknack(0, ())
+
+    def _acknack(self, base: int, missing: Sequence[int]) -> None:
+        self._acknacks += 1
+        self._send([encode_acknack(self._writer_id, self._reader_id, base, missing, self._acknacks)])
+
+    def on_data(self, sample: Data) -> None:
+        """Deliver a sample in its turn."""
+        if self._expected <= sample.sequence_number < self._expected + _HISTORY:
+            self._early.setdefault(sample.sequence_number, sample)
+        self._deliver_next()
+
+    def on_heartbeat(self, heartbeat: Heartbeat) -> None:
+        """Request the samples that the writer has and this reader has not."""
+        self._skip_to(heartbeat.first)
+        missing = [
+            number
+            for number in range(self._expected, min(heartbeat.last + 1, self._expected + _HISTORY))
+            if number not in self._early
+        ]
+        if missing or not heartbeat.is_final:
+            self._acknack(self._expected, missing)
+
+    def on_gap(self, gap: Gap) -> None:
+        """Do not wait for irrelevant samples any more."""
+        for number in gap.others:
+            if self._expected <= number < self._expected + _HISTORY:
+                self._early.setdefault(number, None)
+        if gap.start <= self._expected:
+            self._skip_to(gap.base)
+        self._deliver_next()
+
+    def _skip_to(self, first: int) -> None:
+        if first > self._expected:
+            self._expected = first
+            self._early = {number: sample for number, sample in self._early.items() if number >= first}
+        self._deliver_next()
+
+    def _deliver_next(self) -> None:
+        while self._expected in self._early:
+            sample = self._early.pop(self._expected)
+            self._expected += 1
+            if sample is not None:
+                self._deliver(sample)

@@ -1,0 +1,223 @@
+"""The table of a gateway with `profile: dvrk`: every topic and service of arms, console, pedals and cameras.
+
+Sources: commands and events as robots.dvrk.crtk and robots.dvrk.console_topics have them; periodic states
+and services from jhu-cisst/cisst-ros (commit 73aca61c, mts_ros_crtk_bridge_provided.cpp) and
+jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp and
+core/components/code/mtsIntuitiveResearchKit{Arm,PSM,ECM,MTM,SUJ}.cpp); what programs in Python need in
+addition from jhu-dvrk/dvrk_python (a1b337b3) and crtk_python_client (33b4c387); cameras from
+jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst). All events are latched, as there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import get_args
+
+from devices.ros.params import GatewayParams, Real
+from devices.ros.topics.row import Row
+from robots.dvrk import arms as dvrk
+from robots.dvrk import crtk
+from robots.dvrk.console_topics import PARTS, PEDALS, TELEOPERATION
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.setup_joints import CartArm, joint_names
+from schemas.ports import Port
+from schemas.ros import (
+    CameraInfo,
+    CompressedImage,
+    Float64Message,
+    Float64MultiArray,
+    Image,
+    JointState,
+    PoseStamped,
+    StringMessage,
+    TFMessage,
+)
+
+__all__ = ["NOT_SERVED", "dvrk_table"]
+
+NOT_SERVED = {
+    "actuator_to_joint_position": "a simulated arm has no actuators whose encoders a program could read",
+    "setpoint_cv": "the real bridge does not publish it either",
+}
+"""Names of the real system that are left out, and why."""
+
+_FORWARD, _INVERSE = "crtk_msgs/srv/QueryForwardKinematics", "crtk_msgs/srv/QueryInverseKinematics"
+_SERVICES = {
+    "forward_kinematics": _FORWARD,
+    "local/forward_kinematics": _FORWARD,
+    "inverse_kinematics": _INVERSE,
+}
+_CARTESIAN_STATES = {name: type_ for name, type_ in crtk.CARTESIAN_STATES.items() if name not in NOT_SERVED}
+_PICTURES = {"image_raw": Image.ros_type, "image_raw/compressed": CompressedImage.ros_type}
+_REAL_MAX_AGE_NS = 100_000_000
+"""A state of a real arm that is older is marked stale: ten periods of 10 ms."""
+
+
+def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
+    """Return every row for the simulated and real arms of `params`.
+
+    Ports are named like their topics, without namespace and leading slash.
+    """
+    rows: list[Row] = []
+    for name, arm in params.arms.shown.items():
+        rows += _simulated_arm(name, arm, _reference(name, params))
+    for carried in get_args(CartArm):
+        rows += _setup_joints(carried, _reference(carried, params) if carried in params.arms.shown else "")
+    for part, topics in PARTS.items():
+        if part not in params.listen:
+            rows += _events_and_commands(part, topics.events, topics.commands)
+    for component in params.teleoperations:
+        rows += _events_and_commands(component, TELEOPERATION.events, TELEOPERATION.commands)
+    for camera in params.cameras:
+        rows += _camera(camera)
+    rows += (
+        Row("/tf", TFMessage.ros_type, "publish", periodic=True),
+        Row("/joint_states", JointState.ros_type, "publish", periodic=True),
+        Row("/robot_description", StringMessage.ros_type, "publish", latched=True),
+    )
+    prefix = f"/{params.namespace}" if params.namespace else ""
+    return tuple(replace(row, topic=prefix + row.topic) for row in rows) + tuple(
+        replace(row, is_real=True) for name in params.listen for row in _real_arm(name)
+    )
+
+
+def _reference(arm: CartArm, params: GatewayParams) -> str:
+    """Return the `frame_id` of Cartesian states that are not `local/`.
+
+    The plan refuses a scenario where the motion controller's differs.
+    """
+    return crtk.reference_frame(arm, params.arms.shown, params.mounting, params.reference)
+
+
+def _state(owner: str, name: str, type_: str, **more: object) -> Row:
+    """Return a row that is published at the gateway's period."""
+    port = Port.model_validate({"name": f"{owner}/{name}", "causality": "input", "type": type_} | more)
+    return Row(f"/{owner}/{name}", type_, "publish", port, periodic=True, owner=owner)
+
+
+def _event(owner: str, name: str, type_: str, *, latched: bool = True) -> Row:
+    port = Port(name=f"{owner}/{name}", causality="input", type=type_, variability="event")
+    return Row(f"/{owner}/{name}", type_, "publish", port, latched=latched, owner=owner)
+
+
+def _command(owner: str, name: str, type_: str, joints: tuple[str, ...] = ()) -> Row:
+    names = joints if type_ == JointState.ros_type else ()
+    port = Port(
+        name=f"{owner}/{name}", causality="output", type=type_, variability="event", names=names, clock="wall"
+    )
+    return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)
+
+
+def _events_and_commands(
+    owner: str, events: Mapping[str, str], commands: Mapping[str, str], joints: tuple[str, ...] = ()
+) -> Iterator[Row]:
+    """Yield a row for each event and command; `joints` are those of commands with joint positions."""
+    yield from (_event(owner, name, type_) for name, type_ in events.items())
+    yield from (_command(owner, name, type_, joints) for name, type_ in commands.items())
+
+
+def _joint_states(owner: str, prefix: str, names: tuple[str, ...]) -> Iterator[Row]:
+    for kind in ("measured_js", "setpoint_js"):
+        yield _state(owner, prefix + kind, JointState.ros_type, names=names, fields=crtk.MEASURED)
+
+
+def _simulated_arm(arm: CartArm, mounted: MountedPsm | MountedEcm, reference: str) -> Iterator[Row]:
+    names = tuple(joint.name for joint in mounted.chain.joints)
+    is_psm = isinstance(mounted, MountedPsm)
+    events, commands = (
+        (crtk.PSM_EVENTS, crtk.PSM_COMMANDS) if is_psm else (crtk.ECM_EVENTS, crtk.ECM_COMMANDS)
+    )
+    yield from _events_and_commands(arm, crtk.EVENTS | events, crtk.COMMANDS | commands, names)
+    yield from _joint_states(arm, "", names)
+    yield _state(
+        arm, "gravity_compensation/setpoint_js", JointState.ros_type, names=names, fields=("effort",)
+    )
+    for prefix in ("", "local/"):
+        for name, type_ in _CARTESIAN_STATES.items():
+            frame = crtk.frame_of(arm, prefix + name, reference)
+            yield _state(arm, prefix + name, type_, frame=frame)
+    for name, type_ in crtk.WRENCH_STATES.items():
+        yield _state(arm, name, type_, frame=crtk.frame_of(arm, name, reference))
+        jacobian, shape = f"{name.partition('/')[0]}/jacobian", (6, len(names))
+        yield _state(arm, jacobian, Float64MultiArray.ros_type, size=6 * len(names), shape=shape)
+    for ratio in ("ratio", "ratio_v", "ratio_a"):
+        yield _state(arm, f"trajectory_j/{ratio}", Float64Message.ros_type)
+    yield from (Row(f"/{arm}/{name}", type_, "serve", owner=arm) for name, type_ in _SERVICES.items())
+    if isinstance(mounted, MountedPsm) and (mounted.tool.jaw is not None or mounted.tool.hand is not None):
+        gripper, driven = (
+            ("jaw", mounted.tool.jaw_joints)
+            if mounted.tool.hand is None
+            else ("hand", mounted.tool.hand.joints)
+        )
+        grasping = tuple(joint.name for joint in driven)
+        yield from _joint_states(arm, f"{gripper}/", grasping)
+        gripper_commands = {f"{gripper}/{name}": type_ for name, type_ in crtk.GRIPPER_COMMANDS.items()}
+        yield from _events_and_commands(arm, {}, gripper_commands, grasping)
+
+
+def _setup_joints(arm: CartArm, reference: str) -> Iterator[Row]:
+    """Yield the rows of the setup joints that carry `arm`.
+
+    All four sets have rows, with values or not, because programs connect to all of them.
+    """
+    owner, names = f"SUJ/{arm}", joint_names(arm)
+    yield from _events_and_commands(owner, crtk.SETUP_JOINT_EVENTS, crtk.SETUP_JOINT_COMMANDS, names)
+    yield _state(owner, "measured_js", JointState.ros_type, names=names)
+    yield _state(owner, "measured_cp", PoseStamped.ros_type, frame=reference)
+    yield _state(owner, "local/measured_cp", PoseStamped.ros_type, frame=crtk.CART_FRAME)
+
+
+def _camera(camera: str) -> Iterator[Row]:
+    for eye in ("left", "right"):
+        yield from (
+            _event(camera, f"{eye}/{name}", type_, latched=False) for name, type_ in _PICTURES.items()
+        )
+        yield _event(camera, f"{eye}/camera_info", CameraInfo.ros_type, latched=False)
+
+
+def _real_state(owner: str, name: str, type_: str, **more: object) -> Row:
+    """Return a row of what a real arm publishes periodically."""
+    port = Port.model_validate(
+        {
+            "name": f"{owner}/{name}",
+            "causality": "output",
+            "type": type_,
+            "clock": "wall",
+            "max_age_ns": _REAL_MAX_AGE_NS,
+        }
+        | more
+    )
+    return Row(f"/{owner}/{name}", type_, "subscribe", port, owner=owner)
+
+
+def _real_arm(arm: Real) -> Iterator[Row]:
+    """Yield the rows of a real arm or of real pedals: states and events are received, commands are sent."""
+    if arm == "footpedals":
+        yield from _events_and_commands(arm, {}, PEDALS.events)
+        return
+    names = tuple(joint.name for joint in dvrk.chain(arm).joints)
+    is_master, is_psm = arm.startswith("MTM"), arm.startswith("PSM")
+    gripper = "gripper" if is_master else "jaw" if is_psm else ""
+    for prefix, driven in (("", names), *(((f"{gripper}/", (gripper,)),) if gripper else ())):
+        for kind in ("measured_js", "setpoint_js"):
+            if (prefix, kind) != ("gripper/", "setpoint_js"):
+                yield _real_state(arm, prefix + kind, JointState.ros_type, names=driven, fields=crtk.MEASURED)
+    for prefix in ("", "local/"):
+        for name, type_ in _CARTESIAN_STATES.items():
+            yield _real_state(arm, prefix + name, type_)
+    for name, type_ in crtk.WRENCH_STATES.items():
+        yield _real_state(arm, name, type_)
+    own_events, own_commands = (
+        (crtk.MTM_EVENTS, crtk.MTM_COMMANDS)
+        if is_master
+        else (crtk.PSM_EVENTS, crtk.PSM_COMMANDS)
+        if is_psm
+        else (crtk.ECM_EVENTS, crtk.ECM_COMMANDS)
+    )
+    for name, type_ in (crtk.EVENTS | own_events).items():
+        yield _command(arm, name, type_)
+    jaw = {f"jaw/{name}": type_ for name, type_ in crtk.GRIPPER_COMMANDS.items()} if is_psm else {}
+    for name, type_ in (crtk.COMMANDS | own_commands | jaw).items():
+        # not latched: a late joiner must not move a real arm by an old command
+        yield _event(arm, name, type_, latched=False)

@@ -1,0 +1,86 @@
+"""The topics of all simulated arms together: `/tf`, `/joint_states` and `/robot_description`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from devices.ros.params import GatewayParams
+from devices.ros.topics.publications import MessageSource, State
+from devices.ros.topics.tf import TF_PERIOD_NS, TransformTree
+from schemas.errors import DeviceError
+from schemas.ports import Port
+from schemas.ros import JointState
+from schemas.vectors import VectorCodec
+
+__all__ = ["periods_between", "robot_description", "whole_robot_sources"]
+
+
+def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, MessageSource]:
+    """Return what is published of all arms together, by row name; `states`: by the names of their ports.
+
+    The authors' simulator (profile `paper`) has no such topics.
+    """
+    if params.profile != "dvrk":
+        return {}
+    return {"tf": TransformTree(params, states), "joint_states": _JointStates(params, states)}
+
+
+def periods_between(name: str, period_ns: int) -> int:
+    """Return how many of a gateway's periods lie between two messages of the row `name`."""
+    return max(1, round(TF_PERIOD_NS / period_ns)) if name == "tf" else 1
+
+
+def robot_description(file: Path) -> str:
+    """Return the URDF in `file`, with its meshes as URIs, because readers do not know its directory.
+
+    Raises DeviceError if it is no URDF.
+    """
+    try:
+        robot = ElementTree.fromstring(file.read_text("utf-8"))
+    except (OSError, ElementTree.ParseError) as error:
+        raise DeviceError(
+            f"robot_description '{file}' is no URDF: {error}; `trocar model export` writes one"
+        ) from error
+    for mesh in robot.iter("mesh"):
+        name = mesh.get("filename", "")
+        if "://" not in name:
+            mesh.set("filename", (file.parent / name).as_uri())
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+class _JointStates:
+    """The joints of all arms and of what they hold, named `<arm>_<joint>` as in the robot's description."""
+
+    def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
+        found = (
+            (arm, states.get(f"{arm}/{part}measured_js"))
+            for arm in params.arms.shown
+            for part in ("", "jaw/", "hand/")
+        )
+        self._parts = [(arm, state) for arm, state in found if state is not None]
+        self._known: tuple[str, ...] = ()
+        self._codec: VectorCodec | None = None
+
+    def cdr(self, stamp_ns: int) -> bytes | None:
+        """Return the joints that are known now, as a JointState; None if there are none."""
+        known = [(arm, state, value) for arm, state in self._parts if (value := state.value) is not None]
+        if not known:
+            return None
+        names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
+        if self._codec is None or names != self._known:
+            self._known = names
+            self._codec = VectorCodec(
+                Port(
+                    name="joint_states",
+                    causality="input",
+                    type=JointState.ros_type,
+                    names=names,
+                    fields=("position", "velocity", "effort"),
+                )
+            )
+        rows = [value.reshape(3, -1) for _, _, value in known]  # position, velocity, effort of each arm
+        return self._codec.encode(np.concatenate(rows, axis=1).ravel(), stamp_ns)

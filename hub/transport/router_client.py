@@ -1,0 +1,27 @@
+"""What the hub asks of a device whose own programs connect to the hub's Zenoh router."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+import zenoh
+
+__all__ = ["RouterClient"]
+
+
+@runtime_checkable
+class RouterClient(Protocol):
+    """A device that shares the hub's router with programs outside Trocar, such as a gateway to ROS 2."""
+
+    @property
+    def foreign_keys(self) -> tuple[str, ...]:
+        """Zenoh keys, none of Trocar's own, that the programs and this device use at the hub's router.
+
+        Holders of the certificate `console` may use them.
+        """
+        ...
+
+    def learn_hub(self, connect: Callable[[], zenoh.Session]) -> None:
+        """Receive, before `open`, a function that opens a Zenoh session of the device's own with the hub."""
+        ...

@@ -1,0 +1,23 @@
+"""What tests of several gateways share: waiting, joint positions as fields, and samples of a topic."""
+
+import time
+
+
+def until(condition, seconds=5.0):
+    """Wait until `condition` holds; return its last value."""
+    end = time.monotonic() + seconds
+    while not (held := condition()) and time.monotonic() < end:
+        time.sleep(0.005)
+    return held
+
+
+def joint_fields(values, stamp_ns=None):
+    """Return the fields of a JointState as nested dictionaries, stamped now by default."""
+    sec, nanosec = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 10**9)
+    header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": ""}
+    return {"header": header, "name": [], "position": list(values), "velocity": [], "effort": []}
+
+
+def received(gateway, topic):
+    """Return the samples of `topic` that the gateway reads now."""
+    return [sample for sample in gateway.read(0) if sample.port == topic[1:]]
