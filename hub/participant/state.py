@@ -71,7 +71,7 @@ def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> 
 
 
 def split_state(participant: str, arrays: Sequence[Vector], state: bytes) -> list[Vector]:
-    """Return the values that `state` has for each of `arrays`, in its shape; StateError if it does not fit."""
+    """Return what `state` has for each of `arrays`, in their shapes; StateError if it does not fit."""
     size = sum(array.nbytes for array in arrays)
     if len(state) != size:
         raise StateError(
