@@ -8,7 +8,7 @@ from typing import Any, Literal, cast
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from hub.participant import BondPlan
-from hub.planning.renamed import KINDS
+from hub.planning.renamed import current_plan
 from schemas.network_link import NetworkLinkSpec
 from schemas.ports import BondSide, Port
 from schemas.scenario import Bond
@@ -117,11 +117,9 @@ class Plan(_Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_0_1_0(cls, data: Any) -> Any:
-        """Accept the plan in recordings of version 0.1.0, which named its parts otherwise."""
-        if isinstance(data, dict) and "members" in data:
-            return _from_0_1_0(cast("dict[str, Any]", data))
-        return cast("Any", data)
+    def _with_current_names(cls, data: Any) -> Any:
+        """Accept the plan of a recording of version 0.1.0."""
+        return current_plan(cast("dict[str, Any]", data)) if isinstance(data, dict) else cast("Any", data)
 
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""
@@ -181,26 +179,3 @@ def has_simulated_time(ports: Sequence[Port]) -> bool:
     """
     outputs = [port for port in ports if port.causality == "output"]
     return bool(outputs) and all(port.clock == "simulated" for port in outputs)
-
-
-def _from_0_1_0(data: dict[str, Any]) -> dict[str, Any]:
-    old = dict(data)
-    participants = {
-        name: {("network_link" if key == "link" else key): value for key, value in planned.items()}
-        | {"kind": KINDS.get(planned["kind"], planned["kind"])}
-        for name, planned in old.pop("members").items()
-    }
-    from_devices = [_renamed(inlet, "source") for inlet in old.pop("inlets")]
-    to_devices = [_renamed(outlet, "target") for outlet in old.pop("outlets")]
-    connections = old.pop("links")
-    return old | {
-        "participants": participants,
-        "connections": connections,
-        "from_devices": from_devices,
-        "to_devices": to_devices,
-    }
-
-
-def _renamed(connection: dict[str, Any], end: str) -> dict[str, Any]:
-    names = {"device": end, "device_port": f"{end}_port"}
-    return {names.get(key, key): value for key, value in connection.items()}

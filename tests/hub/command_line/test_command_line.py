@@ -88,7 +88,7 @@ def test_check_shows_the_wiring_of_a_good_scenario(trocar, pendulum, tmp_path):
     file.write_text(SCENARIO.replace("gaol", "goal"))
     code, out, _ = trocar("check", file, "--json")
     assert code == 0
-    assert {(link["source"], link["target"]) for link in json.loads(out)["links"]} == {("one", "two")}
+    assert {(link["source"], link["target"]) for link in json.loads(out)["connections"]} == {("one", "two")}
     code, out, err = trocar("check", file, "--set", "step=2 ms")
     assert (code, out) == (0, "")
     assert "valid" in err

@@ -387,5 +387,7 @@ def test_a_link_is_for_devices():
     device = plan_of(Stylus("s", out("pose", type=POSE)), specs={"s": {"network_link": link}})
     assert device.participants["s"].network_link.delay_ns == 100_000_000
     assert [planned.name for planned in device.meetings()] == ["s"]
-    with pytest.raises(ScenarioError, match=r"a link lies between a device and the hub, but 'a' is a engine"):
+    with pytest.raises(
+        ScenarioError, match=r"a network link lies between a device and the hub, but 'a' is a engine"
+    ):
         plan_of(Part("a", out()), specs={"a": {"network_link": link}})
