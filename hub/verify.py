@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from hub.observation.summary import Progress
 from hub.planning import registry
-from hub.planning.file_hashes import changed_files
 from hub.planning.plan import Plan, PlannedParticipant
+from hub.recording.file_hashes import changed_files
 from hub.recording.recording import Recording
 from hub.session.session import Session
 from schemas.lockstep import Ack

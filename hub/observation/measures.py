@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from hub.planning.measured import measured_port
 from hub.planning.plan import Plan
-from hub.planning.wiring import measured_port
 from schemas.scenario import Measure, Scenario
 from schemas.vectors import Vector
 

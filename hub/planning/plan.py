@@ -1,13 +1,14 @@
-"""The plan of a session: where each participant runs, and every connection and bond resolved."""
+"""The plan of a session: the place and period of every participant, and every connection and bond."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from hub.participant import BondPlan
+from hub.planning.registry import Role
 from hub.planning.renamed import current_plan
 from schemas.network_link import NetworkLinkSpec
 from schemas.ports import BondSide, Port
@@ -29,21 +30,21 @@ class _Part(BaseModel):
 
 
 class PlannedParticipant(_Part):
-    """One participant: where it runs, how often it steps, and its ports, those of connected bonds included."""
+    """One participant: its host, its period, and its ports, with those of its connected bonds."""
 
     name: str
     kind: str
-    role: Literal["engine", "controller", "device"]
+    role: Role
     host: str
     """`hub`, the name of a process, or `remote/<participant>`."""
     period: int
     """In communication steps; 1 for a device in wall time."""
     read_ns: int = 0
-    """Of a device in wall time: the time between two reads."""
+    """For a device in wall time: the time between two reads."""
     network_link: NetworkLinkSpec | None = None
-    """Of a device: the emulated network between it and the hub."""
+    """For a device: the emulated network between it and the hub."""
     rate_limit: float = 2000.0
-    """Of a device: messages per second that are accepted on each of its ports."""
+    """For a device: messages per second that are accepted on each of its ports."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}
@@ -59,7 +60,7 @@ class PlannedParticipant(_Part):
 
     @property
     def key_role(self) -> str:
-        """The role as it stands in keys: there every stepped participant is an engine."""
+        """The role in keys, where every stepped participant is an engine."""
         return "device" if self.role == "device" else "engine"
 
 
@@ -71,7 +72,7 @@ class PlannedConnection(_Part):
     target: str
     target_port: str
     fresh: bool
-    """The target reads the source's output of the same step, otherwise that of the last communication point."""
+    """The target reads the output of the same step; otherwise that of the last communication point."""
     linear: bool
     """The target extrapolates inside its step."""
 
@@ -104,7 +105,7 @@ class PlannedBond(_Part):
 
 
 class Plan(_Part):
-    """Everything that hosts need to know of a session."""
+    """Everything that hosts need to know about a session."""
 
     step_ns: int
     order: tuple[str, ...]
@@ -119,7 +120,7 @@ class Plan(_Part):
     @classmethod
     def _with_current_names(cls, data: Any) -> Any:
         """Accept the plan of a recording of version 0.1.0."""
-        return current_plan(cast("dict[str, Any]", data)) if isinstance(data, dict) else cast("Any", data)
+        return current_plan(cast("dict[str, Any]", data)) if isinstance(data, dict) else data
 
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""

@@ -81,7 +81,7 @@ class Source:
             parent = cast("dict[Any, Any]", parent)[part]
 
     def stands_also_at(self, written: Location, path: Location) -> None:
-        """Let the values below `path` have the places of those below `written`, unless they have their own."""
+        """Give the values below `path` the places of those below `written` if they have none of their own."""
         own = self.marks.keys() | self.overrides.keys()
         for places in (self.marks, self.overrides):
             copied = {
@@ -174,7 +174,7 @@ def _mark(node: Any) -> _Mark:
 
 def _no_such_part(parent: Any, part: str | int) -> str:
     if isinstance(parent, list):
-        length = len(parent)  # pyright: ignore[reportUnknownArgumentType]
+        length = len(cast("list[Any]", parent))
         known = isinstance(part, int) and part < length
         return "" if known else f"is a list of {length}, counted from 0; there is no '{part}' in it"
     return "" if isinstance(parent, dict) else f"is '{parent}', which has no parts"

@@ -5,8 +5,8 @@ import pytest
 from pydantic import Field
 
 from hub.participant import Params
-from hub.planning.file_hashes import changed_files, file_hashes
 from hub.planning.scenario_file import load
+from hub.recording.file_hashes import changed_files, file_hashes
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
