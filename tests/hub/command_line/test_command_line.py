@@ -100,6 +100,15 @@ def test_every_installed_scenario_is_valid(trocar, name):
     assert code == 0, err
 
 
+def test_a_log_that_is_no_terminal_has_one_line_for_each_message():
+    old = ["--set", "participants.stylus.link.delay=3 ms"]
+    command = [sys.executable, "-P", "-m", "hub.command_line", "check", "palpation", *old]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    (warning,) = [line for line in ran.stderr.splitlines() if "link" in line and "WARNING" in line]
+    assert warning.endswith("'link' is now 'network_link'; this release still accepts the old name")
+    assert ran.stderr.count("network_link") == 1
+
+
 def test_every_installed_scenario_names_its_schema():
     for file in installed_scenarios().values():
         assert file.read_text().splitlines()[0] == "# yaml-language-server: $schema=scenario.schema.json"
