@@ -175,7 +175,7 @@ def test_a_cycle_needs_an_order():
     parts, connections = ring("a", "b", "c")
     with pytest.raises(
         ScenarioError,
-        match="form a cycle among a, b, c: state the order in which they step, such as 'order: \\[a, b, c\\]'",
+        match=r"form a cycle among a, b, c: state the order in which they step, such as 'order: \[a, b, c\]",
     ):
         plan_of(*parts, connections=connections)
     with pytest.raises(ScenarioError, match="cycle"):

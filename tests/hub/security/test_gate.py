@@ -77,13 +77,13 @@ PLAN = Plan(
             source="robot", source_port="contact", target="far", target_port="in", fresh=True, linear=False
         ),
     ),
-    inlets=(
+    from_devices=(
         ConnectionFromDevice(
-            device="touch", device_port="pose", target="robot", target_port="goal", max_age_ns=0
+            source="touch", source_port="pose", target="robot", target_port="goal", max_age_ns=0
         ),
     ),
     to_devices=(
-        ConnectionToDevice(source="robot", source_port="contact", device="touch", device_port="contact"),
+        ConnectionToDevice(source="robot", source_port="contact", target="touch", target_port="contact"),
     ),
     bonds=(),
 )

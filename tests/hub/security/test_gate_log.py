@@ -107,9 +107,9 @@ def test_to_name_a_key_of_ones_own_is_no_try():
 
 
 def test_to_name_a_key_of_others_is_one():
-    told = [message for _, message in read(came("touch"), *named("trocar/s/device/head/out/pose"))[1:]]
+    told = [message for _, message in read(came("touch"), *named("trocar/s/device/head/out"))[1:]]
     assert told == [
-        "refused to 'touch' at 10.0.0.2:40000: to publish or receive anything on trocar/s/device/head/out/pose"
+        "refused to 'touch' at 10.0.0.2:40000: to publish or receive anything on trocar/s/device/head/out"
     ]
 
 
