@@ -54,7 +54,7 @@ def _new_values(spec: dict[str, Any]) -> dict[str, str]:
     for parameter, values in _PARAMETER_VALUES.items():
         old = spec.get(parameter)
         if isinstance(old, str) and old in values and isinstance(spec.get("kind"), str):
-            with suppress(ScenarioError):  # whoever validates the scenario reports an unknown kind
+            with suppress(ScenarioError):  # the validation of parameters reports an unknown kind
                 field = registry.load(spec["kind"]).params_model.model_fields.get(parameter)
                 accepted = get_args(field.annotation) if field else ()
                 if values[old] in accepted and old not in accepted:

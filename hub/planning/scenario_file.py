@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ScenarioFile:
-    """A valid scenario, the validated parameters of its participants by name, and where it came from."""
+    """A valid scenario, the validated parameters of its participants by name, and its text."""
 
     scenario: Scenario
     params: Mapping[str, Params]

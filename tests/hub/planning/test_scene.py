@@ -71,7 +71,7 @@ def test_an_empty_scene_is_none(write, scene):
     [
         ("left: {stiffness: 3", "left: {stiffness: -3", "7:23: participants.one.springs.left.stiffness: Inp"),
         ("left: {stiffness", "left: {stifness", "7:12: participants.one.springs.left.stifness: there is no"),
-        ("length: 80 mm", "length: 80 kg", "5:11: participants.three.length: '80 kg' is no quantity in m"),
+        ("length: 80 mm", "length: 80 kg", "5:11: participants.three.length: '80 kg' is not a quantity in m"),
         ("length: 0.5", "length: -0.5", "11:33: participants.two.length: Input should be greater than 0"),
         ("top: {stiffness: 6", "top: {stiffness: 0", "11:88: participants.two.springs.top.stiffness: Input"),
         ("  length: 80", "  lenght: 80", "5:11: scene.lenght: no participant has a parameter 'lenght'."),
