@@ -1,6 +1,4 @@
-"""Re-simulates a recording from its grants and compares every state hash: the same bits, or the first step
-that differs.
-"""
+"""Re-simulates a recording from its grants, and compares every state hash."""
 
 from __future__ import annotations
 
@@ -10,8 +8,8 @@ from dataclasses import dataclass
 
 from hub.observation.summary import Progress
 from hub.planning import registry
-from hub.planning.file_hashes import changed_files
 from hub.planning.plan import Plan, PlannedParticipant
+from hub.recording.file_hashes import changed_files
 from hub.recording.recording import Recording
 from hub.session.session import Session
 from schemas.lockstep import Ack
@@ -33,7 +31,7 @@ class VerifySummary:
 
     recording: str
     same: bool
-    """Every state hash that is recorded came out again."""
+    """Whether every recorded state hash is the same again."""
     steps: int
     hashes: int
     """State hashes that were compared."""
@@ -44,28 +42,19 @@ class VerifySummary:
 def verify(
     recording: Recording, *, endpoint: str | None = None, progress: Callable[[Progress], None] | None = None
 ) -> VerifySummary:
-    """Run the recorded session again, in fresh processes, with what entered it then.
+    """Run the recorded session again, in new processes, with the recorded grants.
 
-    Raises RecordingError if the recording is not one of a session, and what `Session.run` raises.
+    Raises RecordingError if the recording is not of a session, and what `Session.run` raises.
     """
-    scenario, plan, directory = (
-        recording.scenario().model_copy(update={"pace": "fast"}),
-        _plan(recording),
-        recording.directory(),
-    )
-    here = [
-        planned
-        for planned in plan.participants.values()
-        if planned.host == "hub" and planned.role != "device"
-    ]
+    scenario = recording.scenario().model_copy(update={"pace": "fast"})
+    plan, directory = _plan(recording), recording.directory()
     made = {
-        planned.name: registry.make(
-            planned.kind, planned.name, scenario.participants[planned.name].params, directory
-        )
-        for planned in here
+        name: registry.make(planned.kind, name, scenario.participants[name].params, directory)
+        for name, planned in plan.participants.items()
+        if planned.host == "hub" and planned.role != "device"
     }
     for path in changed_files(recording.files()):
-        log.warning("'%s' is not the file that was read when this was recorded: expect differences", path)
+        log.warning("file '%s' has changed or is missing since the recording: expect differences", path)
     comparison = _Comparison(recording, plan)
     session = Session(
         scenario,
@@ -90,7 +79,7 @@ def verify(
 
 
 class _Comparison:
-    """Every ack beside the recorded one."""
+    """Compares every ack with the recorded one."""
 
     def __init__(self, recording: Recording, plan: Plan) -> None:
         self._recorded: dict[str, Iterator[AckMessage]] = {name: recording.acks(name) for name in plan.order}
@@ -105,7 +94,7 @@ class _Comparison:
         return min(self._differences, default=None)
 
     def take(self, planned: PlannedParticipant, ack: Ack) -> None:
-        """Compare a report; at a difference, end the session once the others of this step have been compared."""
+        """Compare an ack; at the first difference, stop the session at the end of this step."""
         then = next(self._recorded[planned.name], None)
         if then is None:
             return  # the recording was cut short between the grant and this ack
@@ -126,9 +115,7 @@ class _Comparison:
 
 
 def _plan(recording: Recording) -> Plan:
-    """Return the recorded wiring; a participant that joined from elsewhere gets a process here, and devices
-    are left alone.
-    """
+    """Return the recorded plan, with remote participants in processes here and without outputs to devices."""
     plan = recording.plan()
     participants = {
         name: planned.model_copy(update={"host": planned.host.replace("/", "_")})

@@ -52,7 +52,7 @@ class PortReference(_Part):
 
 
 class ParticipantSpec(_Part):
-    """A participant: its kind, its host, its period, its network link, and the parameters of its kind."""
+    """A participant: its kind, host, period and network link, and the parameters of its kind."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
@@ -66,14 +66,14 @@ class ParticipantSpec(_Part):
         ),
     )
     network_link: NetworkLinkSpec | None = Field(
-        default=None, description="of a device: the network that is put between it and the hub; default: none"
+        default=None, description="of a device: the emulated network between it and the hub; default: none"
     )
     rate_limit: float = Field(
         default=2000.0,
         gt=0.0,
         allow_inf_nan=False,
         description=(
-            "of a device: messages per second that the hub takes from each of its ports, bursts aside"
+            "of a device: messages per second that the hub accepts from each of its ports, except in bursts"
         ),
     )
     RESERVED: ClassVar[tuple[str, ...]] = ("kind", "host", "period", "network_link", "rate_limit")
@@ -88,7 +88,7 @@ class Connection(_Part):
     """An output port feeds an input port: `source -> target`.
 
     `motion.drive/* -> robot.*` stands for one connection from each output of `motion` under `drive/` to the
-    input of the same name of `robot`; outputs that have no such input stay unconnected.
+    input of the same name of `robot`; outputs without such an input stay unconnected.
     """
 
     source: PortReference
@@ -123,7 +123,7 @@ class Connection(_Part):
 
 
 class Bond(_Part):
-    """A power bond: pose and twist one way, wrench the other."""
+    """A power bond: pose and twist in one direction, wrench in the other."""
 
     motion: PortReference
     force: PortReference
@@ -146,29 +146,26 @@ class Bond(_Part):
 
 
 class Measure(_Part):
-    """A number for the summary, from the values of one output port.
-
-    The port is named as `participant.port` or `participant.port.field`.
-    """
+    """A number for the summary, from the values of `participant.port` or `participant.port.field`."""
 
     kind: Literal["peak-norm", "peak", "least", "mean", "final", "drop", "swing", "time-above"] = Field(
         description=(
-            "drop: the largest fall after the peak; swing: from the least to the largest, of several numbers"
-            " that of the one that varies most; time-above: the longest time (s) at `level` or above; for all"
-            " else of several numbers the norm is taken"
+            "drop: the largest fall after the peak; swing: the largest minus the least value, and of several"
+            " numbers, the one that varies most; time-above: the longest time (s) at `level` or above. All"
+            " others take the norm of several numbers"
         )
     )
     of: PortReference
-    after: Duration = Field(default=0, ge=0, description="simulated time before which values do not count")
+    after: Duration = Field(default=0, ge=0, description="simulated time before which values are ignored")
     level: float | None = Field(default=None, description="for time-above, in the unit of the port")
     unit: str = ""
-    live: bool = Field(default=False, description="show the present value in the progress line")
+    live: bool = Field(default=False, description="show the current value in the progress line")
 
     @model_validator(mode="after")
-    def _level_where_it_counts(self) -> Self:
+    def _check_level(self) -> Self:
         if (self.level is not None) != (self.kind == "time-above"):
             raise ValueError(
-                f"measure of kind {self.kind}: a level belongs to time-above, and to nothing else"
+                f"measure of kind {self.kind}: a level is required for time-above, and not allowed otherwise"
             )
         return self
 
@@ -184,7 +181,7 @@ class Scenario(_Part):
     description: str = ""
     step: Duration = Field(gt=0, description="communication step H")
     duration: Duration | None = Field(
-        default=None, gt=0, description="simulated time; without it the session runs until it is stopped"
+        default=None, gt=0, description="simulated time; default: the session runs until it is stopped"
     )
     pace: Literal["fast", "realtime"] = "fast"
     window: int | None = Field(
@@ -192,7 +189,7 @@ class Scenario(_Part):
         ge=1,
         le=1000,
         description=(
-            "most steps that one grant may cover; without it 10 ms in pace fast with one host, else one step"
+            "most steps that one grant may cover; default: 10 ms at pace fast with one host, else one step"
         ),
     )
     algorithm: Literal["gauss-seidel", "jacobi"] = Field(
@@ -200,10 +197,12 @@ class Scenario(_Part):
     )
     order: list[str] | None = Field(
         default=None,
-        description="the order in which participants step; needed where connections form a cycle",
+        description="the order in which participants step; required if connections form a cycle",
     )
     answer_limit: Duration = Field(
-        default=10**10, gt=0, description="wall time after which a silent participant ends the session"
+        default=10**10,
+        gt=0,
+        description="wall time after which a participant that does not answer ends the session",
     )
     join_limit: Duration = Field(
         default=60 * 10**9, gt=0, description="wall time to wait for all participants to join"
@@ -213,7 +212,7 @@ class Scenario(_Part):
         exclude=True,
         description=(
             "parameters stated once, such as arms, mounting, table and objects: every participant gets those"
-            " that its kind has; what it states itself goes before them, and null keeps them out"
+            " that its kind has; its own values have priority, and null keeps a parameter of the scene out"
         ),
     )
     participants: dict[Name, ParticipantSpec] = Field(min_length=1)

@@ -13,8 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from hub.command_line.display import show, table
-from hub.command_line.recordings import RecordingPath
-from hub.command_line.scenarios import Json
+from hub.command_line.options import Json, RecordingPath
 from schemas.trocar_msgs import GatewayStatus
 
 __all__ = ["app"]

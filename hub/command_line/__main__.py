@@ -1,6 +1,4 @@
-"""`python -P -m hub.command_line`: the same as `trocar`, for processes that are started with a given
-interpreter.
-"""
+"""`python -P -m hub.command_line`: `trocar` with a given Python interpreter."""
 
 from hub.command_line import main
 

@@ -1,4 +1,4 @@
-"""The commands put together, and what every one of them has: version, logs, errors, exit codes."""
+"""The application: all commands, and the version, logs, errors and exit codes that they share."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ import typer
 from rich.logging import RichHandler
 from rich.text import Text
 
-from hub.command_line import certs, hosting, linking, looking, plugins, recordings, running
+from hub.command_line import certs, plugins, recordings
+from hub.command_line.check import check, schema
 from hub.command_line.display import console
+from hub.command_line.doctor import doctor
+from hub.command_line.hosts import device, engine
+from hub.command_line.link import link
+from hub.command_line.ls import ls
+from hub.command_line.run import run
 from schemas.errors import ScenarioError, TrocarError
 
 __all__ = ["app", "main"]
@@ -32,26 +38,26 @@ app = typer.Typer(
 )
 
 for command in (
-    running.run,
-    looking.check,
+    run,
+    check,
     recordings.verify,
     recordings.replay,
     recordings.recover,
     recordings.report,
-    looking.ls,
-    linking.link,
-    hosting.engine,
-    hosting.device,
-    looking.doctor,
-    looking.schema,
+    ls,
+    link,
+    engine,
+    device,
+    doctor,
+    schema,
 ):
     app.command()(command)
 app.add_typer(certs.app, name="certs")
 plugins.mount(app)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(given: bool) -> None:
+    if given:
         typer.echo(version("trocar"))
         raise typer.Exit
 
@@ -60,25 +66,26 @@ def _print_version(wanted: bool) -> None:
 def options(
     *,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show debug logs, and the traceback of an error.")
+        bool, typer.Option("--debug", help="Show debug logs and the traceback of an error.")
     ] = False,
-    version: Annotated[
+    _version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Co-simulation hub for robotic surgery research."""
-    logging.basicConfig(
-        level=logging.DEBUG if debug else logging.INFO,
-        format="%(message)s",
-        handlers=[RichHandler(console=console, show_path=debug)],
-    )
+    level = logging.DEBUG if debug else logging.INFO
+    if console.is_terminal:
+        handler = RichHandler(console=console, show_path=debug)
+        logging.basicConfig(level=level, format="%(message)s", handlers=[handler])
+    else:  # one line for each message, whatever its length
+        logging.basicConfig(level=level, format="%(asctime)s %(levelname)s %(message)s")
 
 
 def main() -> None:
-    """Run the command line: an error that Trocar foresaw is one message and an exit code."""
+    """Run the command line: a TrocarError becomes one message and an exit code."""
     try:
         app()
     except TrocarError as error:
-        log.debug("traceback", exc_info=error)
+        log.debug("traceback", exc_info=error)  # shown with --debug
         console.print(Text("error: ", "bold red"), Text(str(error)), sep="", soft_wrap=True)
         sys.exit(2 if isinstance(error, ScenarioError) else 1)

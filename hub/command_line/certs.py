@@ -1,4 +1,4 @@
-"""`trocar certs`: the certificates by which a hub and participants on other machines know each other."""
+"""`trocar certs`: the certificates of a hub and of participants on other machines."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from schemas.errors import ConnectError, MissingExtraError
 __all__ = ["app"]
 
 app = typer.Typer(
-    help="Make and show the certificates by which a hub and other machines know each other.",
+    help="Create and show the certificates with which a hub and other machines identify each other.",
     no_args_is_help=True,
 )
 
 _HUB_DAYS = 397
-"""What browsers accept of a server at most (CA/Browser Forum, Baseline Requirements 6.3.2): a year, and a
-month to renew it.
+"""A year, and a month to renew: the most that browsers accept for a server.
+
+Source: CA/Browser Forum, Baseline Requirements 6.3.2.
 """
 
 _PARTICIPANT_DAYS = 30
-"""There is no list of certificates that are revoked: one that is lost must not be worth much for long."""
+"""Short, as a certificate that is lost or stolen cannot be revoked."""
 
 _LEAST_DAYS, _MOST_DAYS = 0.01, 3650
-"""A quarter of an hour, for a try; the authority's own ten years."""
+"""A quarter of an hour, to try it out; ten years, as the authority's own certificate."""
 
 Directory = Annotated[
     Path | None,
@@ -36,12 +37,12 @@ Directory = Annotated[
         "--dir",
         metavar="DIR",
         file_okay=False,
-        help="Where the certificates are; by default this user's own.",
+        help="Where the certificates are; default: the directory of this user.",
     ),
 ]
 Hosts = Annotated[
     list[str] | None,
-    typer.Argument(metavar="HOST", help="A name or an address by which other machines reach this one."),
+    typer.Argument(metavar="HOST", help="A name or address at which other machines reach this one."),
 ]
 
 
@@ -57,17 +58,20 @@ def init(
     *,
     directory: Directory = None,
     days: Annotated[
-        float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the hub's is valid.")
+        float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the hub's certificate is valid.")
     ] = _HUB_DAYS,
 ) -> None:
-    """Make an authority and the certificate of this machine's hub: once, on the machine where the hub runs."""
-    _needs_cryptography()
+    """Create an authority and the certificate of this machine's hub.
+
+    Do this once, on the machine where the hub runs.
+    """
+    _require_cryptography()
     from hub.security.certs import found, names_of_this_machine
 
     file = found(_directory(directory), hosts or names_of_this_machine(), days)
     console.print(
-        f"wrote {file}, for the hub, and the authority ca.pem with its key ca.key beside it: keep that key to"
-        " yourself",
+        f"wrote {file}, for the hub, and beside it the authority ca.pem with its key ca.key: keep that key"
+        " secret",
         soft_wrap=True,
     )
     _print_names(file)
@@ -80,15 +84,15 @@ def renew(
     *,
     directory: Directory = None,
     days: Annotated[
-        float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long it is valid.")
+        float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the certificate is valid.")
     ] = _HUB_DAYS,
 ) -> None:
-    """Make a new certificate for the hub, with the same names unless others are given."""
-    _needs_cryptography()
+    """Create a new certificate for the hub, with the same names unless others are given."""
+    _require_cryptography()
     from hub.security.certs import renew as make
 
     file = make(_directory(directory), hosts or (), days)
-    console.print(f"wrote {file}; it counts from the next session on", soft_wrap=True)
+    console.print(f"wrote {file}; the next session uses it", soft_wrap=True)
     _print_names(file)
 
 
@@ -99,7 +103,7 @@ def issue(
         typer.Argument(
             metavar="NAME",
             help=(
-                "A participant with `host: remote`; `observer` reads the status, `console` is for ROS"
+                "A participant with `host: remote`; or `observer`, to read the status; or `console`, for ROS"
                 " programs."
             ),
         ),
@@ -107,37 +111,38 @@ def issue(
     *,
     directory: Directory = None,
     days: Annotated[
-        float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long it is valid.")
+        float, typer.Option(min=_LEAST_DAYS, max=_MOST_DAYS, help="How long the certificate is valid.")
     ] = _PARTICIPANT_DAYS,
 ) -> None:
-    """Make the certificate of one participant, for another machine; an older one stays valid as long as it
-    is.
+    """Create the certificate of one participant on another machine.
+
+    An older certificate of the participant stays valid until it expires.
     """
-    _needs_cryptography()
+    _require_cryptography()
     from hub.security.certs import issue as make
     from hub.security.credentials import CONSOLE, OBSERVER
 
     file = make(_directory(directory), name, days)
     uses = {
         OBSERVER: "trocar ls --connect tls/HUB:7447",
-        CONSOLE: "in the Zenoh settings of the ROS programs, to connect to tls/HUB:7447 (docs/ros.md)",
+        CONSOLE: "the Zenoh settings of the ROS programs, to connect to tls/HUB:7447 (docs/ros.md)",
     }
     use = uses.get(name, f"trocar device {name} --connect tls/HUB:7447")
     console.print(
-        f"wrote {file}, all that the other machine needs. Copy it there, by a way that nobody else can read,"
-        " to one of",
+        f"wrote {file}, which is all that the other machine needs. Copy it there over a channel that others"
+        " cannot read, to one of",
         soft_wrap=True,
     )
     console.print(
         "    ~/.config/trocar/certs/            (Linux)\n    %APPDATA%\\trocar\\certs\\           (Windows)"
     )
     console.print("    ~/Library/Application Support/trocar/certs/  (macOS)", soft_wrap=True)
-    console.print(f"and use it there: {use}", soft_wrap=True)
+    console.print(f"and use it there with: {use}", soft_wrap=True)
 
 
 @app.command()
 def show(*, directory: Directory = None) -> None:
-    """List the certificates of this machine, until when they are valid and for what."""
+    """List the certificates of this machine, with their purpose and date of expiry."""
     from hub.security.credentials import CONSOLE, HUB, OBSERVER, examine, load
 
     place = _directory(directory)
@@ -148,36 +153,29 @@ def show(*, directory: Directory = None) -> None:
         try:
             certificate = examine(load(file.stem, place))
         except ConnectError as error:
-            rows.append((file.stem, "not valid", str(error)))
+            rows.append((file.stem, "invalid", str(error)))
             continue
         role = {
             HUB: f"a hub at {', '.join(certificate.hosts)}",
-            OBSERVER: "reading the status of sessions",
+            OBSERVER: "observers of the status",
             CONSOLE: "ROS programs",
         }
-        left = certificate.until - datetime.now(UTC)
-        rows.append(
-            (
-                file.stem,
-                f"{certificate.until:%Y-%m-%d %H:%M} UTC ({left.days} days)",
-                role.get(certificate.name, f"participant {certificate.name}"),
-            )
-        )
+        days = (certificate.until - datetime.now(UTC)).days
+        until = f"{certificate.until:%Y-%m-%d %H:%M} UTC ({days} days)"
+        rows.append((file.stem, until, role.get(certificate.name, f"participant {certificate.name}")))
     Console(highlight=False).print(
-        table(rows, "file", "valid until", "for") if rows else f"there is no certificate in {place}"
+        table(rows, "file", "valid until", "for") if rows else f"no certificate in {place}"
     )
 
 
 def _print_names(file: Path) -> None:
     from hub.security.credentials import examine, load
 
-    console.print(
-        f"other machines may reach it as {', '.join(examine(load(file.stem, file)).hosts)}", soft_wrap=True
-    )
+    console.print(f"names of this hub: {', '.join(examine(load(file.stem, file)).hosts)}", soft_wrap=True)
 
 
-def _needs_cryptography() -> None:
+def _require_cryptography() -> None:
     from importlib.util import find_spec
 
     if find_spec("cryptography") is None:
-        raise MissingExtraError("making certificates", "certs", "cryptography")
+        raise MissingExtraError("creating certificates", "certs", "cryptography")

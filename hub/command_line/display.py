@@ -1,4 +1,4 @@
-"""What people see on stderr, and programs on stdout."""
+"""Output: tables and progress on stderr for people, JSON on stdout for programs."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ console = Console(stderr=True, highlight=False)
 
 def table(rows: Iterable[Iterable[object]], *columns: str) -> Table:
     """Return a plain table of `rows` under `columns`."""
-    made = Table(*columns, box=None, pad_edge=False, show_header=bool(columns))
+    made = Table(box=None, pad_edge=False, show_header=bool(columns))
+    for name in columns:
+        made.add_column(name, overflow="fold")  # a narrow terminal cuts nothing off
     for row in rows:
         made.add_row(*(str(cell) for cell in row))
     return made
 
 
 def show(result: Mapping[str, Any], *, as_json: bool) -> None:
-    """Print a result: to programs as JSON on stdout, to people as a table on stderr."""
+    """Print a result, as JSON on stdout or as a table on stderr."""
     if as_json:
         typer.echo(json.dumps(result, indent=2, default=str))
         return
@@ -51,11 +53,11 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
 LATENCY_COLUMNS = ("latency", "stream", "count", "p50", "p99", "largest")
 _TIMES = ("p50_s", "p99_s", "largest_s")
 _MOST_STREAMS = 8
-"""Of one device that are shown one by one: a gateway to ROS has dozens. `--json` has them all."""
+"""Streams of one device that are shown one by one: a gateway to ROS has dozens. `--json` has them all."""
 
 
 def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Iterator[tuple[object, ...]]:
-    """Yield the rows of a summary's latency; nothing where no device takes part."""
+    """Yield the rows of a summary's latency; none if no device takes part."""
     if latency.keys() <= {"grant to state"}:
         return
     for way, streams in latency.items():
@@ -63,19 +65,16 @@ def latency_rows(latency: Mapping[str, Mapping[str, Mapping[str, float]]]) -> It
         for stream, row in streams.items():
             of_device.setdefault(stream.rpartition(" -> ")[2].partition(".")[0], {})[stream] = row
         for device, rows in of_device.items():
-            shown = (
-                rows
-                if len(rows) <= _MOST_STREAMS
-                else {
-                    f"{device}, the slowest of {len(rows)}": max(rows.values(), key=lambda row: row["p99_s"])
-                }
-            )
+            shown = rows
+            if len(rows) > _MOST_STREAMS:
+                slowest = max(rows.values(), key=lambda row: row["p99_s"])
+                shown = {f"{device}, the slowest of {len(rows)}": slowest}
             for stream, row in shown.items():
                 yield way, stream, round(row["count"]), *(f"{1e3 * row[name]:.3f} ms" for name in _TIMES)
 
 
 def _readable(name: str, value: Any) -> tuple[str, str]:
-    """Return label and value, with the unit that the name ends in behind the value."""
+    """Return label and value; a unit at the end of the name follows the value."""
     stem, _, suffix = name.rpartition("_")
     unit = _UNITS.get(suffix)
     label = (stem if unit else name).replace("_", " ")
@@ -86,7 +85,6 @@ class RunProgress:
     """The progress line of a run: simulated time, real-time factor, late steps, live measures."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take what is run."""
         self._bar = Bar(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[now]}"), console=console
         )
@@ -103,7 +101,7 @@ class RunProgress:
         self._bar.stop()
 
     def __call__(self, progress: Progress) -> None:
-        """Show where the run is."""
+        """Show the progress of the run."""
         live = (f"{name} {value:.3f} {unit}".rstrip() for name, (value, unit) in progress.live.items())
         late = (f"{progress.late_steps} late steps",) if progress.late_steps else ()
         now = "  ".join(

@@ -1,7 +1,6 @@
-"""Commands that other packages bring: a `typer.Typer` under an entry point of the group `trocar.commands` is
-mounted under its name.
+"""Commands of other packages: each is a `typer.Typer` at an entry point of the group `trocar.commands`.
 
-One that has a single command is that command, as it would be by itself; any other is a group.
+It is added under the name of its entry point: as a command if it has a single one, otherwise as a group.
 """
 
 from __future__ import annotations
@@ -20,33 +19,31 @@ log = logging.getLogger(__name__)
 GROUP = "trocar.commands"
 """Entry-point group.
 
-Whatever is mounted is imported for every command, so it imports what it needs inside its own ones.
+Its modules are imported at every start of `trocar`, so they should import what they need inside commands.
 """
 
 
 def mount(app: typer.Typer) -> None:
-    """Add every installed sub-command to `app`; one that cannot be had is left out with a warning, so that
-    the others work.
-    """
+    """Add every installed command to `app`, except broken ones, about which a warning is logged."""
     taken = {
         (info.name or getattr(info.callback, "__name__", "")).replace("_", "-")
         for info in app.registered_commands
     }
     for entry in sorted(entry_points(group=GROUP), key=lambda e: (e.name, e.value)):
-        brought = (
+        origin = (
             f"command '{entry.name}' of '{entry.dist.name if entry.dist else 'an unnamed distribution'}'"
             f" ({entry.value})"
         )
         if entry.name in taken:
-            log.warning("%s is left out: there is another command of that name", brought)
+            log.warning("%s is left out: another command has that name", origin)
             continue
         try:
             loaded = entry.load()
             if not isinstance(loaded, typer.Typer):
                 raise TypeError(f"expected a typer.Typer, got {type(loaded).__name__}")
-            command = typer.main.get_command(loaded)  # what is wrong with its commands shows here
-        except Exception as error:  # noqa: BLE001  # whatever a plug-in's module does on import
-            log.warning("%s is left out, it cannot be loaded: %s: %s", brought, type(error).__name__, error)
+            command = typer.main.get_command(loaded)  # raises if one of its commands is invalid
+        except Exception as error:  # noqa: BLE001  # a plug-in's module may raise anything on import
+            log.warning("%s is left out, it cannot be loaded: %s: %s", origin, type(error).__name__, error)
             continue
         taken.add(entry.name)
         if isinstance(command, TyperGroup):

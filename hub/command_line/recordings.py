@@ -9,23 +9,20 @@ from typing import Annotated
 import typer
 
 from hub.command_line.display import RunProgress, console, show
-from hub.command_line.scenarios import Json, Listen
+from hub.command_line.options import Json, Listen, RecordingPath
 from hub.recording.recording import Recording
 
 __all__ = ["recover", "replay", "report", "verify"]
 
-RecordingPath = Annotated[
-    Path,
-    typer.Argument(metavar="RECORDING", exists=True, help="A recording's directory, or the MCAP file in it."),
-]
 Output = Annotated[
-    Path | None, typer.Option("--output", "-o", help="Where to write; by default beside the recording.")
+    Path | None, typer.Option("--output", "-o", help="Where to write; default: beside the recording.")
 ]
 
 
 def verify(recording: RecordingPath, *, listen: Listen = None, as_json: Json = False) -> None:
-    """Simulate a recorded session again and compare every state hash; exit code 1 and the first difference if
-    one is not the same.
+    """Simulate a recorded session again and compare every state hash.
+
+    If one differs, the exit code is 1 and the result names the first step and participant that differ.
     """
     from hub.verify import verify as resimulate
 
@@ -41,12 +38,12 @@ def replay(
     recording: RecordingPath,
     *,
     rate: Annotated[
-        float, typer.Option(min=0.0, help="Simulated seconds per second; 0: as fast as it goes.")
+        float, typer.Option(min=0.0, help="Simulated seconds per second; 0: as fast as possible.")
     ] = 1.0,
     listen: Listen = None,
     as_json: Json = False,
 ) -> None:
-    """Publish a recording again, so that consoles see it as they would see it live."""
+    """Publish the messages of a recording again, as the live session did."""
     from hub.recording.replay import replay as publish
     from hub.transport.endpoints import free_endpoint, require_loopback
     from hub.transport.zenoh_session import open_session
@@ -58,16 +55,16 @@ def replay(
 
 
 def recover(recording: RecordingPath, *, output: Output = None, as_json: Json = False) -> None:
-    """Save what is whole of a recording that was cut short."""
+    """Save the readable part of a recording that was cut short."""
     from hub.recording.recover import recover as save
 
     show(asdict(save(recording, output)), as_json=as_json)
 
 
 def report(recording: RecordingPath, *, output: Output = None) -> None:
-    """Write one self-contained HTML page of plots about a recording."""
+    """Write one self-contained HTML page with plots of a recording."""
     from hub.recording.report import report as write
 
     page = output or recording.with_name(f"{recording.stem if recording.is_file() else recording.name}.html")
     write(Recording(recording), page)
-    console.print(f"wrote {page}")
+    console.print(f"wrote {page}", soft_wrap=True)

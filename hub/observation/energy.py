@@ -1,5 +1,7 @@
-"""The energy book of every bond: what the motion side gave, what the force side got, and what the coupling
-made or lost.
+"""The energy books of the bonds.
+
+A book holds the work that the motion side did, the work that the force side received, and their difference:
+the energy that the coupling created or lost.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ class _Book:
 
 
 class EnergyBooks:
-    """Reads the work of both sides of each bond from the acks."""
+    """The books of all bonds of a session, kept from the acks."""
 
     def __init__(self, plan: Plan) -> None:
         self._books = [_Book(planned) for planned in plan.bonds]
@@ -41,7 +43,7 @@ class EnergyBooks:
 
     @property
     def residual_j(self) -> float:
-        """Sum over all bonds of what the force side got beyond what the motion side gave (J)."""
+        """Sum over all bonds of the work received by the force side minus that of the motion side (J)."""
         return sum(book.force_j - book.motion_j for book in self._books)
 
     def messages(self, time_ns: int) -> list[CouplingEnergy]:

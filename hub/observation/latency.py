@@ -1,6 +1,4 @@
-"""How long things take: bounded histograms of times, and the three ways of a device's messages through a
-session.
-"""
+"""Latencies of device messages on their three ways through a session, in histograms of bounded size."""
 
 from __future__ import annotations
 
@@ -16,9 +14,7 @@ _BITS = 5
 
 
 class Histogram:
-    """Counts of times in bins whose width grows with the time; memory is bounded by the number of bits of a
-    time (64 x 32 bins at most).
-    """
+    """Counts of times in bins whose width grows with the time: 64 x 32 bins at most."""
 
     def __init__(self) -> None:
         self._bins: dict[int, list[int]] = {}
@@ -26,7 +22,7 @@ class Histogram:
 
     @property
     def count(self) -> int:
-        """How many times were counted."""
+        """The number of times counted."""
         return sum(count for count, _ in self._bins.copy().values())
 
     def add(self, time_ns: int) -> None:
@@ -46,7 +42,7 @@ class Histogram:
     def percentile(self, share: float) -> float:
         """Return the time (ns) below which `share` of all times are: the mean of its bin.
 
-        Raises ValueError of nothing.
+        Raises ValueError if no time was counted.
         """
         bins = self._bins.copy()
         rank, passed = share * sum(count for count, _ in bins.values()), 0
@@ -55,10 +51,10 @@ class Histogram:
             passed += count
             if passed >= rank:
                 return total_ns / count
-        raise ValueError("no percentile of nothing")
+        raise ValueError("a histogram without times has no percentile")
 
     def message(self, way: str, stream: str) -> Latency:
-        """Return what is told of a stream on its way; raises ValueError of nothing."""
+        """Return the message about a stream on its way; raises ValueError if no time was counted."""
         p50_s, p99_s = (self.percentile(share) / 1e9 for share in (0.5, 0.99))
         return Latency(
             way=way,
@@ -71,7 +67,7 @@ class Histogram:
 
 
 class Latencies:
-    """A histogram for each stream. For use from any thread."""
+    """A histogram for each stream; thread-safe."""
 
     def __init__(self) -> None:
         self._histograms: dict[tuple[str, str], Histogram] = {}
@@ -91,7 +87,7 @@ class Latencies:
 
 
 def by_way(latencies: Iterable[Latency]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return latencies as a summary has them: way, stream, and its numbers."""
+    """Return latencies in the form of a summary: by way and stream, the numbers."""
     rows: dict[str, dict[str, dict[str, float]]] = {}
     for one in latencies:
         rows.setdefault(one.way, {})[one.stream] = {

@@ -1,4 +1,4 @@
-"""Measures: the numbers a scenario wants in its summary, taken from the values of output ports as they come."""
+"""Measures: numbers for the summary, computed from the values of output ports during the run."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from hub.planning.measured import measured_port
 from hub.planning.plan import Plan
-from hub.planning.wiring import measured_port
 from schemas.scenario import Measure, Scenario
 from schemas.vectors import Vector
 
@@ -18,6 +18,8 @@ __all__ = ["Measures"]
 
 
 class _Meter:
+    """One measure: running statistics of a part of a vector."""
+
     def __init__(self, measure: Measure, part: slice, period: float) -> None:
         self.live = measure.live
         self.unit = measure.unit
@@ -65,19 +67,15 @@ class _Meter:
             "least": self._least,
             "mean": self._sum / self._count,
             "final": self.now,
+            "drop": self._drop,
+            "swing": float(np.max(self._high - self._low)),
+            "time-above": self._longest * self._period,
         }
-        return (
-            results
-            | {
-                "drop": self._drop,
-                "swing": float(np.max(self._high - self._low)),
-                "time-above": self._longest * self._period,
-            }
-        )[self._kind]
+        return results[self._kind]
 
 
 class Measures:
-    """All measures of a session. Values of one port come from one thread, in order."""
+    """All measures of a session; the values of one port must arrive in order."""
 
     def __init__(self, scenario: Scenario, plan: Plan) -> None:
         self._meters: dict[str, _Meter] = {}
@@ -96,15 +94,15 @@ class Measures:
         return list(self.by_port)
 
     def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
-        """Take the value of an output port at a time."""
+        """Add the value of an output port at a time."""
         for meter in self.by_port.get((participant, port), ()):
             with self._lock:
                 meter.take(value, time_ns)
 
     def live(self) -> Mapping[str, tuple[float, str]]:
-        """Return the present value and unit of each measure that the progress line shows."""
+        """Return the current value and unit of each measure in the progress line."""
         return {name: (meter.now, meter.unit) for name, meter in self._meters.items() if meter.live}
 
     def results(self) -> dict[str, float | None]:
-        """Return every measure's result; None if its port never spoke."""
+        """Return the result of every measure; None if its port had no value."""
         return {name: meter.result for name, meter in self._meters.items()}

@@ -1,4 +1,4 @@
-"""Everything that watches a session without taking part in it: recorder, measures and energy books."""
+"""The observers of a session, which do not take part in it: recorder, measures and energy books."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, InletS
 __all__ = ["Observers"]
 
 _ENERGY_PERIOD_NS = 10_000_000
-"""The books change at every step; 100 Hz shows all that a plot can."""
+"""The books change at every step; 100 Hz is enough for a plot."""
 
 
 @dataclass
@@ -40,7 +40,7 @@ class _Watched:
 
 
 class Observers:
-    """Sees every grant, ack and output value of one run, from this process or from others."""
+    """Receives every grant, ack and output value of one run, from this process or from others."""
 
     def __init__(
         self, plan: Plan, keys: Keys, run: int, measures: Measures, recorder: Recorder | None
@@ -72,12 +72,12 @@ class Observers:
 
     @property
     def watches_values(self) -> bool:
-        """Say whether output values matter here at all."""
+        """Whether any observer uses output values."""
         return self._recorder is not None or bool(self.measures.by_port)
 
     @property
     def away(self) -> dict[str, tuple[str, str]]:
-        """Participant and port of every output of another process that is to be watched, by key."""
+        """Participant and port of every watched output of another process, by key."""
         away = {
             key: w
             for key, w in self._watched.items()
@@ -91,7 +91,7 @@ class Observers:
         }
 
     def _comes_by_lane(self, watched: _Watched) -> bool:
-        """Say whether the hub's own host reads the value anyway, past Zenoh, and shows it to `value`."""
+        """Return whether the hub's own host receives the value past Zenoh, and passes it to `value`."""
         name, port = watched.planned.name, watched.port
         readers = {
             self._plan.participants[connection.target].host
@@ -101,11 +101,11 @@ class Observers:
         return "hub" in readers and has_lane(port, watched.planned.host, "hub")
 
     def linked(self) -> bool:
-        """Say whether the value at time 0 of every watched output of another process has been heard."""
+        """Return whether the value at time 0 of every watched output of another process was received."""
         return all(self._watched[key].newest >= (INITIAL, 0) for key in self.away)
 
     def value(self, planned: PlannedParticipant, port: Port, step: int, time_ns: int, value: Any) -> None:
-        """Take an output value of a participant in this process, or one that came here by a lane."""
+        """Receive an output value of a participant in this process, or one from a lane."""
         if (planned.name, port.name) in self.measures.by_port and step > INITIAL:
             self.measures.take(planned.name, port.name, value, time_ns)
         if self._recorder is not None:
@@ -114,7 +114,7 @@ class Observers:
                 self._recorder.write(watched.channel, time_ns, watched.codec.encode(item, time_ns))
 
     def sample(self, sample: zenoh.Sample) -> None:
-        """Take an output value of a participant in another process, as it comes from the wire."""
+        """Receive an output value of a participant in another process, from the wire."""
         watched = self._watched.get(str(sample.key_expr))
         try:
             tag = Tag.of(sample)
@@ -137,15 +137,13 @@ class Observers:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
     def watches(self, device: str, port: str) -> bool:
-        """Say whether anybody wants to see what a device says on a port, whether or not it enters the
-        simulation.
-        """
+        """Return whether an observer uses an output of a device, whether or not it enters the simulation."""
         return self._recorder is not None or (device, port) in self.measures.by_port
 
     def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
-        """Take what a device said; what enters the simulation is recorded with its grant.
+        """Receive a message of a device; one that enters the simulation is recorded with its grant.
 
-        Raises MessageError if it is none of the port.
+        Raises MessageError if it is no message of the port.
         """
         watched = self._watched[self._keys.output("device", device, port)]
         measured = (device, port) in self.measures.by_port
@@ -157,7 +155,7 @@ class Observers:
             self._recorder.write(watched.channel, time_ns, payload)
 
     def grant(self, grant: Grant, payload: bytes) -> None:
-        """Take a grant and the device samples in it."""
+        """Receive a grant and the device samples in it."""
         if self._recorder is None:
             return
         self._recorder.write(self._channel(self._keys.grant, GrantMessage.ros_type), grant.start_ns, payload)
@@ -170,7 +168,7 @@ class Observers:
             self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())
 
     def ack(self, planned: PlannedParticipant, ack: Ack, time_ns: int, payload: bytes | None) -> None:
-        """Take a report; `payload` are its bytes if it came from the wire."""
+        """Receive an ack; `payload` are its bytes if it is from the wire."""
         self.energy.take(planned.name, ack)
         if self._recorder is not None:
             channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)

@@ -1,4 +1,4 @@
-"""What a run tells about itself: while it goes, and at its end."""
+"""The progress of a run, and its summary at the end."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ __all__ = ["Progress", "Summary"]
 
 @dataclass(frozen=True)
 class Progress:
-    """What a progress line shows."""
+    """The contents of a progress line."""
 
     step: int
     steps: int | None
-    """Steps of the whole run; None if it goes on until it is stopped."""
+    """Steps of the whole run; None if it continues until it is stopped."""
     sim_time_s: float
     real_time_factor: float
     late_steps: int
     live: Mapping[str, tuple[float, str]]
-    """Present value and unit of each measure that is shown live."""
+    """Current value and unit of each measure that is shown live."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,7 @@ class Summary:
     late_steps: int
     dropped_messages: int
     state_hash: str
-    """Over every state hash of every participant: equal for equal runs, whatever the placement or the grants'
-    windows.
-    """
+    """Hash of all state hashes: equal for equal runs, whatever the hosts and the windows of the grants."""
     recording: str | None
     recording_complete: bool | None
     energy_residual_j: float
@@ -56,7 +54,7 @@ class Summary:
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the summary as JSON would have it, the measures beside the rest."""
+        """Return the summary as a flat mapping, with the measures beside the rest."""
         row = asdict(self)
         measures = row.pop("measures")
         return row | measures

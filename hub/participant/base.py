@@ -1,4 +1,4 @@
-"""What every participant is: a name, parameters and ports."""
+"""The base of every participant: name, parameters and ports."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Participant(ABC):
     def __init__(self, name: str, params: Any) -> None:
         """Store the participant's name and an instance of `params_model`.
 
-        Cheap: no package of an extra is imported here.
+        Import no package of an extra here: scenarios are checked where those are not installed.
         """
         self.name = name
         self.params = params
@@ -56,7 +56,7 @@ class Participant(ABC):
     @property
     @abstractmethod
     def ports(self) -> tuple[Port, ...]:
-        """Inputs and outputs, readable before anything is started; those of bonds not among them."""
+        """Inputs and outputs, readable before anything is started; without the ports of bonds."""
 
     @abstractmethod
     def close(self) -> None:

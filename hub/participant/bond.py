@@ -1,7 +1,7 @@
 """The two sides of a power bond inside an engine's step: prediction, virtual coupling forces and work.
 
-The force side goes through its sub-steps on the predicted motion of the other side and sums impulse and work;
-the motion side applies the wrench it was given and sums the work it does. Frames (dof 6) use the convention
+The force side takes its sub-steps on the predicted motion of the other side and sums impulse and work; the
+motion side applies the wrench that it receives and sums the work it does. Frames (dof 6) use the convention
 pose (x, y, z, qx, qy, qz, qw), twist (linear, angular), wrench (force, torque), all expressed in the bond's
 frame. In the shapes `size` and `linear` are those of the `BondSide`. Scheme and rules:
 docs/decisions/0004-coupling.md.
@@ -47,10 +47,10 @@ class ForceSide:
         self._started = False
 
     def begin(self, inputs: Inputs, h: float) -> None:
-        """Take the motion at the start of a step of `h` seconds.
+        """Read the motion at the start of a step of `h` seconds.
 
-        Where the motion that came out differs by d from the predicted one, the spring is displaced by d at
-        once: it takes the work F d + k d^2 / 2, with F its force at the end of the last step.
+        Where the motion differs by d from the predicted one, the spring is displaced by d at once: it takes
+        the work F d + k d^2 / 2, with F its force at the end of the last step.
         """
         x, v = inputs[self._position][: self._linear], inputs[self._velocity]
         if self._started:
@@ -75,8 +75,9 @@ class ForceSide:
         return self._v + tau * self._a
 
     def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
-        """Count the forces (N, N m; shape (size,)) with which the other side pushes, in a sub-step of `dt`
-        seconds around `tau`.
+        """Add the forces of a sub-step of `dt` seconds around `tau`.
+
+        `spring`, `damper`: forces (N, N m; shape (size,)) with which the other side pushes.
         """
         force = spring + damper
         self._impulse += dt * force
@@ -85,10 +86,10 @@ class ForceSide:
         self._work[0] += dt * float(moved @ self.velocity(tau))
 
     def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond: the reaction on the other side (minus the mean force, or the one at
-        the end), and the work.
+        """Return the outputs of the bond: the work, and the reaction on the other side.
 
-        `spring`, `damper`: forces (N, N m; shape (size,)) at the end of the step, on the predicted motion.
+        The reaction is minus the mean force, or minus the force at the end. `spring`, `damper`: forces (N,
+        N m; shape (size,)) at the end of the step, on the predicted motion.
         """
         self._spring = spring[: self._linear].copy()
         force = self._impulse / self._summed if self._plan.mean else spring + damper
@@ -96,7 +97,7 @@ class ForceSide:
 
     @property
     def state(self) -> Vector:
-        """All that this side remembers between steps, for hash, save and restore."""
+        """The state of this side between steps, for hash, save and restore."""
         return np.concatenate(
             [
                 self._work,
@@ -137,14 +138,15 @@ class MotionSide:
         self._work = np.zeros(1)
 
     def begin(self, inputs: Inputs, position: Vector, velocity: Vector) -> None:
-        """Take the reaction for this step, and the motion at its start, from which the other side predicted."""
+        """Read the reaction for this step; `position` and `velocity` are the motion at its start."""
         self._reaction = inputs[self.force_port]
         if self._correction is not None:
             self._x, self._v = position[: self._linear].copy(), velocity[: self._linear].copy()
 
     def force(self, tau: float, position: Vector, velocity: Vector) -> Vector:
-        """Return the force (N, N m; shape (size,)) on this side in the sub-step that begins `tau` seconds
-        into the step, given where it is then.
+        """Return the force (N, N m; shape (size,)) on this side in the sub-step that starts at `tau` seconds.
+
+        `position`, `velocity`: the motion of this side at the start of the sub-step.
         """
         if self._correction is None:
             return self._reaction
@@ -156,18 +158,16 @@ class MotionSide:
         return force
 
     def add(self, force: Vector, displacement: Vector) -> None:
-        """Count the work done against `force` over `displacement` (m, rad; shape (size,)) of one sub-step."""
+        """Add the work against `force` over `displacement` (m, rad; shape (size,)) of one sub-step."""
         self._work[0] -= force.dot(displacement)
 
     def result(self, position: Vector, velocity: Vector) -> dict[str, Vector]:
-        """Return the outputs of the bond at the end of the step; the work's array is the same one at every
-        step.
-        """
+        """Return the outputs of the bond at the end of the step; the array of the work is reused."""
         return {self.position_port: position, self.velocity_port: velocity, self.work_port: self._work}
 
     @property
     def state(self) -> Vector:
-        """All that this side remembers between steps."""
+        """The state of this side between steps."""
         return self._work.copy()
 
     @state.setter

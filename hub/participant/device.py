@@ -46,9 +46,7 @@ class Device(Participant):
     """
 
     read_period_ns: ClassVar[int] = 1_000_000
-    """How often it is read in wall time where the scenario does not say; a haptic stylus moves and is felt at
-    1 kHz.
-    """
+    """Default time between two reads in wall time: a haptic stylus is read and driven at 1 kHz."""
 
     @abstractmethod
     def open(self, directory: Path) -> None:
@@ -56,17 +54,18 @@ class Device(Participant):
 
     @abstractmethod
     def read(self, t: int) -> Iterable[Sample]:
-        """Return what is new up to time `t` (ns since the session's start, wall or simulated), oldest first."""
+        """Return the new samples up to `t` (ns since the session's start, wall or simulated time)."""
 
     def wait(self, seconds: float) -> bool:
-        """Wait in the thread that reads, until the next period; a device that knows when it has something new
-        returns at once, True, and is read.
+        """Wait until the next period, in the thread that reads.
+
+        A device that knows when it has a new sample returns True at once, and is read then.
         """
         sleep(seconds)
         return False
 
     def write(self, port: str, value: Value) -> None:
-        """Take the newest value of a signal, or the next message of an event port.
+        """Accept the newest value of a signal, or the next message of an event port.
 
-        A device without inputs is never written to.
+        Never called for a device without inputs.
         """

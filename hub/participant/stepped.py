@@ -17,8 +17,9 @@ __all__ = ["BondPlan", "Correction", "Setup", "Stepped"]
 
 @dataclass(frozen=True)
 class Correction:
-    """The motion side's share of `impulse-linearised`: F_tool = -F_mean - gain [k (x - x_pred) + b (v -
-    v_pred)].
+    """The part of the motion side in `impulse-linearised`.
+
+    F_tool = -F_mean - gain [k (x - x_pred) + b (v - v_pred)].
     """
 
     gain: float
@@ -35,8 +36,9 @@ class BondPlan:
     """
 
     prediction: str
-    """What the force side assumes of the motion inside a step: `hold`, `velocity` (x + v t) or `slope` (x + v
-    t + a t^2/2).
+    """The motion that the force side assumes inside a step.
+
+    `hold`, `velocity` (x + v t) or `slope` (x + v t + a t^2/2).
     """
     mean: bool
     """The force side returns its mean force over the step; otherwise the force at its end."""
@@ -79,7 +81,7 @@ class Stepped(Participant):
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """Power bonds that may be connected; after `configure` with their effective masses."""
+        """The bonds that may be connected; after `configure` with their effective masses."""
         return ()
 
     @abstractmethod

@@ -1,10 +1,12 @@
-"""Coupling algorithms of power bonds, and the stable-step rule. Derivation and figures:
-docs/decisions/0004-coupling.md.
+"""Coupling algorithms of power bonds, and the stable-step rule.
+
+Derivation and figures: docs/decisions/0004-coupling.md.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from hub.participant import BondPlan, Correction
 from schemas.ports import BondSide
@@ -14,19 +16,20 @@ __all__ = ["bond_plans", "is_fresh", "stable_step_problem"]
 
 _RULE_SHARE = 0.5
 """With this factor the rules of impulse and impulse-linearised hold in all of 108 linear cases
-(`bench/stable_step.py`), those of held inputs in half: what held inputs create only the tool's own damping
-takes, which a bond does not know.
+(`bench/stable_step.py`), those of held inputs in half of them: only the tool's own damping dissipates the
+energy that held inputs create, and a bond does not know that damping.
 """
 
 _ENERGY_SHARE = 0.25
-"""What a press and release makes of energy is 0.13 H^2 k_contact / m of what it exchanges
-(`tests/engines/bullet/press_and_release.py`): 0.8 % here.
+"""A press and release creates energy of 0.13 H^2 k_contact / m of what it exchanges
+(`tests/engines/bullet/press_and_release.py`): 0.8 % with this factor.
 """
 
 
 def is_fresh(bond: Bond, source_side: str) -> bool:
-    """Say whether the other side gets the outputs of `source_side` (`motion` or `force`) within the same
-    step.
+    """Return whether the other side receives the outputs of `source_side` within the same step.
+
+    `source_side` is `motion` or `force`.
     """
     if bond.algorithm in ("impulse", "impulse-linearised"):
         return source_side == "force"
@@ -37,24 +40,15 @@ def is_fresh(bond: Bond, source_side: str) -> bool:
 
 
 def bond_plans(bond: Bond, force: BondSide, step_s: float) -> tuple[BondPlan, BondPlan]:
-    """Return the plans of the motion side and of the force side, for a communication step of `step_s`
-    seconds.
-    """
+    """Return the plans of the motion side and the force side; `step_s`: communication step in seconds."""
     if bond.algorithm == "impulse":
         plan = BondPlan(prediction=bond.prediction, mean=True)
         return plan, plan
     if bond.algorithm == "impulse-linearised":
-        gain = linearised_gain(
-            step_s,
-            _number(force.stiffness),
-            _number(force.damping),
-            _number(force.proxy_mass),
-            force.proxy_step,
-        )
-        correction = Correction(gain=gain, stiffness=_number(force.stiffness), damping=_number(force.damping))
-        return BondPlan(prediction="velocity", mean=True, correction=correction), BondPlan(
-            prediction="velocity", mean=True
-        )
+        k, b, mass = _number(force.stiffness), _number(force.damping), _number(force.proxy_mass)
+        gain = linearised_gain(step_s, k, b, mass, force.proxy_step)
+        plan = BondPlan(prediction="velocity", mean=True)
+        return replace(plan, correction=Correction(gain=gain, stiffness=k, damping=b)), plan
     plan = BondPlan(prediction="hold", mean=False)
     return plan, plan
 
@@ -64,7 +58,7 @@ def linearised_gain(
 ) -> float:
     """Return g = S / (k H^2/6 + b H/2) with S = m_p [1 - (1 - min(1, b h / m_p)) exp(-(H - h) sqrt(k/m_p))].
 
-    S is the mass that the proxy alone reflects to the tool within a step: light for short steps, all of m_p
+    S is the mass that the proxy alone reflects to the tool within a step: small for short steps, all of m_p
     for long ones. An explicit damper takes its share b h / m_p at once, in the first sub-step h of the proxy.
     """
     first = min(proxy_step_s, step_s)
@@ -74,14 +68,16 @@ def linearised_gain(
 
 
 def stable_step_problem(bond: Bond, motion: BondSide, force: BondSide, step_s: float) -> str | None:
-    """Return what breaks the stable-step rule of `bond` at a step of `step_s` seconds, or None.
+    """Return how `bond` breaks the stable-step rule at a step of `step_s` seconds, or None.
 
-    impulse: H <= 0.5 m / b.  impulse-linearised: H <= 0.5 sqrt(m (1/k + 1/k_contact)) and m >= 0.5 m_proxy.
-    Both: H <= 0.25
-    sqrt(m / k_contact), above which a press and release makes more than 1 % of the energy it exchanges
-    (docs/decisions/0015-contact-force.md).  gauss-seidel and jacobi with held inputs: H <= 0.5 m / b and H <=
-    0.5 sqrt(m / k), the
-    sampling limits of a held damper and a held spring.
+    The rules:
+        impulse: H <= 0.5 m / b.
+        impulse-linearised: H <= 0.5 sqrt(m (1/k + 1/k_contact)) and m >= 0.5 m_proxy.
+        Both: H <= 0.25 sqrt(m / k_contact), above which a press and release creates more than 1 % of the
+        energy it exchanges (docs/decisions/0015-contact-force.md).
+        gauss-seidel and jacobi with held inputs: H <= 0.5 m / b and H <= 0.5 sqrt(m / k), the sampling limits
+        of a held damper and a held spring.
+
     m: effective mass of the motion side; k, b: virtual coupling. A number that a side does not state is not
     checked.
     """

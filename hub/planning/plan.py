@@ -1,14 +1,15 @@
-"""The plan of a session: where each participant runs, and every connection and bond resolved."""
+"""The plan of a session: the place and period of every participant, and every connection and bond."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from hub.participant import BondPlan
-from hub.planning.renamed import KINDS
+from hub.planning.registry import Role
+from hub.planning.renamed import current_plan
 from schemas.network_link import NetworkLinkSpec
 from schemas.ports import BondSide, Port
 from schemas.scenario import Bond
@@ -29,21 +30,21 @@ class _Part(BaseModel):
 
 
 class PlannedParticipant(_Part):
-    """One participant: where it runs, how often it steps, and its ports, those of connected bonds included."""
+    """One participant: its host, its period, and its ports, with those of its connected bonds."""
 
     name: str
     kind: str
-    role: Literal["engine", "controller", "device"]
+    role: Role
     host: str
     """`hub`, the name of a process, or `remote/<participant>`."""
     period: int
     """In communication steps; 1 for a device in wall time."""
     read_ns: int = 0
-    """Of a device in wall time: the time between two reads."""
+    """For a device in wall time: the time between two reads."""
     network_link: NetworkLinkSpec | None = None
-    """Of a device: the emulated network between it and the hub."""
+    """For a device: the emulated network between it and the hub."""
     rate_limit: float = 2000.0
-    """Of a device: messages per second that are accepted on each of its ports."""
+    """For a device: messages per second that are accepted on each of its ports."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}
@@ -59,7 +60,7 @@ class PlannedParticipant(_Part):
 
     @property
     def key_role(self) -> str:
-        """The role as it stands in keys: there every stepped participant is an engine."""
+        """The role in keys, where every stepped participant is an engine."""
         return "device" if self.role == "device" else "engine"
 
 
@@ -71,7 +72,7 @@ class PlannedConnection(_Part):
     target: str
     target_port: str
     fresh: bool
-    """The target reads the source's output of the same step, otherwise that of the last communication point."""
+    """The target reads the output of the same step; otherwise that of the last communication point."""
     linear: bool
     """The target extrapolates inside its step."""
 
@@ -104,7 +105,7 @@ class PlannedBond(_Part):
 
 
 class Plan(_Part):
-    """Everything that hosts need to know of a session."""
+    """Everything that hosts need to know about a session."""
 
     step_ns: int
     order: tuple[str, ...]
@@ -117,11 +118,9 @@ class Plan(_Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_0_1_0(cls, data: Any) -> Any:
-        """Accept the plan in recordings of version 0.1.0, which named its parts otherwise."""
-        if isinstance(data, dict) and "members" in data:
-            return _from_0_1_0(cast("dict[str, Any]", data))
-        return cast("Any", data)
+    def _with_current_names(cls, data: Any) -> Any:
+        """Accept the plan of a recording of version 0.1.0."""
+        return current_plan(cast("dict[str, Any]", data)) if isinstance(data, dict) else data
 
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""
@@ -181,26 +180,3 @@ def has_simulated_time(ports: Sequence[Port]) -> bool:
     """
     outputs = [port for port in ports if port.causality == "output"]
     return bool(outputs) and all(port.clock == "simulated" for port in outputs)
-
-
-def _from_0_1_0(data: dict[str, Any]) -> dict[str, Any]:
-    old = dict(data)
-    participants = {
-        name: {("network_link" if key == "link" else key): value for key, value in planned.items()}
-        | {"kind": KINDS.get(planned["kind"], planned["kind"])}
-        for name, planned in old.pop("members").items()
-    }
-    from_devices = [_renamed(inlet, "source") for inlet in old.pop("inlets")]
-    to_devices = [_renamed(outlet, "target") for outlet in old.pop("outlets")]
-    connections = old.pop("links")
-    return old | {
-        "participants": participants,
-        "connections": connections,
-        "from_devices": from_devices,
-        "to_devices": to_devices,
-    }
-
-
-def _renamed(connection: dict[str, Any], end: str) -> dict[str, Any]:
-    names = {"device": end, "device_port": f"{end}_port"}
-    return {names.get(key, key): value for key, value in connection.items()}

@@ -1,7 +1,7 @@
 """The kinds of participants that are installed, found by entry points and loaded by name.
 
-A package brings its own kinds by an entry point in one of the groups `trocar.engines`, `trocar.controllers`
-and `trocar.devices`. If it has an extra of the same name as a kind, the kind needs that extra to run.
+A package adds its own kinds with entry points in the groups `trocar.engines`, `trocar.controllers` and
+`trocar.devices`. If it has an extra with the name of a kind, the kind needs the packages of that extra.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, distribution, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from packaging.requirements import Requirement
 from pydantic import ValidationError
@@ -24,6 +24,7 @@ __all__ = [
     "UNPACKAGED",
     "Kind",
     "Participant",
+    "Role",
     "broken",
     "find",
     "installed_packages",
@@ -35,28 +36,32 @@ __all__ = [
 ]
 
 Participant = type[Stepped] | type[Device]
+Role = Literal["engine", "controller", "device"]
 
-GROUPS = {"trocar.engines": "engine", "trocar.controllers": "controller", "trocar.devices": "device"}
+GROUPS: dict[str, Role] = {
+    "trocar.engines": "engine",
+    "trocar.controllers": "controller",
+    "trocar.devices": "device",
+}
 """Entry-point group to role."""
 
 UNPACKAGED = "PYTHONPATH"
-"""Stands for the distribution of a kind that is named `module:Class`."""
+"""In place of a distribution, for a kind that is named `module:Class`."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of participant as its package declares it; nothing of it is imported yet."""
+    """A kind of participant as its package declares it, without importing the package."""
 
     name: str
-    role: str
-    """`engine`, `controller` or `device`."""
+    role: Role
     distribution: str
     entry: EntryPoint
 
 
 @cache
 def kinds() -> dict[str, Kind]:
-    """Return every installed kind by name. Raises ScenarioError if two distributions bring the same one."""
+    """Return every installed kind by name. Raises ScenarioError if two distributions have the same one."""
     found: dict[str, Kind] = {}
     for group, role in GROUPS.items():
         for entry in sorted(entry_points(group=group), key=lambda e: (e.name, e.value)):
@@ -64,7 +69,7 @@ def kinds() -> dict[str, Kind]:
             other = found.get(kind.name)
             if other:
                 raise ScenarioError(
-                    f"kind '{kind.name}' is brought by both '{other.distribution}' and '{kind.distribution}':"
+                    f"both '{other.distribution}' and '{kind.distribution}' have a kind '{kind.name}':"
                     " uninstall one of them"
                 )
             found[kind.name] = kind
@@ -72,8 +77,7 @@ def kinds() -> dict[str, Kind]:
 
 
 def find(name: str) -> Kind:
-    """Return the kind called `name`: an installed one, or `module:Class` for a class of one's own on
-    PYTHONPATH.
+    """Return the kind called `name`: an installed one, or `module:Class` for a class on PYTHONPATH.
 
     Raises ScenarioError if there is none, or if that class cannot be imported.
     """
@@ -81,10 +85,9 @@ def find(name: str) -> Kind:
         return kinds()[name]
     if ":" in name:
         kind = Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
-        loaded = _import(kind)  # only the class itself says what it is
-        return (
-            replace(kind, role="device") if isinstance(loaded, type) and issubclass(loaded, Device) else kind
-        )
+        loaded = _import(kind)  # without an entry point, only the class says which role it has
+        is_device = isinstance(loaded, type) and issubclass(loaded, Device)
+        return replace(kind, role="device") if is_device else kind
     raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}")
 
 
@@ -96,10 +99,11 @@ def load(name: str) -> Participant:
     """
     kind = find(name)
     loaded = _import(kind)
-    if not (isinstance(loaded, type) and issubclass(loaded, Device if kind.role == "device" else Stepped)):
+    base = Device if kind.role == "device" else Stepped
+    if not (isinstance(loaded, type) and issubclass(loaded, base)):
         raise ScenarioError(
-            f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no"
-            f" {'Device' if kind.role == 'device' else 'Stepped'}"
+            f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no subclass of"
+            f" {base.__name__}"
         )
     return loaded
 
@@ -107,7 +111,7 @@ def load(name: str) -> Participant:
 def _import(kind: Kind) -> Any:
     try:
         return kind.entry.load()
-    except Exception as error:  # whatever a plugin's module does on import
+    except Exception as error:  # a plugin's module may raise anything on import
         raise ScenarioError(
             f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}:"
             f" {type(error).__name__}: {error}"
@@ -117,7 +121,7 @@ def _import(kind: Kind) -> Any:
 def make(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Stepped | Device:
     """Return a participant of kind `name`; relative paths in its parameters start at `directory`.
 
-    Raises ScenarioError if the kind cannot be loaded or the parameters are none of it.
+    Raises ScenarioError if the kind cannot be loaded or the parameters are invalid.
     """
     kind = load(name)
     try:
@@ -139,7 +143,7 @@ def broken() -> dict[str, str]:
 
 
 def require_extra(name: str) -> None:
-    """Raise MissingExtraError if kind `name` belongs to an extra of which a package is not installed."""
+    """Raise MissingExtraError if a package of the extra of kind `name` is not installed."""
     kind = find(name)
     for package in missing_packages(kind.entry.dist, name):
         raise MissingExtraError(f"{kind.role} '{name}'", name, package, kind.distribution)
@@ -161,7 +165,7 @@ def _requirements(dist: Distribution | None, extra: str) -> Iterator[Requirement
         marker = requirement.marker
         if not marker or marker.evaluate({"extra": ""}) or not marker.evaluate({"extra": extra}):
             continue
-        if dist and requirement.name == dist.name:  # an extra that is the sum of others
+        if dist and requirement.name == dist.name:  # an extra that consists of others
             for part in sorted(requirement.extras):
                 yield from _requirements(dist, part)
         else:

@@ -1,4 +1,4 @@
-"""Scenarios as files: found, read, overridden and validated, with a line and a column for everything wrong."""
+"""Scenario files: find, read, override and validate them; every error names its line and column."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ScenarioFile:
-    """A valid scenario, the validated parameters of its participants by name, and where it came from."""
+    """A valid scenario, the validated parameters of its participants by name, and its text."""
 
     scenario: Scenario
     params: Mapping[str, Params]
@@ -41,20 +41,15 @@ def installed_scenarios() -> dict[str, Path]:
 
 
 def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
-    """Return the scenario that is installed under a name or stands in a file, with `a.b.c=value` overrides
-    applied.
+    """Return the installed scenario of a name, or the one in a file, with overrides `a.b.c=value` applied.
 
-    Raises ScenarioError with one line for each thing that is wrong.
+    Raises ScenarioError with one line for each problem.
     """
     source = read(_find(name_or_path))
     for override in overrides:
         source.override(override)
     replace_old_names(source)
-    try:
-        spread_scene(source, _models(source))
-    except ScenarioError as error:
-        raise located(error, source) from error
-    found: list[str] = []
+    found = [str(located(error, source)) for error in spread_scene(source, _models(source))]
     params = _all_params(source, found)
     try:
         scenario = Scenario.model_validate(source.tree)
@@ -66,7 +61,7 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
 
 
 def located(error: ScenarioError, source: Source) -> ScenarioError:
-    """Return `error` with its place in the file in front of the message, if it says which value it is about."""
+    """Return `error` with the place of its value in front of the message, if it names a value."""
     return ScenarioError(source.line(error.path, str(error))) if error.path else error
 
 
@@ -78,18 +73,19 @@ def _find(name_or_path: str) -> Path:
         return path
     known = installed_scenarios()
     if name_or_path in SCENARIOS:
-        log.warning("scenario '%s' is now '%s'", name_or_path, SCENARIOS[name_or_path])
-        return known[SCENARIOS[name_or_path]]
+        new = SCENARIOS[name_or_path]
+        log.warning("scenario '%s' is now '%s'; this release still accepts the old name", name_or_path, new)
+        return known[new]
     if name_or_path not in known:
         raise ScenarioError(
-            f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} A file of your own is"
-            " named with its .yaml."
+            f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} For a file of your"
+            " own, give its path with .yaml."
         )
     return known[name_or_path]
 
 
 def _specs(source: Source) -> dict[str, dict[str, Any]]:
-    """Return the participants that name a kind; the scenario's own validation reports the others."""
+    """Return the participants that name a kind; the validation of the scenario reports the others."""
     participants = source.tree.get("participants")
     given = cast("dict[str, Any]", participants if isinstance(participants, dict) else {})
     specs = {name: cast("dict[str, Any]", spec) for name, spec in given.items() if isinstance(spec, dict)}
@@ -97,7 +93,7 @@ def _specs(source: Source) -> dict[str, dict[str, Any]]:
 
 
 def _models(source: Source) -> dict[str, type[Params]]:
-    """Return the parameters' model of every participant whose kind can be loaded."""
+    """Return the model of the parameters of every participant whose kind can be loaded."""
     models: dict[str, type[Params]] = {}
     for name, spec in _specs(source).items():
         with suppress(ScenarioError):  # `_all_params` reports it
@@ -106,7 +102,7 @@ def _models(source: Source) -> dict[str, type[Params]]:
 
 
 def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
-    """Return the parameters of every participant; what is wrong with them goes into `found`."""
+    """Return the parameters of every participant, and append what is wrong with them to `found`."""
     params: dict[str, Params] = {}
     for name, spec in _specs(source).items():
         try:
@@ -117,8 +113,9 @@ def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
 
 
 def _params(at: Location, spec: dict[str, Any], source: Source) -> Params:
-    """Return the validated parameters of one participant, and see that what it needs is installed, if it runs
-    here.
+    """Return the validated parameters of one participant.
+
+    Raises ScenarioError if they are invalid, or if it runs here and a package that it needs is not installed.
     """
     kind = spec["kind"]
     try:
@@ -131,4 +128,5 @@ def _params(at: Location, spec: dict[str, Any], source: Source) -> Params:
     try:
         return model.model_validate(given, context={"directory": source.directory})
     except ValidationError as error:
-        raise ScenarioError("\n".join(problems(error, model, at, source))) from error
+        found = problems(error, model, at, source, other_keys=ParticipantSpec.RESERVED)
+        raise ScenarioError("\n".join(found)) from error

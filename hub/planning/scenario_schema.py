@@ -1,6 +1,4 @@
-"""The JSON schema of a scenario with the parameters of every installed kind, for editors
-(yaml-language-server).
-"""
+"""The JSON schema of a scenario with the parameters of every installed kind, for yaml-language-server."""
 
 from __future__ import annotations
 
@@ -29,8 +27,10 @@ def scenario_schema() -> str:
 
 
 def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a participant, told apart by `kind`: an editor then reports against the one that
-    is meant.
+    """Return the schema of a participant: one branch for each kind, so that an editor reports against it.
+
+    Parameters may be missing or null, as the scene may have them or be kept out: `trocar check` reports those
+    that a participant lacks in the end.
     """
     broken = registry.broken()
     kinds = [kind for name, kind in sorted(registry.kinds().items()) if name not in broken]
@@ -42,10 +42,9 @@ def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[st
         definitions.update(
             {f"{kind.name}.{name}": definition for name, definition in params.pop("$defs", {}).items()}
         )
-        properties = {
-            key: value for key, value in common.items() if key in ParticipantSpec.RESERVED
-        } | params.get("properties", {})
-        # parameters that a kind requires may stand in the scene: `trocar check` reports those that are missing
+        properties = {key: common[key] for key in ParticipantSpec.RESERVED} | {
+            name: _or_null(schema) for name, schema in params.get("properties", {}).items()
+        }
         then = {"properties": properties, "additionalProperties": False}
         branches.append({"if": {"properties": {"kind": {"const": kind.name}}}, "then": then})
     kind_schema = common["kind"] | {"enum": [kind.name for kind in kinds]}
@@ -55,3 +54,10 @@ def _participant(common: dict[str, Any], definitions: dict[str, Any]) -> dict[st
         "required": ["kind"],
         "allOf": branches,
     }
+
+
+def _or_null(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema that also allows null; unlike with `anyOf`, errors point into the value."""
+    shown = {key: schema[key] for key in ("description", "default") if key in schema}
+    rest = {key: value for key, value in schema.items() if key not in shown}
+    return shown | {"if": {"type": "null"}, "then": True, "else": rest}

@@ -1,6 +1,4 @@
-"""The text of a scenario: the YAML tree, where each value of it stands, and what the command line put over
-it.
-"""
+"""The text of a scenario: its YAML tree, the place of each value in the file, and overrides on top of it."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from schemas.errors import ScenarioError
 
-__all__ = ["Location", "Source", "read"]
+__all__ = ["Location", "Source", "merged", "read"]
 
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of the scenario."""
@@ -25,14 +23,14 @@ _MERGE = "tag:yaml.org,2002:merge"
 
 @dataclass(frozen=True)
 class Source:
-    """Where a scenario came from, and where in it each value stands."""
+    """The tree of a scenario, and where in its file or on the command line each value is written."""
 
     file: Path
     tree: dict[str, Any]
     marks: dict[Location, tuple[_Mark, _Mark]]
-    """Line and column, from 1, of each key (list items: of the item) and of its value."""
+    """Line and column, counted from 1, of each key (for a list item: of the item) and of its value."""
     overrides: dict[Location, str] = field(default_factory=dict[Location, str])
-    """The values set on the command line, and what was written there."""
+    """The values set on the command line, each with the text that sets it."""
 
     @property
     def directory(self) -> Path:
@@ -40,13 +38,28 @@ class Source:
         return self.file.resolve().parent
 
     def line(self, path: Location, message: str, *, key: bool = False) -> str:
-        """Return `FILE:LINE:COL: path: message` for the value at `path` (or its key); what is missing is
-        shown where it belongs.
+        """Return `FILE:LINE:COL: path: message` about the value at `path`, or about its key."""
+        return f"{self.place(path, key=key)}: {'.'.join(map(str, path)) or 'scenario'}: {message}"
+
+    def place(self, path: Location, *, key: bool = False) -> str:
+        """Return `FILE:LINE:COL`, or the override, that writes the value at `path`, or its key.
+
+        The place of a missing value is that of the mapping or list in which it is missing.
         """
-        return f"{self._where(path, key)}: {'.'.join(map(str, path)) or 'scenario'}: {message}"
+        for length in range(len(path), -1, -1):
+            known = path[:length]
+            if known in self.overrides:
+                return f"--set {self.overrides[known]}"
+            if known in self.marks:
+                line, column = self.marks[known][0 if key and length == len(path) else 1]
+                return f"{self.file}:{line}:{column}"
+        return str(self.file)
 
     def override(self, text: str) -> None:
-        """Apply `a.b.c=value`. Mappings on the way that are not there are made, and judged by the validation."""
+        """Apply `a.b.c=value`. Missing mappings on the way are created; the validation judges them later.
+
+        Raises ScenarioError if the text has another form, or names a part of something that has no parts.
+        """
         dotted, equals, value_text = text.partition("=")
         if not equals or not all(dotted.split(".")):
             raise ScenarioError(f"--set {text}: expected a.b.c=value")
@@ -67,34 +80,17 @@ class Source:
                 self.overrides[path[: depth + 1]] = text
             parent = cast("dict[Any, Any]", parent)[part]
 
-    def rename(self, parent: Location, old: str, new: str) -> None:
-        """Call the value at `old` of the mapping at `parent` `new`; messages about it still find its place."""
-        mapping: Any = self.tree
-        for part in parent:
-            mapping = mapping[part]
-        mapping[new] = mapping.pop(old)
-        self.stands_also_at((*parent, old), (*parent, new))
-
     def stands_also_at(self, written: Location, path: Location) -> None:
-        """Find the values below `path` where those below `written` are, unless they have a place of their own."""
+        """Give the values below `path` the places of those below `written` if they have none of their own."""
+        own = self.marks.keys() | self.overrides.keys()
         for places in (self.marks, self.overrides):
-            found = {
+            copied = {
                 (*path, *at[len(written) :]): place
                 for at, place in places.items()
                 if at[: len(written)] == written
             }
-            for at, place in found.items():
-                cast("dict[Location, Any]", places).setdefault(at, place)
-
-    def _where(self, path: Location, key: bool) -> str:
-        for length in range(len(path), -1, -1):
-            known = path[:length]
-            if known in self.overrides:
-                return f"--set {self.overrides[known]}"
-            if known in self.marks:
-                line, column = self.marks[known][0 if key and length == len(path) else 1]
-                return f"{self.file}:{line}:{column}"
-        return str(self.file)
+            new = {at: place for at, place in copied.items() if at not in own}
+            cast("dict[Location, Any]", places).update(new)
 
 
 def read(file: Path) -> Source:
@@ -119,7 +115,7 @@ def read(file: Path) -> Source:
         raise ScenarioError(f"{file}: cannot be read: {error}") from error
     except RecursionError:
         raise ScenarioError(
-            f"{file}: nested too deeply: does an alias (*name) stand inside what it is an alias of?"
+            f"{file}: nested too deeply: is an alias (*name) used inside its own anchor (&name)?"
         ) from None
     if not isinstance(tree, dict):
         raise ScenarioError(
@@ -133,12 +129,10 @@ def _yaml() -> Any:
 
 
 def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tuple[_Mark, _Mark]]]:
-    """Yield where each value below a YAML node stands, the place that counts last: a key of one's own goes
-    before a merged one.
-    """
+    """Yield the place of each value below a YAML node; of two for the same path, the last one counts."""
     if value.id == "mapping":
-        for merged in _merged(value):
-            yield from _marks(key, merged, path)
+        for other in _merged_nodes(value):  # first: a mapping's own keys replace those it merges
+            yield from _marks(key, other, path)
     # `key:` without a value: the parser is already on the next line
     empty = value.start_mark.index == value.end_mark.index
     yield path, (_mark(key), _mark(key if empty else value))
@@ -151,22 +145,27 @@ def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tup
             yield from _marks(child, child, (*path, index))
 
 
-def _merged(mapping: Any) -> Iterator[Any]:
-    """Yield the nodes that `<<` merges into a mapping; of several that have a key the first one counts, so it
-    comes last.
-    """
+def _merged_nodes(mapping: Any) -> Iterator[Any]:
+    """Yield the nodes that `<<` merges into a mapping, the one with the highest priority last."""
     for name, child in mapping.value:
         if name.tag == _MERGE:
+            # YAML gives the first of several mappings priority
             yield from reversed(child.value) if child.id == "sequence" else (child,)
 
 
 def _copied(value: Any) -> Any:
-    """Return a YAML tree in which no part is shared: what an alias stands for can then be overridden in one
-    place alone.
-    """
+    """Return a YAML tree without shared parts, so that an override changes one place only."""
     if isinstance(value, dict):
         return {key: _copied(part) for key, part in cast("dict[Any, Any]", value).items()}
     return [_copied(part) for part in cast("list[Any]", value)] if isinstance(value, list) else value
+
+
+def merged(value: Any, over: Any) -> Any:
+    """Return `over`, and if both are mappings, also the entries of `value` that it lacks, at any depth."""
+    if not (isinstance(value, dict) and isinstance(over, dict)):
+        return over
+    below, above = cast("dict[str, Any]", value), cast("dict[str, Any]", over)
+    return below | {key: merged(below[key], part) if key in below else part for key, part in above.items()}
 
 
 def _mark(node: Any) -> _Mark:
@@ -175,10 +174,7 @@ def _mark(node: Any) -> _Mark:
 
 def _no_such_part(parent: Any, part: str | int) -> str:
     if isinstance(parent, list):
-        length = len(parent)  # pyright: ignore[reportUnknownArgumentType]
-        return (
-            ""
-            if isinstance(part, int) and part < length
-            else f"is a list of {length}, counted from 0; there is no '{part}' in it"
-        )
+        length = len(cast("list[Any]", parent))
+        known = isinstance(part, int) and part < length
+        return "" if known else f"is a list of {length}, counted from 0; there is no '{part}' in it"
     return "" if isinstance(parent, dict) else f"is '{parent}', which has no parts"

@@ -1,49 +1,46 @@
-"""What a scenario states once for all participants: the arms, the instruments, what lies on the table."""
+"""The scene of a scenario: parameters stated once for all participants, such as arms, table and objects."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from hub.participant import Params
-from hub.planning.scenario_source import Source
+from hub.planning.scenario_source import Source, merged
 from schemas.errors import ScenarioError, did_you_mean
 
 __all__ = ["spread_scene"]
 
 
-def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> None:
-    """Give every participant the parts of `scene` that its kind has as parameters.
+def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator[ScenarioError]:
+    """Give every participant the parts of `scene` that its kind has as parameters; yield what is wrong.
 
-    What a participant states itself goes before the scene; of mappings, entry by entry. `null` keeps a part
-    of the scene out. `models`: the parameters of each participant's kind. Raises ScenarioError for a part that no participant has.
+    A participant's own value has priority over the scene's; mappings are merged entry by entry, and an own
+    value of null keeps a part of the scene out.
+
+    Args:
+        source: The scenario; its `scene` is removed.
+        models: The parameters of each participant's kind; a participant whose kind is unknown is left out.
     """
-    if "scene" not in source.tree:
+    scene = source.tree.pop("scene", None)
+    if scene is None:
         return
-    scene = source.tree.pop("scene")
     if not isinstance(scene, dict):
-        raise ScenarioError("the scene is a mapping of parameters", path=("scene",))
-    participants = cast("dict[str, dict[str, Any]]", source.tree["participants"]) if models else {}
+        yield ScenarioError(f"expected a mapping of parameters, got {scene!r}", path=("scene",))
+        return
+    given = source.tree.get("participants")
+    participants = cast("dict[str, dict[str, Any]]", given if isinstance(given, dict) else {})
     for part, value in cast("dict[str, Any]", scene).items():
         takers = [name for name, model in models.items() if part in model.model_fields]
-        if not takers:
+        # a participant of an unknown kind, which is reported elsewhere, may have the parameter
+        if not takers and len(models) == len(participants) > 0:
             known = {field for model in models.values() for field in model.model_fields}
-            raise ScenarioError(
-                f"no participant has a parameter '{part}'.{did_you_mean(part, known)}", path=("scene", part)
-            )
+            problem = f"no participant has a parameter '{part}'.{did_you_mean(str(part), known)}"
+            yield ScenarioError(problem, path=("scene", part))
         for name in takers:
-            spec = participants[name]
-            if part in spec and spec[part] is None:
-                del spec[part]
-                continue
-            spec[part] = _merged(value, spec[part]) if part in spec else value
-            source.stands_also_at(("scene", part), ("participants", name, part))
-
-
-def _merged(scene: Any, own: Any) -> Any:
-    if not (isinstance(scene, dict) and isinstance(own, dict)):
-        return own
-    first, second = cast("dict[str, Any]", scene), cast("dict[str, Any]", own)
-    return first | {
-        key: _merged(first[key], value) if key in first else value for key, value in second.items()
-    }
+            own = participants[name]
+            if part in own and own[part] is None:
+                del own[part]
+            else:
+                own[part] = merged(value, own[part]) if part in own else value
+                source.stands_also_at(("scene", part), ("participants", name, part))

@@ -1,4 +1,4 @@
-"""What pydantic found wrong in a scenario, told to the person who wrote it: what, where, what was allowed."""
+"""Errors of pydantic as messages for the author of a scenario: what, where, what was allowed."""
 
 from __future__ import annotations
 
@@ -15,38 +15,47 @@ __all__ = ["problems"]
 
 
 def problems(
-    error: ValidationError, model: type[BaseModel], prefix: Location, source: Source
+    error: ValidationError,
+    model: type[BaseModel],
+    prefix: Location,
+    source: Source,
+    *,
+    other_keys: Iterable[str] = (),
 ) -> Iterator[str]:
-    """Yield one line for each thing that `model`, which stands at `prefix` in the scenario, found wrong."""
+    """Yield one line for each error that `model`, which stands at `prefix` in the scenario, has found.
+
+    `other_keys` are allowed at `prefix` beside the fields of the model.
+    """
     for detail in error.errors(include_url=False):
         about_key = detail["type"] == "extra_forbidden" or detail["loc"][-1:] == ("[key]",)
         path = (*prefix, *(part for part in detail["loc"] if part != "[key]"))
-        yield source.line(path, _message(detail, model), key=about_key)
+        yield source.line(path, _message(detail, model, other_keys), key=about_key)
 
 
-def _message(detail: ErrorDetails, model: type[BaseModel]) -> str:
+def _message(detail: ErrorDetails, model: type[BaseModel], other_keys: Iterable[str]) -> str:
+    given = detail["input"]
     match detail["type"]:
         case "extra_forbidden":
-            name = str(detail["loc"][-1])
-            return f"there is no '{name}' here.{did_you_mean(name, _known_keys(model, detail['loc'][:-1]))}"
+            *parents, name = detail["loc"]
+            known = [*_known_keys(model, parents), *(() if parents else other_keys)]
+            return f"there is no '{name}' here.{did_you_mean(str(name), known)}"
         case "literal_error":
             expected = str(detail.get("ctx", {}).get("expected", "")).replace(" or ", ", ")
-            return (
-                f"'{detail['input']}' is not"
-                f" allowed.{did_you_mean(str(detail['input']), (word.strip(chr(39)) for word in expected.split(', ')))}"
-            )
+            allowed = (word.strip("'") for word in expected.split(", "))
+            return f"'{given}' is not allowed.{did_you_mean(str(given), allowed)}"
         case "missing":
             return "is required but not given"
         case "model_type" | "dict_type":
-            return f"expected a mapping, got {detail['input']!r}"
+            return f"expected a mapping, got {given!r}"
         case _:
-            message, shown = detail["msg"].removeprefix("Value error, "), repr(detail["input"])
+            message, shown = detail["msg"].removeprefix("Value error, "), repr(given)
             return message if shown in message or len(shown) > 60 else f"{message} (got {shown})"
 
 
 def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
-    """Return the keys that `model` allows at `loc`, read from its JSON schema, where unions and nested models
-    are all alike.
+    """Return the keys that `model` allows at `loc`.
+
+    They are read from its JSON schema, where unions and nested models look alike.
     """
     root = model.model_json_schema()
     here = list(_branches(root, root))
@@ -58,7 +67,7 @@ def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
 
 
 def _children(branch: dict[str, Any], part: str | int) -> Iterator[dict[str, Any]]:
-    """Yield the schemas of what stands under `part` in a mapping or a list."""
+    """Yield the schemas of the value at `part` of a mapping or a list."""
     properties: dict[str, Any] = branch.get("properties", {})
     patterns: dict[str, Any] = branch.get("patternProperties", {})
     candidates: list[Any] = (

@@ -1,4 +1,4 @@
-"""Connections with a wildcard: `motion.drive/* -> robot.*` spelt out."""
+"""Connections with a wildcard, such as `motion.drive/* -> robot.*`."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import Port
 from schemas.scenario import Connection
 
-__all__ = ["spelt_out"]
+__all__ = ["expand"]
 
 
-def spelt_out(
+def expand(
     connection: Connection, ports: Mapping[str, Sequence[Port]], path: tuple[str | int, ...]
 ) -> tuple[Connection, ...]:
-    """Return the single connections that `connection`, which stands at `path` in the scenario, means among
-    the `ports` of each participant.
+    """Return the single connections for which `connection`, at `path` in the scenario, stands.
 
-    Raises ScenarioError if a wildcard joins nothing.
+    `ports` are those of every participant. Raises ScenarioError if a wildcard connects nothing.
     """
     one, other = connection.source, connection.target
     if not connection.is_wildcard:
@@ -27,9 +26,9 @@ def spelt_out(
             raise ScenarioError(f"unknown participant '{name}'.{did_you_mean(name, ports)}", path=path)
     outputs = [port.name for port in ports[one.participant] if port.causality == "output"]
     inputs = [port.name for port in ports[other.participant] if port.causality == "input"]
-    here, there = one.port.removesuffix("*"), other.port.removesuffix("*")
-    pairs = [(name, there + name.removeprefix(here)) for name in outputs if name.startswith(here)]
-    joined = [
+    prefix, other_prefix = one.port.removesuffix("*"), other.port.removesuffix("*")
+    pairs = [(name, other_prefix + name.removeprefix(prefix)) for name in outputs if name.startswith(prefix)]
+    connections = [
         connection.model_copy(
             update={
                 "source": one.model_copy(update={"port": source}),
@@ -39,10 +38,8 @@ def spelt_out(
         for source, target in pairs
         if target in inputs
     ]
-    if not joined:
-        lists = (
-            f"outputs of '{one.participant}': {', '.join(outputs) or 'none'}; inputs of"
-            f" '{other.participant}': {', '.join(inputs) or 'none'}"
-        )
-        raise ScenarioError(f"'{one} -> {other}' joins nothing ({lists})", path=path)
-    return tuple(joined)
+    if not connections:
+        names = f"outputs of '{one.participant}': {', '.join(outputs) or 'none'}"
+        names += f"; inputs of '{other.participant}': {', '.join(inputs) or 'none'}"
+        raise ScenarioError(f"'{one} -> {other}' connects nothing ({names})", path=path)
+    return tuple(connections)

@@ -1,1 +1,1 @@
-"""Sessions and hubs on other machines, and the process that holds a device for them."""
+"""Connections to hubs, also on other machines: to query their sessions, and to host a device for them."""

@@ -1,6 +1,4 @@
-"""A process that holds one device and stays: it joins a session, waits when the hub is gone, and joins again,
-also a later session.
-"""
+"""A process that hosts one device: it joins a session, and joins again when the hub returns."""
 
 from __future__ import annotations
 
@@ -35,12 +33,12 @@ __all__ = ["DeviceHost"]
 log = logging.getLogger(__name__)
 
 _RETRY_S = 0.5
-_LOOK_S = 0.2
-"""A wait that is this short can be interrupted on every system."""
+_POLL_S = 0.2
+"""A wait this short can be interrupted with Ctrl-C on every system."""
 
 
 class DeviceHost:
-    """Keeps one device open, and takes part with it in whatever run of its session there is."""
+    """Keeps one device open, and takes part with it in one run of a session after the other."""
 
     def __init__(
         self,
@@ -50,18 +48,17 @@ class DeviceHost:
         request: JoinRequest,
         directory: Path | None,
     ) -> None:
-        """Take the device's name, what opens a Zenoh session with the hub, and where relative paths start
-        (None: where the hub has them).
+        """Prepare a host.
 
-        `keys`: of the session to join, or of `*` for whatever the hub has.
+        Args:
+            name: Of the device.
+            connect: Opens a Zenoh session with the hub.
+            keys: Of the session to join, or of `*` for any session of the hub.
+            request: The request with which it joins.
+            directory: Where relative paths start; None: where they do for the hub.
         """
-        self._name, self._connect, self._keys, self._request, self._directory = (
-            name,
-            connect,
-            keys,
-            request,
-            directory,
-        )
+        self._name, self._connect, self._keys = name, connect, keys
+        self._request, self._directory = request, directory
         self._loop: DeviceThread | None = None
         self._held: tuple[Any, ...] = ()
         self._failure: ParticipantError | None = None
@@ -69,43 +66,43 @@ class DeviceHost:
         """The run is over: the hub is gone, or the device has failed."""
 
     def serve(self) -> None:
-        """Take part in one run after the other, for ever.
+        """Take part in one run after the other, until an error.
 
         Raises ConnectError or MessageError if the first one cannot be joined, and ParticipantError if the
         device fails.
         """
-        joined, told = False, ""
+        joined, logged = False, ""
         try:
             while True:
                 try:
                     with self._connect() as session:
                         reply = join_session(session, self._keys, self._request)
-                        joined, told = True, ""
+                        joined, logged = True, ""
                         self._take_part(session, reply)
                     log.warning(
-                        "device '%s': the hub is gone; nothing is written to it any more, and it joins again"
-                        " when the hub is back",
+                        "device '%s': lost the hub; the device receives nothing until the hub returns and it"
+                        " joins again",
                         self._name,
                     )
                 except (ConnectError, MessageError) as error:
                     if not joined:
                         raise
-                    if str(error) != told:
-                        told = str(error)
-                        log.info("device '%s' waits for the hub: %s", self._name, told)
+                    if str(error) != logged:
+                        logged = str(error)
+                        log.info("device '%s' waits for the hub: %s", self._name, logged)
                     sleep(_RETRY_S)
         finally:
             if self._loop is not None:
                 self._loop.close()
 
     def _take_part(self, session: zenoh.Session, reply: JoinReply) -> None:
-        """Go along with a run until it is over."""
+        """Take part in a run until it is over."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
         run = RunInfo(reply.plan, keys, reply.run, reply.admission)
         with ExitStack() as stack:
             gone = session.liveliness().declare_subscriber(
-                keys.alive("hub", "hub"), Callback(self._hub_came_or_went, indirect=True), history=True
+                keys.alive("hub", "hub"), Callback(self._on_hub, indirect=True), history=True
             )
             stack.callback(gone.undeclare)
             refused = session.declare_publisher(
@@ -115,7 +112,7 @@ class DeviceHost:
             try:
                 loop = self._device_loop(reply)
             except ParticipantError as error:
-                self._say(
+                self._ask(
                     session,
                     self._request.model_copy(update={"failed": f"{error.participant}: {error.cause}"}),
                 )
@@ -126,12 +123,12 @@ class DeviceHost:
             loop.attach(uplink)
             token = session.liveliness().declare_token(keys.alive("device", self._name))
             stack.callback(token.undeclare)
-            self._say(session, self._request.model_copy(update={"ready": True}))
+            self._ask(session, self._request.model_copy(update={"ready": True}))
             log.info("device '%s' takes part in session '%s'", self._name, keys.session)
-            while not self._over.wait(_LOOK_S):
+            while not self._over.wait(_POLL_S):
                 pass
             if self._failure is not None:
-                self._say(
+                self._ask(
                     session,
                     self._request.model_copy(
                         update={"failed": f"{self._failure.participant}: {self._failure.cause}"}
@@ -140,9 +137,7 @@ class DeviceHost:
                 raise self._failure
 
     def _device_loop(self, reply: JoinReply) -> DeviceThread:
-        """Return the loop of the device, which stays open from one run to the next unless the scenario wants
-        another one.
-        """
+        """Return the thread of the device: that of the last run, unless kind, parameters or period have changed."""
         planned, params = reply.plan.participants[self._name], reply.params[self._name]
         wanted = (planned.kind, params, planned.read_ns, reply.directory)
         if self._loop is None or self._held != wanted:
@@ -151,7 +146,7 @@ class DeviceHost:
             directory = self._directory or Path(reply.directory)
             device = make(planned.kind, self._name, params, directory)
             if not isinstance(device, Device):
-                raise ParticipantError(self._name, -1, f"'{planned.kind}' is no device here")
+                raise ParticipantError(self._name, -1, f"kind '{planned.kind}' is no device on this machine")
             if isinstance(device, RouterClient):
                 device.learn_hub(self._connect)
             self._loop, self._held = (
@@ -161,10 +156,10 @@ class DeviceHost:
             self._loop.start(directory)
         return self._loop
 
-    def _say(self, session: zenoh.Session, request: JoinRequest) -> None:
+    def _ask(self, session: zenoh.Session, request: JoinRequest) -> None:
         ask(session, self._keys.join(self._request.host), request, Empty)
 
-    def _hub_came_or_went(self, sample: zenoh.Sample) -> None:
+    def _on_hub(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:
             self._over.set()
 

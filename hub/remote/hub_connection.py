@@ -1,4 +1,4 @@
-"""Reaching a hub, on this machine or another one, and finding out why it cannot be reached."""
+"""Connecting to a hub, on this machine or another one, and finding out why that fails."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from schemas.errors import ConnectError
 
 __all__ = ["obstacle", "reach"]
 
-_PATIENCE_S = 3.0
+_TIMEOUT_S = 3.0
 
 _VERDICTS = {
     "UNKNOWN_CA": "is of another authority than the hub's",
     "CERTIFICATE_EXPIRED": "has expired, by the clock of the hub's machine",
     "BAD_CERTIFICATE": "is not valid, by the clock of the hub's machine",
 }
-"""What a hub says of a certificate that it does not accept, by what OpenSSL calls the alert."""
+"""Why a hub rejects a certificate, by OpenSSL's name of the alert."""
 
 
 def reach(
     endpoint: str, name: str, certificates: Path | None = None, *, mode: str = "client"
 ) -> zenoh.Session:
-    """Open a Zenoh session with the hub at `endpoint`: over loopback as it is, from another machine with the
-    certificate of `name`.
+    """Open a Zenoh session with the hub at `endpoint`; from another machine, with the certificate of `name`.
 
-    `mode`, Zenoh's, counts over loopback only: from elsewhere everything goes through the hub. Raises
-    ConnectError with what mends it.
+    `mode` is Zenoh's, and used on loopback only: from other machines everything goes through the hub. Raises
+    ConnectError, which says how to repair it.
     """
     host, port = address(endpoint)
     if is_loopback(endpoint):
@@ -44,18 +43,18 @@ def reach(
             if _answers(host, port):
                 raise
             raise ConnectError(
-                f"cannot reach the hub at {endpoint}: nobody listens there. Is it running? trocar ls shows"
-                " the sessions of this machine"
+                f"cannot reach the hub at {endpoint}: no process listens there. Is it running? trocar ls"
+                " shows the sessions of this machine"
             ) from error
     if not endpoint.startswith("tls/"):
         raise ConnectError(
             f"'{endpoint}': a hub on another machine is reached by TLS only: tls/{host}:{port}"
         )
     credentials = load(name, certificates)
-    whose = examine(credentials).name
-    if whose != name:
+    holder = examine(credentials).name
+    if holder != name:
         raise ConnectError(
-            f"{credentials.file} is the certificate of '{whose}', with which nobody can join as '{name}'"
+            f"{credentials.file} is the certificate of '{holder}'; to join as '{name}', use that of '{name}'"
         )
     try:
         session = open_session("client", connect=[endpoint], security=credentials.connecting())
@@ -64,80 +63,73 @@ def reach(
             f"cannot reach the hub at {endpoint}: {obstacle(host, port, credentials) or error}"
         ) from error
     names = {link.auth_identifier for link in session.info.links()}
-    # Zenoh also trusts the authorities of the web, none of which vouches for a name without a domain
+    # Zenoh also trusts the authorities of the web, which issue no certificates for names without a domain
     if names - {HUB}:
         session.close()
         raise ConnectError(
-            f"who answers at {endpoint} is no hub of the authority of {credentials.file}: it shows that of"
-            f" {', '.join(map(str, names))}"
+            f"the server at {endpoint} is no hub of the authority of {credentials.file}: it presents the"
+            f" certificate of {', '.join(map(str, names))}"
         )
     return session
 
 
 def obstacle(host: str, port: int, credentials: Credentials) -> str:
-    """Go the same way once more with Python's own TLS, which says what Zenoh does not; return what is in the
-    way, if anything.
-    """
+    """Return why a connection fails, or an empty string; Python's TLS gives the reason, unlike Zenoh."""
     context = ssl.create_default_context(cadata=credentials.authority)
     context.load_cert_chain(credentials.file)
     try:
         with (
-            socket.create_connection((host, port), _PATIENCE_S) as plain,
+            socket.create_connection((host, port), _TIMEOUT_S) as plain,
             context.wrap_socket(plain, server_hostname=host) as secure,
         ):
-            secure.recv(1)  # in TLS 1.3 the verdict on our certificate comes after the handshake
+            secure.recv(1)  # in TLS 1.3 the verdict on our certificate follows the handshake
     except ssl.SSLCertVerificationError as error:
-        return _verdict_on_hub(host, error, credentials)
+        return _problem_of_hub(host, error, credentials)
     except ssl.SSLError as error:
         reason = error.reason or str(error)
         verdict = next((words for alert, words in _VERDICTS.items() if alert in reason), "")
         if verdict:
             return (
                 f"the certificate {credentials.file} {verdict}. On the hub's machine: trocar certs issue"
-                f" {credentials.name}; then copy it here anew"
+                f" {credentials.name}; then copy it here again"
             )
         return (
-            f"who listens there does not speak TLS as a hub does ({reason}); start it with --listen"
+            f"the server there does not use TLS as a hub does ({reason}); start the hub with --listen"
             f" tls/0.0.0.0:{port}"
         )
     except socket.gaierror:
-        return (
-            f"'{host}' is no name that this machine knows; give the address instead, or mend the name service"
-        )
+        return f"this machine cannot resolve the name '{host}'; give the address instead"
     except ConnectionRefusedError:
-        return f"nobody listens there. Is it running, with --listen tls/0.0.0.0:{port}?"
+        return f"no process listens there. Is the hub running, with --listen tls/0.0.0.0:{port}?"
     except TimeoutError:
+        if _answers(host, port):
+            return ""
         return (
-            ""
-            if _answers(host, port)
-            else (
-                "nothing answers. Is the address right, and does the firewall of the hub's machine let TCP"
-                f" port {port} in?"
-            )
+            "no answer. Is the address right, and does the firewall of the hub's machine allow TCP port"
+            f" {port}?"
         )
     except OSError as error:
         return f"{error}"
     return ""
 
 
-def _verdict_on_hub(host: str, error: ssl.SSLCertVerificationError, credentials: Credentials) -> str:
+def _problem_of_hub(host: str, error: ssl.SSLCertVerificationError, credentials: Credentials) -> str:
     if "expired" in error.verify_message:
         return "its certificate has expired. On its machine: trocar certs renew"
     if "match" in error.verify_message:
         return (
-            f"its certificate is not for the name '{host}'. On its machine, trocar certs show tells the"
-            " names; to have others: trocar certs renew NAME ..."
+            f"its certificate is not for the name '{host}'. On its machine, trocar certs show lists the"
+            " names; to change them: trocar certs renew NAME ..."
         )
-    mends = f"on the hub's machine: trocar certs issue {credentials.name}; then copy it here anew"
     return (
-        f"its certificate is of another authority than {credentials.file} ({error.verify_message}). To mend"
-        f" it, {mends}"
+        f"its certificate is of another authority than {credentials.file} ({error.verify_message}). On the"
+        f" hub's machine: trocar certs issue {credentials.name}; then copy it here again"
     )
 
 
 def _answers(host: str, port: int) -> bool:
     try:
-        with socket.create_connection((host, port), _PATIENCE_S):
+        with socket.create_connection((host, port), _TIMEOUT_S):
             return True
     except OSError:
         return False

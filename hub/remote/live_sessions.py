@@ -1,4 +1,4 @@
-"""The sessions that are running now, as their hubs tell."""
+"""Queries to running sessions."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ __all__ = ["ask_about", "live_sessions"]
 
 R = TypeVar("R", bound=BaseModel)
 
-_OTHERS = ConnectError, MessageError, zenoh.ZError
-"""What comes of asking whoever is no hub."""
+_NO_HUB = ConnectError, MessageError, zenoh.ZError
+"""The errors of a query to a server that is no hub."""
 
 ANSWER_S = 2.0
 """A hub answers within a step; a paused one at once."""
@@ -34,13 +34,13 @@ ANSWER_S = 2.0
 def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) -> list[SessionStatus]:
     """Return the status of every session whose hub listens on one of `endpoints`.
 
-    On another machine that needs the certificate `observer`, which is looked for in `certificates`; raises
-    ConnectError if there is no hub. On this machine whoever else listens there is passed over.
+    A hub on another machine needs the certificate `observer`, which is read from `certificates`; raises
+    ConnectError if there is no such hub. On this machine, endpoints without a hub are ignored.
     """
     found: dict[str, SessionStatus] = {}
     for endpoint in endpoints:
         with (
-            suppress(*_OTHERS) if is_loopback(endpoint) else nullcontext(),
+            suppress(*_NO_HUB) if is_loopback(endpoint) else nullcontext(),
             reach(endpoint, OBSERVER, certificates) as session,
         ):
             found |= {status.session: status for status in _statuses(session)}
@@ -56,10 +56,19 @@ def ask_about(
     *,
     session: str | None = None,
 ) -> R:
-    """Ask the hub of the session that has `participant` (and is called `session`, if that is given)
-    something.
+    """Send a request to the hub of the session that has `participant`, and return the reply.
 
-    Raises ConnectError if there is none on these endpoints, and MessageError if it refuses.
+    Args:
+        participant: A participant of the session.
+        endpoints: Where hubs listen.
+        verb: The kind of request, as in its key.
+        request: The request.
+        reply_model: The model of the reply.
+        session: The name of the session, if several may have such a participant.
+
+    Raises:
+        ConnectError: There is no such session on these endpoints.
+        MessageError: The hub rejects the request.
     """
     seen: list[str] = []
     for endpoint in endpoints:
@@ -72,7 +81,7 @@ def ask_about(
                     return ask(client, Keys(status.session).control(verb), request, reply_model)
     where = f"session '{session}'" if session else "any session"
     raise ConnectError(
-        f"there is no '{participant}' in {where} that runs here; running: {', '.join(sorted(seen)) or 'none'}"
+        f"there is no '{participant}' in {where} of these hubs; running: {', '.join(sorted(seen)) or 'none'}"
     )
 
 

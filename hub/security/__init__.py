@@ -1,1 +1,1 @@
-"""Certificates, access rules, and the gate through which other machines join."""
+"""Certificates, access rules, and the gate through which other machines join a session."""

@@ -1,9 +1,8 @@
-"""Who may say and hear what from another machine: rules made of the plan, by which all that they do not name
-is refused.
+"""The access rules for other machines, generated from the plan: what they do not allow is denied.
 
 A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of it
-(egress). Whom it is for, the name in the certificate says. The hub's own machine, which reaches the gate by
-TCP over loopback, may do everything, as it may without a gate.
+(egress). It applies to a name in a certificate. The hub's own machine, which reaches the gate by TCP over
+loopback, may do everything, as without a gate.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ _ALL = (
 )
 
 _DEVICE_BYTES = 2**20
-"""What a device may say in one message: a colour image of 640 x 480 pixels fits in."""
+"""The largest message of a device: a colour image of 640 x 480 pixels fits."""
 
 _MOST_BYTES = 2**25
-"""What anybody may say in one message: Zenoh gathers its fragments before anybody looks at it."""
+"""The largest message of any client: Zenoh collects its fragments in memory before it applies the rules."""
 
 Rule = dict[str, Any]
 
@@ -41,11 +40,9 @@ Rule = dict[str, Any]
 def access_settings(
     plan: Plan, session: str, foreign: Mapping[str, Sequence[str]] | None = None
 ) -> dict[str, Any]:
-    """Return Zenoh's settings by which each remote participant of `plan` may do its part in `session`, and
-    nothing else.
+    """Return Zenoh's settings that allow each remote participant of `plan` its part in `session` only.
 
-    `foreign`: by the device, the keys that it shares with programs, which connect with the certificate
-    `console`.
+    `foreign`: by device, the keys that it shares with programs, which connect with the certificate `console`.
     """
     keys = Keys(session)
     rights = {
@@ -54,13 +51,13 @@ def access_settings(
         if planned.host.startswith("remote/")
     }
     # all that `trocar ls` needs
-    rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_asks(Keys("*").status), *_hears(keys.status)]
-    everything = ["**"]  # but what has a chunk that begins with @, as some foreign keys have
+    rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_query(Keys("*").status), *_subscribe(keys.status)]
+    everything = ["**"]  # does not match chunks that begin with @, as in some foreign keys
     for name, shared in (foreign or {}).items():
         everything += shared
-        for whose in (CONSOLE, name) if name in rights else (CONSOLE,):
-            rights[whose] = [*rights.get(whose, ()), _allow("both", _ALL, *shared)]
-    rules = {f"{name} {index}": rule for name, its in rights.items() for index, rule in enumerate(its)}
+        for holder in (CONSOLE, name) if name in rights else (CONSOLE,):
+            rights[holder] = [*rights.get(holder, ()), _allow("both", _ALL, *shared)]
+    rules = {f"{name} {index}": rule for name, own in rights.items() for index, rule in enumerate(own)}
     access = {
         "enabled": True,
         "default_permission": "deny",
@@ -75,8 +72,8 @@ def access_settings(
         "policies": [
             {"subjects": ["local"], "rules": ["local"]},
             *(
-                {"subjects": [name], "rules": [f"{name} {index}" for index in range(len(its))]}
-                for name, its in rights.items()
+                {"subjects": [name], "rules": [f"{name} {index}" for index in range(len(own))]}
+                for name, own in rights.items()
             ),
         ],
     }
@@ -89,45 +86,43 @@ def access_settings(
         "size_limit": _DEVICE_BYTES,
     }
     limits = {"low_pass_filter": [size], "transport/link/rx/max_message_size": _MOST_BYTES}
-    # who else is here, and at which address, is nobody's business
+    # a client must not learn the addresses of others
     return {"access_control": access, **limits, "scouting/gossip/enabled": False}
 
 
 def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
     """Return the rights of one remote participant."""
     name, role, hub = planned.name, planned.key_role, keys.alive("hub", "hub")
-    links = [
-        keys.output("engine", link.source, link.source_port)
-        for link in plan.connections
-        if link.target == name
-    ]
-    feeds = [_feed(plan, keys, outlet) for outlet in plan.to_devices if outlet.target == name]
-    heard = list(dict.fromkeys(links + feeds))
-    # as the hub does, to all participants at once
-    listens = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]
+    inputs = [
+        keys.output("engine", connection.source, connection.source_port)
+        for connection in plan.connections
+        if connection.target == name
+    ] + [_to_device(plan, keys, connection) for connection in plan.to_devices if connection.target == name]
+    # the hub subscribes to these of all participants at once
+    of_all = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]
     return [
         _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
-        _allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *listens),
+        _allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *of_all),
         _allow("ingress", ["liveliness_token"], keys.alive(role, name)),
-        *_asks(Keys("*").join(planned.host), keys.control("clock")),
-        *_hears(*heard, keys.link(name) if role == "device" else keys.grant),
+        *_query(Keys("*").join(planned.host), keys.control("clock")),
+        *_subscribe(*dict.fromkeys(inputs), keys.link(name) if role == "device" else keys.grant),
         _allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
         _allow("egress", ["liveliness_token"], hub),
     ]
 
 
-def _feed(plan: Plan, keys: Keys, outlet: ConnectionToDevice) -> str:
-    """Return the key on which a device gets what a connection brings."""
-    if plan.participants[outlet.source].port(outlet.source_port).variability == "event":
-        return keys.feed(outlet.source, outlet.source_port)
-    return keys.signals(outlet.source, outlet.target)
+def _to_device(plan: Plan, keys: Keys, connection: ConnectionToDevice) -> str:
+    """Return the key on which a device receives the values of a connection."""
+    if plan.participants[connection.source].port(connection.source_port).variability == "event":
+        return keys.feed(connection.source, connection.source_port)
+    return keys.signals(connection.source, connection.target)
 
 
-def _asks(*keys: str) -> list[Rule]:
+def _query(*keys: str) -> list[Rule]:
     return [_allow("ingress", ["query"], *keys), _allow("egress", ["reply", "declare_queryable"], *keys)]
 
 
-def _hears(*keys: str) -> list[Rule]:
+def _subscribe(*keys: str) -> list[Rule]:
     return [_allow("ingress", ["declare_subscriber"], *keys), _allow("egress", ["put"], *keys)]
 
 

@@ -1,7 +1,7 @@
-"""The authority of a hub: it makes the certificates by which hub and participants know each other
-(docs/decisions/0027-remote-hosts.md).
+"""The authority of a hub, which issues the certificates of the hub and of participants.
 
-Keys are of the elliptic curve P-256, which every TLS library has. Needs the extra `certs`.
+Keys are of the elliptic curve P-256, which every TLS library supports. Needs the extra `certs`. The design:
+docs/decisions/0027-remote-hosts.md.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ __all__ = ["found", "issue", "names_of_this_machine", "renew"]
 
 _AUTHORITY_DAYS = 3650
 _SKEW = timedelta(hours=1)
-"""Certificates are valid from that long ago: the clock of the other machine may be behind."""
+"""Certificates are valid from this time before now: the clock of the other machine may be behind."""
 
 
 def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
-    """Make an authority in `directory`, and the hub's certificate for the names and addresses `hosts`; return
-    the file of the latter.
+    """Create an authority in `directory`, and the hub's certificate for `hosts`; return the latter's file.
 
-    Raises ScenarioError if there is an authority already: what it has issued would be worth nothing.
+    `hosts`: names and addresses at which the hub is reached. Raises ScenarioError if there is an authority
+    already, as the certificates that it has issued would become useless.
     """
     key_file, certificate_file = directory / "ca.key", directory / "ca.pem"
     if key_file.exists() or certificate_file.exists():
         raise ScenarioError(
-            f"{directory} has an authority already, and the certificates in use are of it. For a new"
-            " certificate of the hub alone: trocar certs renew. To begin anew, move that directory away"
+            f"{directory} has an authority already, which issued the certificates in use. For a new"
+            " certificate of the hub alone: trocar certs renew. To start afresh, move that directory away"
         )
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
     key = ec.generate_private_key(ec.SECP256R1())
-    # longer ones are refused (RFC 5280, ub-common-name)
+    # longer ones are invalid (RFC 5280, ub-common-name)
     name = _named(f"Trocar authority {secrets.token_hex(4)} of {socket.gethostname()}"[:64])
     signs = dict.fromkeys(("key_cert_sign", "crl_sign"), True)
     other = (
@@ -74,44 +74,43 @@ def found(directory: Path, hosts: Sequence[str], days: float) -> Path:
 def renew(directory: Path, hosts: Sequence[str], days: float) -> Path:
     """Replace the hub's certificate, for `hosts` or (if empty) those of the present one; return its file.
 
-    Raises ConnectError if the present one says nothing about that: it is not there, or not valid any more.
+    Raises ConnectError if `hosts` is empty and there is no present one, or it is invalid.
     """
     if not hosts:
         try:
             hosts = examine(load(HUB, directory)).hosts
         except ConnectError as error:
             raise ConnectError(
-                "the hub's names cannot be taken from its present certificate; give them: trocar certs renew"
-                f" HOST ... ({error})"
+                "the names of the hub are unknown, as its certificate is missing or invalid; give them with"
+                f" trocar certs renew HOST ... ({error})"
             ) from error
     return _issue(directory, HUB, days, hosts)
 
 
 def issue(directory: Path, name: str, days: float) -> Path:
-    """Make a certificate for the participant `name`, `observer` or `console`, in place of an older one;
-    return its file, which is all the other machine needs.
+    """Create a certificate for the participant `name`, `observer` or `console`, and return its file.
 
-    Raises ScenarioError if nobody can have that name, ConnectError if `directory` has no authority.
+    The file is all that the other machine needs; it replaces an older one. Raises ScenarioError if the name
+    is invalid, ConnectError if `directory` has no authority.
     """
     if not valid_name(name) or name in (HUB, "ca"):
-        whose = (
-            f"the name of a participant that the scenario places with 'host: remote', '{OBSERVER}', or"
-            f" '{CONSOLE}' for ROS programs"
+        raise ScenarioError(
+            f"'{name}' cannot have a certificate: give the name of a participant with 'host: remote' in the"
+            f" scenario, '{OBSERVER}', or '{CONSOLE}' for ROS programs"
         )
-        raise ScenarioError(f"'{name}' cannot have a certificate: give {whose}")
     return _issue(directory, name, days)
 
 
 def names_of_this_machine() -> list[str]:
-    """Return the names and addresses by which other machines may reach this one."""
+    """Return the names and addresses at which other machines may reach this one."""
     names = {socket.gethostname(), socket.getfqdn(), "localhost"}
     with suppress(OSError):
         names |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None)}
     with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        # an address of nobody (RFC 5737): nothing is sent, only which of ours is on the way there is wanted
+        # an address for documentation (RFC 5737): nothing is sent; the system chooses our own address
         probe.connect(("192.0.2.1", 9))
         names.add(probe.getsockname()[0])
-    # an address that holds for one network card only
+    # with % it is valid for one network card only
     return sorted(name for name in names if "%" not in name)
 
 
@@ -140,7 +139,7 @@ def _authority(directory: Path) -> tuple[ec.EllipticCurvePrivateKey, x509.Certif
         certificate = x509.load_pem_x509_certificate((directory / "ca.pem").read_bytes())
     except (OSError, ValueError) as error:
         raise ConnectError(
-            f"{directory} has no authority that can be read ({error}). To make one, on the hub's machine:"
+            f"{directory} has no authority that can be read ({error}). To create one, on the hub's machine:"
             " trocar certs init"
         ) from error
     if not isinstance(key, ec.EllipticCurvePrivateKey) or certificate.public_key() != key.public_key():

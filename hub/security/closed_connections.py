@@ -1,5 +1,6 @@
-"""From where TCP connections came that have ended: Linux tells it of every one (sock_diag(7),
-linux/inet_diag.h), to whoever asks.
+"""The remote addresses of TCP connections that have closed, as Linux reports them.
+
+See sock_diag(7) and linux/inet_diag.h.
 """
 
 from __future__ import annotations
@@ -10,45 +11,45 @@ import struct
 from collections.abc import Collection, Iterator
 from ipaddress import ip_address
 
-__all__ = ["ended_connections"]
+__all__ = ["closed_connections"]
 
 _SOCK_DIAG = 4
 _TCP_DESTROY = 1 << 0
 """The group SKNLGRP_INET_TCP_DESTROY, as a bit of the address."""
 
 _FAMILY, _PORTS, _SOURCE_BYTES, _TARGET_BYTES = 16, struct.Struct(">HH"), 24, 40
-"""Offsets behind the header of 16 bytes: struct inet_diag_msg begins with the family, its sockid with both
-ports and both addresses.
+"""Offsets behind the header of 16 bytes.
+
+struct inet_diag_msg begins with the family, its sockid with both ports and both addresses.
 """
 
 
-def ended_connections(ports: Collection[int], look_s: float) -> Iterator[str | None]:
-    """Yield address and port of the other end of each connection to one of this machine's `ports` that has
-    ended.
+def closed_connections(ports: Collection[int], look_s: float) -> Iterator[str | None]:
+    """Yield the remote address and port of each connection to one of this machine's `ports` that has closed.
 
-    Yields None whenever none has for `look_s`. Raises OSError where the system does not tell it: on any but
-    Linux, or without its module inet_diag.
+    Yields None whenever none has for `look_s` seconds. Raises OSError where the system does not report it: on
+    other systems than Linux, or without its module inet_diag.
     """
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, _SOCK_DIAG) as told:
-        told.bind((0, _TCP_DESTROY))
-        told.settimeout(look_s)
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, _SOCK_DIAG) as reports:
+        reports.bind((0, _TCP_DESTROY))
+        reports.settimeout(look_s)
         while True:
             try:
-                message = told.recv(4096)
+                message = reports.recv(4096)
             except TimeoutError:
                 yield None
                 continue
             except OSError as error:
-                if error.errno == errno.ENOBUFS:  # more than it could keep for us
+                if error.errno == errno.ENOBUFS:  # more reports than fit into the buffer of the socket
                     continue
                 raise
             port, other_port = _PORTS.unpack_from(message, _SOURCE_BYTES - _PORTS.size)
-            if port in ports and other_port:  # the listener itself has no other end
+            if port in ports and other_port:  # the listening socket itself has no remote port
                 length = 4 if message[_FAMILY] == socket.AF_INET else 16
-                yield f"{_written(message[_TARGET_BYTES : _TARGET_BYTES + length])}:{other_port}"
+                yield f"{_as_text(message[_TARGET_BYTES : _TARGET_BYTES + length])}:{other_port}"
 
 
-def _written(address: bytes) -> str:
+def _as_text(address: bytes) -> str:
     ip = ip_address(address)
     if ip.version == 4:
         return str(ip)

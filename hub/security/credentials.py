@@ -1,6 +1,4 @@
-"""Who this machine is to another one: a key, the certificate of it and the authority that both sides trust,
-together in one PEM file.
-"""
+"""The identity of this machine: one PEM file with a key, its certificate, and the authority of both sides."""
 
 from __future__ import annotations
 
@@ -23,12 +21,13 @@ HUB = "hub"
 """Name of the certificate with which a hub listens."""
 
 CONSOLE = "console"
-"""Name of the certificate with which programs reach the devices of a session that share keys with them, such
-as gateways to ROS, and nothing else.
+"""Name of the certificate of programs that share keys with devices of a session, such as gateways to ROS.
+
+It gives access to those keys and nothing else.
 """
 
 OBSERVER = "observer"
-"""Name of the certificate with which anybody may read the status of a session, and nothing else."""
+"""Name of the certificate that gives access to the status of a session, and nothing else."""
 
 _KEY = re.compile("-----BEGIN PRIVATE KEY-----.*?-----END PRIVATE KEY-----\n", re.DOTALL)
 _CERTIFICATE = re.compile("-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----\n", re.DOTALL)
@@ -45,18 +44,17 @@ class Credentials:
 
     @property
     def name(self) -> str:
-        """Whom the certificate names: a participant, `hub`, `observer` or `console`."""
+        """The name in the certificate: a participant, `hub`, `observer` or `console`."""
         return self.file.stem
 
     def listening(self) -> dict[str, Any]:
-        """Return Zenoh's settings with which a hub demands a certificate of whoever connects, and hangs up
-        when it expires.
-        """
+        """Return Zenoh's settings for a hub, which demands a certificate, and disconnects when it expires."""
         return self._settings("listen") | {"transport/link/tls/close_link_on_expiration": True}
 
     def connecting(self) -> dict[str, Any]:
-        """Return Zenoh's settings with which to reach a hub that has a certificate of the same authority for
-        the name in the endpoint.
+        """Return Zenoh's settings for a client.
+
+        The hub must have a certificate of the same authority, for the name in the endpoint.
         """
         return self._settings("connect") | {"transport/link/tls/verify_name_on_connect": True}
 
@@ -75,30 +73,30 @@ class Credentials:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What a valid certificate says."""
+    """The contents of a valid certificate."""
 
     name: str
     until: datetime
     hosts: tuple[str, ...]
-    """The names and addresses by which a hub may be reached."""
+    """The names and addresses at which a hub may be reached."""
 
 
 def default_directory() -> Path:
-    """Return where certificates are looked for: `~/.config/trocar/certs`, on Windows `trocar/certs` in
-    `%APPDATA%`.
+    """Return this user's directory of certificates.
+
+    `~/.config/trocar/certs`, or on Windows `trocar/certs` in `%APPDATA%`.
     """
     return Path(typer.get_app_dir("trocar")) / "certs"
 
 
 def load(name: str, where: Path | None = None) -> Credentials:
-    """Return the credentials called `name` of a directory, or those of a file; by default of this user's
-    directory.
+    """Return the credentials in the file `where`, or those called `name` in the directory `where`.
 
-    Raises ConnectError if there are none or the file is something else.
+    `where` is by default this user's directory. Raises ConnectError if the file is missing or is another one.
     """
     place = default_directory() if where is None else where
     file = place if place.is_file() else place / f"{name}.pem"
-    mends = (
+    remedy = (
         "trocar certs init"
         if name == HUB
         else f"trocar certs issue {name}, on the hub's machine; then copy the file that it names to {place}"
@@ -107,27 +105,26 @@ def load(name: str, where: Path | None = None) -> Credentials:
         text = file.read_text(encoding="ascii")
     except FileNotFoundError as error:
         raise ConnectError(
-            f"there is no certificate {file}, without which nothing goes from machine to machine. To make it:"
-            f" {mends}"
+            f"there is no certificate {file}, which connections between machines need. To create it: {remedy}"
         ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConnectError(f"the certificate {file} cannot be read: {error}") from error
     keys, certificates = _KEY.findall(text), _CERTIFICATE.findall(text)
     if (len(keys), len(certificates)) != (1, 2):
         raise ConnectError(
-            f"{file} is no file of `trocar certs`, which hold a key, its certificate and its authority. To"
-            f" make one: {mends}"
+            f"{file} is no file of `trocar certs`, which have a key, its certificate and its authority. To"
+            f" create one: {remedy}"
         )
     return Credentials(file, keys[0], *certificates)
 
 
 def examine(credentials: Credentials) -> Certificate:
-    """Return what a certificate says, after showing it to its authority as a connection would.
+    """Return the contents of a certificate, verified against its authority as in a connection.
 
     Raises ConnectError if it has expired, is of another authority, or does not belong to its key.
     """
     try:
-        shown = _shown_to_authority(credentials)
+        verified = _verified(credentials)
     except ssl.SSLError as error:
         reason = (
             error.verify_message
@@ -136,28 +133,29 @@ def examine(credentials: Credentials) -> Certificate:
         )
         again = "renew" if credentials.name == HUB else f"issue {credentials.name}"
         raise ConnectError(
-            f"{credentials.file} is not valid: {reason}. To mend it, on the hub's machine: trocar certs"
+            f"{credentials.file} is not valid: {reason}. To replace it, on the hub's machine: trocar certs"
             f" {again}"
         ) from error
-    subject: dict[str, str] = {key: value for ((key, value),) in shown["subject"]}
-    until = datetime.fromtimestamp(ssl.cert_time_to_seconds(shown["notAfter"]), UTC)
+    subject: dict[str, str] = {key: value for ((key, value),) in verified["subject"]}
+    until = datetime.fromtimestamp(ssl.cert_time_to_seconds(verified["notAfter"]), UTC)
     return Certificate(
-        subject["commonName"], until, tuple(value for _, value in shown.get("subjectAltName", ()))
+        subject["commonName"], until, tuple(value for _, value in verified.get("subjectAltName", ()))
     )
 
 
-def _shown_to_authority(credentials: Credentials) -> dict[str, Any]:
-    """Return the certificate as the other side of a connection sees it, from a handshake in memory; raises
-    SSLError if it is refused.
+def _verified(credentials: Credentials) -> dict[str, Any]:
+    """Return the certificate as the other side of a connection sees it, from a handshake in memory.
+
+    Raises SSLError if the other side rejects it.
     """
     contexts = {side: ssl.SSLContext(side) for side in (ssl.PROTOCOL_TLS_SERVER, ssl.PROTOCOL_TLS_CLIENT)}
     for context in contexts.values():
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     contexts[ssl.PROTOCOL_TLS_SERVER].load_cert_chain(credentials.file)
     contexts[ssl.PROTOCOL_TLS_CLIENT].load_cert_chain(credentials.file)
-    judge = ssl.PROTOCOL_TLS_CLIENT if credentials.name == HUB else ssl.PROTOCOL_TLS_SERVER
-    contexts[judge].verify_mode = ssl.CERT_REQUIRED
-    contexts[judge].load_verify_locations(cadata=credentials.authority)
+    verifier = ssl.PROTOCOL_TLS_CLIENT if credentials.name == HUB else ssl.PROTOCOL_TLS_SERVER
+    contexts[verifier].verify_mode = ssl.CERT_REQUIRED
+    contexts[verifier].load_verify_locations(cadata=credentials.authority)
     to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
     ends = {
         ssl.PROTOCOL_TLS_CLIENT: contexts[ssl.PROTOCOL_TLS_CLIENT].wrap_bio(to_client, to_server),
@@ -169,7 +167,7 @@ def _shown_to_authority(credentials: Credentials) -> dict[str, Any]:
         for end in ends.values():
             with suppress(ssl.SSLWantReadError):
                 end.do_handshake()
-    shown = ends[judge].getpeercert()
-    if not shown:
-        raise ssl.SSLError("the handshake did not come to its end")
-    return dict(shown)
+    certificate = ends[verifier].getpeercert()
+    if not certificate:
+        raise ssl.SSLError("the handshake did not finish")
+    return dict(certificate)

@@ -1,7 +1,8 @@
-"""The gate of a hub: the one process that listens to other machines (docs/decisions/0027-remote-hosts.md).
+"""The gate of a hub: the only process that listens to other machines.
 
-It shows them the hub's certificate, demands theirs and holds them to the access rules. What it lets through
-goes to the hub's router over loopback; what it refuses, it tells the hub, which logs it.
+It presents the hub's certificate, demands theirs and applies the access rules. It forwards what they allow to
+the hub's router over loopback, and reports what they deny to the hub, which logs it. The design:
+docs/decisions/0027-remote-hosts.md.
 """
 
 from __future__ import annotations
@@ -22,18 +23,21 @@ __all__ = ["OPEN", "Gate"]
 log = logging.getLogger(__name__)
 
 OPEN = "open"
-"""What the process says once it listens."""
+"""The first line of the process once it listens."""
 
-_END_S = 3.0
-_AGAIN_S = 1.0
+_STOP_S = 3.0
+_RETRY_S = 1.0
 
 
 class Gate:
-    """The gate as its hub has it."""
+    """The gate, from the side of its hub."""
 
     def __init__(self, endpoints: Sequence[str], security: Mapping[str, Any]) -> None:
-        """`endpoints`: where to listen, such as tls/0.0.0.0:7447; `security`: Zenoh's settings of TLS and of
-        access.
+        """Prepare a gate.
+
+        Args:
+            endpoints: Where to listen, such as tls/0.0.0.0:7447.
+            security: Zenoh's settings of TLS and of access.
         """
         self.endpoints = list(endpoints)
         self._security = dict(security)
@@ -42,7 +46,7 @@ class Gate:
         self._reader: threading.Thread | None = None
 
     def open(self, hub: str) -> None:
-        """Start the process, before the hub that listens at `hub`; raises ConnectError if it cannot listen."""
+        """Start the process for the hub at the endpoint `hub`; raises ConnectError if it cannot listen."""
         self._hub = hub
         self._process = self._start()
         self._reader = threading.Thread(target=self._read, name="gate", daemon=True)
@@ -54,7 +58,7 @@ class Gate:
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )
-        orders, answers = _ends(process)
+        orders, answers = _pipes(process)
         orders.write(
             json.dumps({"listen": self.endpoints, "connect": [self._hub], "security": self._security}) + "\n"
         )
@@ -68,23 +72,21 @@ class Gate:
         return process
 
     def _read(self) -> None:
-        """Log what the process tells; start it again if it ends by itself: its clients come back by
-        themselves.
-        """
+        """Log the reports of the process, and restart it if it ends; its clients then reconnect."""
         while True:
-            answers = _ends(self._process)[1]
+            answers = _pipes(self._process)[1]
             for line in answers:
                 level, _, message = line.rstrip().partition(" ")
                 log.log(int(level), "gate: %s", message)
             if self._closing.is_set():
                 return
-            log.error("the gate ended with exit code %s; opening it again", _end(self._process))
+            log.error("the gate ended with exit code %s; restarting it", _stop(self._process))
             answers.close()
-            while not self._start_again():
-                if self._closing.wait(_AGAIN_S):
+            while not self._restart():
+                if self._closing.wait(_RETRY_S):
                     return
 
-    def _start_again(self) -> bool:
+    def _restart(self) -> bool:
         with self._starting:
             if self._closing.is_set():
                 return False
@@ -96,29 +98,29 @@ class Gate:
             return True
 
     def close(self) -> None:
-        """End the process, if it was started: with its input, or by force."""
+        """Stop the process, if it was started."""
         if self._reader is None:
             return
         with self._starting:
             self._closing.set()
-        _end(self._process)
+        _stop(self._process)
         self._reader.join()
-        _ends(self._process)[1].close()
+        _pipes(self._process)[1].close()
 
 
-def _end(process: subprocess.Popen[str]) -> int:
-    """End a process, with its input or by force; return its exit code."""
+def _stop(process: subprocess.Popen[str]) -> int:
+    """Stop a process by closing its input, or by force; return its exit code."""
     with suppress(BrokenPipeError):
-        _ends(process)[0].close()
+        _pipes(process)[0].close()
     try:
-        return process.wait(_END_S)
+        return process.wait(_STOP_S)
     except subprocess.TimeoutExpired:
         process.kill()
         return process.wait()
 
 
-def _ends(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:
-    """Return where to write to a process and where to read what it writes."""
+def _pipes(process: subprocess.Popen[str]) -> tuple[IO[str], IO[str]]:
+    """Return the input and the output of a process."""
     if process.stdin is None or process.stdout is None:
-        raise ValueError("a gate is started with pipes at both ends")
+        raise ValueError("the process of a gate needs pipes as input and output")
     return process.stdin, process.stdout

@@ -1,7 +1,7 @@
-"""What Zenoh's log says of who came to the gate and what was refused to them, in our words.
+"""Reads from Zenoh's log who connects to the gate and what is denied to them.
 
-Written after the lines of Zenoh 1.10: an access rule that refuses says so at level trace alone, and a
-handshake that fails does not say with whom.
+Written for the log lines of Zenoh 1.10: a denial by an access rule appears at level trace only, and the line
+of a failed handshake does not name the client.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
-__all__ = ["LISTENED_TO", "GateLog"]
+__all__ = ["LOG_FILTER", "GateLog"]
 
-LISTENED_TO = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace"
-"""What of Zenoh's log is needed, as `RUST_LOG` has it."""
+LOG_FILTER = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace"
+"""The part of Zenoh's log that is needed, in the syntax of `RUST_LOG`."""
 
-Told = tuple[int, str]
+Report = tuple[int, str]
 """Level of `logging`, and message."""
 
-_MOST_TOLD = 20
-"""So many refusals are told of one connection: a flood must not become one of the hub's log."""
+_MOST_REPORTS = 20
+"""Denials that are reported of one connection, so that a client cannot flood the hub's log."""
 
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m|[\x00-\x1f\x7f-\x9f]")
-"""And whatever else a terminal might obey, as keys come from strangers."""
-_CAME = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. Common Name: (?P<name>.*)\.$")
+_CONTROL = re.compile(r"\x1b\[[0-9;]*m|[\x00-\x1f\x7f-\x9f]")
+"""Colours, and all other control characters: a key is the client's text, and might command a terminal."""
+_CONNECTED = re.compile(r"Accepted TLS connection on \S+: (?P<address>\S+)\. Common Name: (?P<name>.*)\.$")
 _FAILED = re.compile(r" WARN .*zenoh_link_tls\S*: (?P<reason>.*?)(\. Hint: .*)?$")
 _LIST = re.compile(r"(?P<thread>ThreadId\(\d+\)).* ACL \(\w+\): caching permissions for `(?P<key>.*)`")
 _VERDICT = re.compile(
@@ -44,15 +44,13 @@ _REASONS = {
     "alert: BadCertificate": "it does not accept the hub's certificate",
     "alert: CertificateUnknown": "it does not accept the hub's certificate",
     "extended key usage": "its certificate is not that of a participant",
-    "handshake eof": "it hung up",
+    "handshake eof": "it closed the connection",
 }
 
 
 @dataclass
 class _List:
-    """The verdicts that Zenoh passes beforehand on every kind of message in both directions, as soon as
-    somebody at the other end names a key.
-    """
+    """The verdicts that Zenoh computes in advance, for every kind of message, when a client names a key."""
 
     key: str
     peer: str = ""
@@ -62,24 +60,24 @@ class _List:
 
 
 class GateLog:
-    """Reads Zenoh's log line by line."""
+    """Turns the lines of Zenoh's log into reports."""
 
     def __init__(self, known: Collection[str]) -> None:
-        """`known`: the names in certificates for which there are access rules."""
+        """Start reading; `known` are the names in certificates that have access rules."""
         self._known = known
         self._addresses: dict[str, str] = {}
-        self._let_in: set[str] = set()
+        self._accepted: set[str] = set()
         self._names: dict[str, str] = {}
         self._lists: dict[str, _List] = {}
-        self._told: dict[str, set[str]] = {}
+        self._reported: dict[str, set[str]] = {}
 
-    def read(self, line: str) -> Iterator[Told]:
-        """Yield what is to be told after a line."""
-        if not self._lists and " is authorized " in line:  # nearly all lines are of this kind
+    def read(self, line: str) -> Iterator[Report]:
+        """Yield the reports that follow from a line."""
+        if not self._lists and " is authorized " in line:  # fast path: most lines are of this kind
             return
-        text = _COLOUR.sub("", line.rstrip())
-        if came := _CAME.search(text):
-            yield self._greet(came["name"], came["address"])
+        text = _CONTROL.sub("", line.rstrip())
+        if connected := _CONNECTED.search(text):
+            yield self._accept(connected["name"], connected["address"])
         elif failed := _FAILED.search(text):
             reason = next(
                 (words for sign, words in _REASONS.items() if sign in failed["reason"]), failed["reason"]
@@ -92,29 +90,29 @@ class GateLog:
         elif verdict := _VERDICT.search(text):
             yield from self._judge(verdict)
 
-    def ended(self, address: str) -> Iterator[Told]:
-        """Yield what is to be told when a connection from `address` has ended."""
-        if address in self._let_in:
-            self._let_in.discard(address)
+    def closed(self, address: str) -> Iterator[Report]:
+        """Yield the reports when a connection from `address` has closed."""
+        if address in self._accepted:
+            self._accepted.discard(address)
         else:
-            yield logging.WARNING, f"the connection from {address} was not let in"
+            yield logging.WARNING, f"the connection from {address} was not accepted"
 
-    def _greet(self, name: str, address: str) -> Told:
+    def _accept(self, name: str, address: str) -> Report:
         self._addresses[name] = address
-        self._let_in.add(address)
-        self._told.pop(name, None)
+        self._accepted.add(address)
+        self._reported.pop(name, None)
         if name in self._known:
             return logging.INFO, f"'{name}' connects from {address}"
         return (
             logging.WARNING,
             (
                 f"'{name}' connects from {address}, but no remote participant of this session has that name:"
-                " it gets nothing"
+                " it has no rights"
             ),
         )
 
-    def _judge(self, verdict: re.Match[str]) -> Iterator[Told]:
-        """Tell of a refusal, unless it stands in a list."""
+    def _judge(self, verdict: re.Match[str]) -> Iterator[Report]:
+        """Yield the report of a denial, unless it belongs to a list."""
         if named := _NAME.search(verdict["subject"] or ""):
             self._names[verdict["peer"]] = named[1]
         refused = verdict["verdict"] == "unauthorized"
@@ -128,21 +126,21 @@ class GateLog:
             return
         yield from self._close_list(verdict["thread"])
         if refused and verdict["flow"] == "ingress":
-            yield from self._tell(verdict["peer"], f"{verdict['deed'].lower()} on {verdict['key']}")
+            yield from self._report(verdict["peer"], f"{verdict['deed'].lower()} on {verdict['key']}")
 
-    def _close_list(self, thread: str) -> Iterator[Told]:
-        """Tell of a key that was named by somebody who may do nothing with it, neither speak nor hear."""
+    def _close_list(self, thread: str) -> Iterator[Report]:
+        """End a list, and report its key if the client may neither publish nor receive anything on it."""
         listed = self._lists.pop(thread, None)
         if listed is not None and listed.nothing_allowed and listed.peer in self._names:
-            yield from self._tell(listed.peer, f"say or hear anything on {listed.key}")
+            yield from self._report(listed.peer, f"publish or receive anything on {listed.key}")
 
-    def _tell(self, peer: str, deed: str) -> Iterator[Told]:
-        name = self._names.get(peer, "somebody without a name")
-        told = self._told.setdefault(name, set())
-        if deed in told or len(told) > _MOST_TOLD:
+    def _report(self, peer: str, deed: str) -> Iterator[Report]:
+        name = self._names.get(peer, "a client without a name")
+        reported = self._reported.setdefault(name, set())
+        if deed in reported or len(reported) > _MOST_REPORTS:
             return
-        told.add(deed)
-        more = "; what else is refused to it is not told any more" if len(told) > _MOST_TOLD else ""
+        reported.add(deed)
+        more = "; further refusals are not reported" if len(reported) > _MOST_REPORTS else ""
         yield (
             logging.WARNING,
             f"refused to '{name}' at {self._addresses.get(name, 'an unknown address')}: to {deed}{more}",

@@ -1,5 +1,6 @@
-"""The process of a gate: `python -P -m hub.security.gate_process`; what it is to do it reads from its input,
-and it ends when that ends.
+"""The process of a gate, `python -P -m hub.security.gate_process`.
+
+It reads its settings from the first line of its input, and ends when the input is closed.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from typing import Any, TextIO
 
 import zenoh
 
-from hub.security.closed_connections import ended_connections
+from hub.security.closed_connections import closed_connections
 from hub.security.gate import OPEN
-from hub.security.gate_log import LISTENED_TO, GateLog
+from hub.security.gate_log import LOG_FILTER, GateLog
 from hub.transport.endpoints import address
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
@@ -27,18 +28,17 @@ from schemas.errors import ConnectError
 __all__ = ["main"]
 
 _MOST_PER_SECOND = 200
-"""So much is told of whoever knocks, however often."""
+"""Lines that are reported to the hub, however often clients try to connect."""
 
 _LATER_S = 0.3
-"""That a connection has ended may be known before the line of the log is read which says that it was let in.
-"""
+"""The report that a connection has closed may be read before the log line that it was accepted."""
 
 
 def main() -> None:
-    """Keep a gate open until the end of the input; exit code 1 if it cannot be opened."""
+    """Run a gate until the input is closed; exit code 1 if it cannot listen."""
     orders: dict[str, Any] = json.loads(sys.stdin.readline())
-    answers, zenohs_log = _parted_outputs()
-    os.environ["RUST_LOG"] = LISTENED_TO
+    answers, zenohs_log = _split_outputs()
+    os.environ["RUST_LOG"] = LOG_FILTER
     zenoh.init_log_from_env_or("error")
     security = orders["security"]
     try:
@@ -54,59 +54,57 @@ def main() -> None:
         for subject in security["access_control"]["subjects"]
         for name in subject.get("cert_common_names", ())
     ]
-    gate_log, tell = GateLog(known), _Telling(answers)
+    gate_log, report = GateLog(known), _Reporter(answers)
     ports = {address(endpoint)[1] for endpoint in orders["listen"]}
-    for task in (lambda: _read(zenohs_log, gate_log, tell), lambda: _look(ports, gate_log, tell)):
+    for task in (lambda: _read(zenohs_log, gate_log, report), lambda: _watch(ports, gate_log, report)):
         threading.Thread(target=task, daemon=True).start()
     with session:
         sys.stdin.read()
 
 
-def _parted_outputs() -> tuple[TextIO, TextIO]:
-    """Return the output of this process to write to, and to read what Zenoh believes to write to it: its log
-    always goes there.
-    """
+def _split_outputs() -> tuple[TextIO, TextIO]:
+    """Return this process' output, and a pipe with the log of Zenoh, which it always writes to the output."""
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
     reading, writing = os.pipe()
     os.dup2(writing, sys.stdout.fileno())
     return answers, os.fdopen(reading, encoding="utf-8", errors="replace")
 
 
-class _Telling:
-    """Tells the hub, but not more than so much in a second."""
+class _Reporter:
+    """Reports to the hub, at most `_MOST_PER_SECOND` lines in a second."""
 
     def __init__(self, answers: TextIO) -> None:
         self._answers = answers
         self._lock = threading.Lock()
         self._second = self._count = 0
 
-    def __call__(self, told: Iterable[tuple[int, str]]) -> None:
-        for level, message in told:
+    def __call__(self, reports: Iterable[tuple[int, str]]) -> None:
+        for level, message in reports:
             with self._lock:
                 now = int(monotonic())
                 self._second, self._count = now, self._count + 1 if now == self._second else 1
                 if self._count < _MOST_PER_SECOND:
                     self._answers.write(f"{level} {message}\n")
                 elif self._count == _MOST_PER_SECOND:
-                    self._answers.write(f"{logging.WARNING} there is more in this second than is told\n")
+                    self._answers.write(f"{logging.WARNING} more reports in this second are left out\n")
 
 
-_Tell = Callable[[Iterable[tuple[int, str]]], None]
+_Report = Callable[[Iterable[tuple[int, str]]], None]
 
 
-def _read(zenohs_log: TextIO, gate_log: GateLog, tell: _Tell) -> None:
+def _read(zenohs_log: TextIO, gate_log: GateLog, report: _Report) -> None:
     for line in zenohs_log:
-        tell(gate_log.read(line))
+        report(gate_log.read(line))
 
 
-def _look(ports: set[int], gate_log: GateLog, tell: _Tell) -> None:
-    ended: deque[tuple[float, str]] = deque()
-    with suppress(OSError, AttributeError):  # a system that does not tell it; one without such sockets
-        for other in ended_connections(ports, _LATER_S):
+def _watch(ports: set[int], gate_log: GateLog, report: _Report) -> None:
+    closed: deque[tuple[float, str]] = deque()
+    with suppress(OSError, AttributeError):  # a system that does not report it, or without such sockets
+        for other in closed_connections(ports, _LATER_S):
             if other is not None:
-                ended.append((monotonic() + _LATER_S, other))
-            while ended and ended[0][0] <= monotonic():
-                tell(gate_log.ended(ended.popleft()[1]))
+                closed.append((monotonic() + _LATER_S, other))
+            while closed and closed[0][0] <= monotonic():
+                report(gate_log.closed(closed.popleft()[1]))
 
 
 if __name__ == "__main__":

@@ -12,10 +12,10 @@ from typing import Any
 
 from hub.participant import Device, Params, Stepped
 from hub.planning import registry
-from hub.planning.file_hashes import file_hashes
 from hub.planning.plan import Plan
 from hub.planning.scenario_file import ScenarioFile
 from hub.planning.wiring import make_plan
+from hub.recording.file_hashes import file_hashes
 from hub.security.access import access_settings
 from hub.security.credentials import HUB, examine, load
 from hub.security.gate import Gate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from time import monotonic, sleep
 
-from hub.planning.bond_check import check_bonds
+from hub.planning.bonds import check_bonds
 from hub.session.run import Run, SessionSpec
 from schemas.errors import SessionError
 

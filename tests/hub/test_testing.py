@@ -408,7 +408,7 @@ class Plain(Good):
         return state_hash(self.x)
 
 
-def test_a_device_that_follows_the_clock_is_told_and_says_the_same_again():
+def test_a_device_in_simulated_time_returns_the_same_samples_again():
     chance = random.Random(1)
 
     class Fickle(Pen):
@@ -416,6 +416,6 @@ def test_a_device_that_follows_the_clock_is_told_and_says_the_same_again():
             return super().sample(t + chance.randrange(2), port, frame)
 
     with pytest.raises(
-        AssertionError, match="says the same when it is told the same, but two instances differ"
+        AssertionError, match="the same samples for the same inputs, but two instances differ"
     ):
         check_device(Fickle)

@@ -88,7 +88,7 @@ def test_check_shows_the_wiring_of_a_good_scenario(trocar, pendulum, tmp_path):
     file.write_text(SCENARIO.replace("gaol", "goal"))
     code, out, _ = trocar("check", file, "--json")
     assert code == 0
-    assert {(link["source"], link["target"]) for link in json.loads(out)["links"]} == {("one", "two")}
+    assert {(link["source"], link["target"]) for link in json.loads(out)["connections"]} == {("one", "two")}
     code, out, err = trocar("check", file, "--set", "step=2 ms")
     assert (code, out) == (0, "")
     assert "valid" in err
@@ -98,6 +98,15 @@ def test_check_shows_the_wiring_of_a_good_scenario(trocar, pendulum, tmp_path):
 def test_every_installed_scenario_is_valid(trocar, name):
     code, _, err = trocar("check", name)
     assert code == 0, err
+
+
+def test_a_log_that_is_no_terminal_has_one_line_for_each_message():
+    old = ["--set", "participants.stylus.link.delay=3 ms"]
+    command = [sys.executable, "-P", "-m", "hub.command_line", "check", "palpation", *old]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    (warning,) = [line for line in ran.stderr.splitlines() if "link" in line and "WARNING" in line]
+    assert warning.endswith("'link' is now 'network_link'; this release still accepts the old name")
+    assert ran.stderr.count("network_link") == 1
 
 
 def test_every_installed_scenario_names_its_schema():

@@ -83,8 +83,7 @@ def test_a_name_that_is_taken_stays_with_its_owner(command_line, install_plugin,
     install_plugin("scales", {"trocar.commands": {"check": "scales:app"}}, text=SCALES)
     plugins.mount(command_line)
     assert (
-        "command 'check' of 'scales' (scales:app) is left out: there is another command of that name"
-        in caplog.text
+        "command 'check' of 'scales' (scales:app) is left out: another command has that name" in caplog.text
     )
     assert run(command_line, "check").stdout == "checked\n"
 

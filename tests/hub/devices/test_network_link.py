@@ -116,7 +116,7 @@ def test_network_links_in_a_scenario():
     with pytest.raises(
         ValidationError,
         match=(
-            "150 ms is no preset, there are 0 ms, 70 ms, 100 ms, 200 ms, 300 ms, 500 ms; any other delay is a"
+            "150 ms is no preset; these are 0 ms, 70 ms, 100 ms, 200 ms, 300 ms, 500 ms. For any other delay, use"
             " 'delay'"
         ),
     ):

@@ -93,7 +93,7 @@ def test_a_link_is_changed_while_the_session_runs(prepare, host):
         with pytest.raises(MessageError, match=r"Input should be less than 1"):
             relink(session, loss=1.5)
         with pytest.raises(
-            ConnectError, match=r"there is no 'nobody' in any session that runs here; running: hand"
+            ConnectError, match=r"there is no 'nobody' in any session of these hubs; running: hand"
         ):
             relink(session, "nobody")
         if host == "other":

@@ -91,7 +91,7 @@ def test_values_before_a_time_do_not_count():
 
 @pytest.mark.parametrize("measure", [{"kind": "time-above"}, {"kind": "peak", "level": 1.0}])
 def test_a_level_belongs_to_time_above(measure):
-    with pytest.raises(ValidationError, match="a level belongs to time-above"):
+    with pytest.raises(ValidationError, match="a level is required for time-above"):
         Measure.model_validate({"of": "a.out", **measure})
 
 

@@ -38,8 +38,8 @@ def force(**rest):
             into(type=JOINTS, names=("y", "x")),
             "'a.out' names x, y; 'b.in' takes y, x",
         ),
-        (into("out"), into(), "'a.out' is an input, here an output is wanted"),
-        (out(), out("in"), "'b.in' is an output, here an input is wanted"),
+        (into("out"), into(), "'a.out' is an input, expected an output"),
+        (out(), out("in"), "'b.in' is an output, expected an input"),
     ],
 )
 def test_ports_that_do_not_fit(source, target, message):
@@ -116,7 +116,7 @@ def test_a_wildcard_that_joins_nothing_names_what_there_is():
     assert raised.value.path == ("connections", 0)
     assert (
         str(raised.value)
-        == "'motion.drive/* -> robot.*' joins nothing (outputs of 'motion': state, drive/PSM1/servo_jp,"
+        == "'motion.drive/* -> robot.*' connects nothing (outputs of 'motion': state, drive/PSM1/servo_jp,"
         " drive/PSM1/jaw, drive/PSM2/servo_jp; inputs of 'robot': PSM3/servo_jp)"
     )
 
@@ -175,7 +175,7 @@ def test_a_cycle_needs_an_order():
     parts, connections = ring("a", "b", "c")
     with pytest.raises(
         ScenarioError,
-        match="form a cycle among a, b, c: say in which order they step, such as 'order: \\[a, b, c\\]'",
+        match=r"form a cycle among a, b, c: state the order in which they step, such as 'order: \[a, b, c\]",
     ):
         plan_of(*parts, connections=connections)
     with pytest.raises(ScenarioError, match="cycle"):
@@ -276,7 +276,7 @@ def test_the_period_of_an_output_is_a_multiple_of_the_participants():
     [
         ((motion(), force()), {"motion": "c.tip"}, "unknown participant 'c'"),
         ((motion(), force()), {"motion": "a.top"}, r"'a' has no bond 'top'. Did you mean 'tip'\?"),
-        ((motion(), force()), {"motion": "b.tip"}, "'b.tip' is a force side, here the motion side is wanted"),
+        ((motion(), force()), {"motion": "b.tip"}, "'b.tip' is a force side, expected a motion side"),
         ((motion(dof=3), force(dof=1)), {}, "'a.tip' has 3 degrees of freedom, 'b.tip' has 1"),
         ((motion(dof=3, points=4), force(dof=3)), {}, "'a.tip' bonds 4 points, 'b.tip' bonds 1"),
         (
@@ -363,7 +363,7 @@ def test_a_device_that_follows_the_clock_reads_as_a_participant_does():
 
 def test_nothing_is_extrapolated_for_a_device():
     stylus, engine = Stylus("stylus", out("pose", type=POSE), into("force", size=3)), Part("a", out(size=3))
-    with pytest.raises(ScenarioError, match="'stylus' is a device, which is written what is there"):
+    with pytest.raises(ScenarioError, match="'stylus' is a device, which receives values as they are"):
         plan_of(
             stylus,
             engine,
@@ -387,5 +387,5 @@ def test_a_link_is_for_devices():
     device = plan_of(Stylus("s", out("pose", type=POSE)), specs={"s": {"network_link": link}})
     assert device.participants["s"].network_link.delay_ns == 100_000_000
     assert [planned.name for planned in device.meetings()] == ["s"]
-    with pytest.raises(ScenarioError, match=r"a link lies between a device and the hub, but 'a' is a engine"):
+    with pytest.raises(ScenarioError, match=r"but 'a' is no device \(engine\): remove it"):
         plan_of(Part("a", out()), specs={"a": {"network_link": link}})

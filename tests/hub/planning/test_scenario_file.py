@@ -63,15 +63,15 @@ def test_every_problem_is_one_line_with_its_place(problems):
         (
             "3:1: stepp: there is no 'stepp' here. Did you mean 'step'? Known: algorithm, answer_limit,"
             " bonds, connections, description, duration, join_limit, measure, name, order, pace,"
-            " participants, step, window."
+            " participants, scene, step, window."
         ),
         (
             "9:13: participants.two.length: '5 kg' is not a quantity in m (Cannot convert from 'kilogram'"
             " ([mass]) to 'meter' ([length]))"
         ),
         (
-            "10:5: participants.two.sover: there is no 'sover' here. Did you mean 'solver'? Known: length,"
-            " solver, springs."
+            "10:5: participants.two.sover: there is no 'sover' here. Did you mean 'solver'? Known: host,"
+            " kind, length, network_link, period, rate_limit, solver, springs."
         ),
     ]
 
@@ -217,7 +217,7 @@ def test_an_override_changes_what_it_names_and_no_other_that_merges_it(merged):
         (
             "springs: {a:",
             "springs: &s {b: *s, a:",
-            ["nested too deeply: does an alias (*name) stand inside what it is an alias of?"],
+            ["nested too deeply: is an alias (*name) used inside its own anchor (&name)?"],
         ),
     ],
 )

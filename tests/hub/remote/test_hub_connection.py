@@ -65,7 +65,8 @@ def test_a_server_that_is_no_hub_is_left_alone(authority, tmp_path, monkeypatch)
             security=load("www.example", authority.directory).listening(),
         ),
         pytest.raises(
-            ConnectError, match=r"is no hub of the authority of .*touch\.pem: it shows that of www\.example"
+            ConnectError,
+            match=r"is no hub of the authority of .*touch\.pem: it presents the certificate of www\.example",
         ),
     ):
         reach(f"tls/127.0.0.1:{port}", "touch", authority.issued("touch").file)
@@ -115,8 +116,8 @@ def test_the_hubs_certificate_has_expired(inside, tmp_path):
 
 
 def test_no_hub_is_there(authority):
-    assert "nobody listens there" in obstacle("127.0.0.1", free_port(), authority.issued("touch"))
-    assert "no name that this machine knows" in obstacle(
+    assert "no process listens there" in obstacle("127.0.0.1", free_port(), authority.issued("touch"))
+    assert "this machine cannot resolve the name" in obstacle(
         "no-such-hub.invalid", 7447, authority.issued("touch")
     )
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -130,7 +131,7 @@ def test_no_hub_is_there(authority):
 
         thread = threading.Thread(target=hang_up)
         thread.start()
-        assert "does not speak TLS as a hub does" in obstacle(
+        assert "does not use TLS as a hub does" in obstacle(
             "127.0.0.1", server.getsockname()[1], authority.issued("touch")
         )
         thread.join()
@@ -145,14 +146,14 @@ def test_a_hub_elsewhere_is_reached_by_tls_and_with_a_certificate_only(authority
 
 def test_a_certificate_is_not_lent(authority):
     with pytest.raises(
-        ConnectError, match=r"touch\.pem is the certificate of 'touch', with which nobody can join as 'head'"
+        ConnectError, match=r"touch\.pem is the certificate of 'touch'; to join as 'head', use"
     ):
         reach("tls/127.0.0.1:7447", "head", authority.issued("touch").file)
 
 
 def test_the_way_to_mend_it_comes_with_the_error(authority):
     with pytest.raises(
-        ConnectError, match=r"cannot reach the hub at tls/127\.0\.0\.1:\d+: nobody listens there"
+        ConnectError, match=r"cannot reach the hub at tls/127\.0\.0\.1:\d+: no process listens there"
     ):
         reach(f"tls/127.0.0.1:{free_port()}", "touch", authority.issued("touch").file)
 
@@ -160,8 +161,6 @@ def test_the_way_to_mend_it_comes_with_the_error(authority):
 def test_a_hub_of_this_machine_that_does_not_run_is_said_to_be_none():
     with pytest.raises(
         ConnectError,
-        match=(
-            r"cannot reach the hub at tcp/127\.0\.0\.1:\d+: nobody listens there\. Is it running\? trocar ls"
-        ),
+        match=r"the hub at tcp/127\.0\.0\.1:\d+: no process listens there\. Is it running\? trocar ls",
     ):
         reach(f"tcp/127.0.0.1:{free_port()}", "touch")

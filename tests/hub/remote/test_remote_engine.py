@@ -146,7 +146,7 @@ def test_rules_are_for_remote_participants_and_the_observer(loaded):
 
 def test_a_hub_without_a_certificate_does_not_listen_to_other_machines(loaded, tmp_path):
     with pytest.raises(
-        ConnectError, match=r"there is no certificate .*hub\.pem.*To make it: trocar certs init"
+        ConnectError, match=r"there is no certificate .*hub\.pem.*To create it: trocar certs init"
     ):
         launch(loaded(), outside=["tls/0.0.0.0:7447"], certificates=tmp_path)
     authority = Authority.founded(tmp_path / "certs")

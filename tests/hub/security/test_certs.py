@@ -130,7 +130,7 @@ def test_certificates_are_looked_for_in_the_users_settings(monkeypatch, tmp_path
 def test_the_command_line_makes_and_shows_them(tmp_path):
     place = ["--dir", str(tmp_path / "certs")]
     run = CliRunner().invoke
-    assert "there is no certificate" in run(app, ["show", *place]).output
+    assert "no certificate in" in run(app, ["show", *place]).output
     assert run(app, ["init", "hub.example", *place]).exit_code == 0
     assert run(app, ["issue", "touch", *place]).exit_code == 0
     assert run(app, ["issue", "observer", "--days", "2", *place]).exit_code == 0
@@ -143,11 +143,11 @@ def test_the_command_line_makes_and_shows_them(tmp_path):
         "(29 days)",
         "(1 days)",
         "(396 days)",
-        "reading the status",
+        "observers of the status",
     ):
         assert word in shown
     certs.issue(tmp_path / "certs", "touch", -0.01)
-    assert "not valid" in run(app, ["show", *place]).output
+    assert "invalid" in run(app, ["show", *place]).output
 
 
 def test_doctor_tells_until_when_they_are_valid(monkeypatch, tmp_path):

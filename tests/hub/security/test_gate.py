@@ -77,13 +77,13 @@ PLAN = Plan(
             source="robot", source_port="contact", target="far", target_port="in", fresh=True, linear=False
         ),
     ),
-    inlets=(
+    from_devices=(
         ConnectionFromDevice(
-            device="touch", device_port="pose", target="robot", target_port="goal", max_age_ns=0
+            source="touch", source_port="pose", target="robot", target_port="goal", max_age_ns=0
         ),
     ),
     to_devices=(
-        ConnectionToDevice(source="robot", source_port="contact", device="touch", device_port="contact"),
+        ConnectionToDevice(source="robot", source_port="contact", target="touch", target_port="contact"),
     ),
     bonds=(),
 )
@@ -217,7 +217,7 @@ def test_a_device_does_its_part(hub, told, caplog):
             lambda: f"alive: {KEYS.alive('device', 'touch')}" in hub.heard and contact and link and alive
         )
     sleep(0.5)
-    assert not [line for line in caplog.messages if "refused" in line or "not let in" in line]
+    assert not [line for line in caplog.messages if "refused" in line or "not accepted" in line]
 
 
 def test_a_remote_engine_hears_grants_too(hub):
@@ -391,7 +391,7 @@ def test_plain_tcp_opens_nothing(hub, told):
         pass
     told("refused a connection: it does not speak TLS")
     if sys.platform == "linux":
-        told("the connection from 127.0.0.1:", "was not let in")
+        told("the connection from 127.0.0.1:", "was not accepted")
 
 
 def test_nobody_without_a_certificate_gets_in(hub, told):
@@ -416,7 +416,7 @@ def test_a_gate_that_is_killed_opens_again(tmp_path, told):
     hub = Hub(tmp_path)
     try:
         os.kill(hub.gate._process.pid, signal.SIGKILL)
-        told("the gate ended with exit code -9; opening it again")
+        told("the gate ended with exit code -9; restarting it")
         wait_for(lambda: _opens(hub))
     finally:
         hub.close()

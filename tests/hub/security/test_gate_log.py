@@ -107,9 +107,9 @@ def test_to_name_a_key_of_ones_own_is_no_try():
 
 
 def test_to_name_a_key_of_others_is_one():
-    told = [message for _, message in read(came("touch"), *named("trocar/s/device/head/out/pose"))[1:]]
+    told = [message for _, message in read(came("touch"), *named("trocar/s/device/head/out"))[1:]]
     assert told == [
-        "refused to 'touch' at 10.0.0.2:40000: to say or hear anything on trocar/s/device/head/out/pose"
+        "refused to 'touch' at 10.0.0.2:40000: to publish or receive anything on trocar/s/device/head/out"
     ]
 
 
@@ -118,14 +118,14 @@ def test_threads_do_not_mix():
     others = named("others", thread=2)
     lines = [line for pair in zip(own, others, strict=True) for line in pair]
     assert [message for _, message in read(came("touch"), *lines)[1:]] == [
-        "refused to 'touch' at 10.0.0.2:40000: to say or hear anything on others"
+        "refused to 'touch' at 10.0.0.2:40000: to publish or receive anything on others"
     ]
 
 
 def test_a_flood_of_refusals_is_not_told_to_its_end():
     told = read(came("touch"), *(verdict("Put", f"key/{i}") for i in range(1000)))[1:]
     assert len(told) == 21
-    assert told[-1][1].endswith("what else is refused to it is not told any more")
+    assert told[-1][1].endswith("further refusals are not reported")
 
 
 def test_a_key_gives_no_orders_to_a_terminal():
@@ -141,7 +141,7 @@ def test_any_other_line_is_passed_over(line):
 def test_a_connection_that_ended_was_let_in_or_not():
     log = GateLog(["touch"])
     list(log.read(came("touch")))
-    assert list(log.ended("10.0.0.2:40000")) == []
-    assert list(log.ended("10.0.0.2:40001")) == [
-        (logging.WARNING, "the connection from 10.0.0.2:40001 was not let in")
+    assert list(log.closed("10.0.0.2:40000")) == []
+    assert list(log.closed("10.0.0.2:40001")) == [
+        (logging.WARNING, "the connection from 10.0.0.2:40001 was not accepted")
     ]

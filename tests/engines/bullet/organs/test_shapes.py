@@ -21,7 +21,7 @@ from engines.bullet.organs.catalogue import SHAPES
 from engines.bullet.organs.materials import presets
 from engines.bullet.organs.params import OrganParams
 from engines.bullet.params import BulletParams
-from hub.planning.file_hashes import file_hashes
+from hub.recording.file_hashes import file_hashes
 
 BLOCK = {"size": ["80 mm", "60 mm", "20 mm"], "young_modulus": "10 kPa"}
 EXTENTS = {

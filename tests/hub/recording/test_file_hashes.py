@@ -5,8 +5,8 @@ import pytest
 from pydantic import Field
 
 from hub.participant import Params
-from hub.planning.file_hashes import changed_files, file_hashes
 from hub.planning.scenario_file import load
+from hub.recording.file_hashes import changed_files, file_hashes
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
@@ -94,4 +94,4 @@ def test_a_verification_tells_which_file_is_another_one_by_now(install_plugin, d
     assert "expect differences" not in caplog.text
     (directory / "a.txt").write_text("longer")
     assert not verify(recording).same
-    assert f"'{directory / 'a.txt'}' is not the file that was read when this was recorded" in caplog.text
+    assert f"file '{directory / 'a.txt'}' has changed or is missing since the recording" in caplog.text

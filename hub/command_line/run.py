@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from hub.command_line.display import RunProgress, console, show
-from hub.command_line.hosting import Certificates
-from hub.command_line.scenarios import Json, Overrides, ScenarioName, locating
+from hub.command_line.options import Certificates, Json, Overrides, ScenarioName, with_places
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.transport.endpoints import split_endpoints
@@ -17,33 +16,30 @@ from hub.transport.endpoints import split_endpoints
 __all__ = ["run"]
 
 
-def _is_new(directory: Path | None) -> Path | None:
-    if (
-        directory is not None
-        and directory.exists()
-        and not (directory.is_dir() and not any(directory.iterdir()))
-    ):
-        raise typer.BadParameter(f"'{directory}' is there already; name a new directory.")
-    return directory
+def _check_new(directory: Path | None) -> Path | None:
+    if directory is None or not directory.exists() or (directory.is_dir() and not any(directory.iterdir())):
+        return directory
+    raise typer.BadParameter(f"'{directory}' exists already; name a new directory.")
 
 
 def run(
     scenario: ScenarioName,
     *,
     record: Annotated[
-        Path | None, typer.Option(metavar="DIR", callback=_is_new, help="Record to a new rosbag2 directory.")
+        Path | None,
+        typer.Option(metavar="DIR", callback=_check_new, help="Record to a new directory, a rosbag2 bag."),
     ] = None,
     overrides: Overrides = None,
     pace: Annotated[
-        Literal["fast", "realtime"] | None, typer.Option(help="Instead of the scenario's own.")
+        Literal["fast", "realtime"] | None, typer.Option(help="Replace the pace of the scenario.")
     ] = None,
     listen: Annotated[
         list[str] | None,
         typer.Option(
             metavar="ENDPOINT",
             help=(
-                "Where to listen beside loopback, such as tls/0.0.0.0:7447; or where on loopback. May be"
-                " repeated."
+                "Where to listen besides loopback, such as tls/0.0.0.0:7447, or the endpoint on loopback."
+                " May be repeated."
             ),
         ),
     ] = None,
@@ -53,10 +49,10 @@ def run(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Run a scenario."""
+    """Run a scenario, and show a summary."""
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
     inside, outside = split_endpoints(listen or ())
-    with locating(file.source):
+    with with_places(file.source):
         session = launch(
             file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host
         )

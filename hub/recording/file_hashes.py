@@ -1,6 +1,4 @@
-"""The files that a session reads, and their hashes: a recording names them, so that a re-simulation knows
-whether they are still the same.
-"""
+"""The hashes of the files that a session reads: a re-simulation compares them with those in the recording."""
 
 from __future__ import annotations
 
@@ -17,10 +15,9 @@ __all__ = ["changed_files", "file_hashes"]
 
 
 def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
-    """Return the SHA-256 of every file that a `Path` in `params` names, by its full path; relative ones start
-    at `directory`.
+    """Return the SHA-256 of every file that a `Path` in `params` names, by its full path.
 
-    A path of a directory stands for all files right in it.
+    Relative paths start at `directory`. A directory stands for all files directly in it.
     """
     files: set[Path] = set()
     for named in _paths(list(params)):
@@ -30,7 +27,7 @@ def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
 
 
 def changed_files(recorded: Mapping[str, str]) -> list[str]:
-    """Return which files of `recorded`, hashes by path, are gone or hold something else by now."""
+    """Return the files in `recorded`, hashes by path, that are missing now or have other contents."""
     return [
         path for path, digest in recorded.items() if not Path(path).is_file() or _hash(Path(path)) != digest
     ]

@@ -1,0 +1,58 @@
+"""`trocar check` and `trocar schema`: what a scenario means, and what it may contain."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import typer
+from rich.markup import escape
+
+from hub.command_line.display import console
+from hub.command_line.options import Json, Overrides, ScenarioName, with_places
+from hub.planning.plan import Plan
+from hub.planning.scenario_file import load
+from hub.planning.scenario_schema import scenario_schema
+from hub.session.launch import plan_of
+
+__all__ = ["check", "schema"]
+
+
+def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json = False) -> None:
+    """Check a scenario without starting anything, and show its ports and connections."""
+    file = load(scenario, overrides or ())
+    with with_places(file.source):
+        plan, _ = plan_of(file.scenario, file.params)
+    if as_json:
+        typer.echo(plan.model_dump_json(indent=2))
+        return
+    _print_plan(plan)
+    console.print(f"[green]{escape(str(file.source.file))} is a valid scenario.", soft_wrap=True)
+
+
+def _print_plan(plan: Plan) -> None:
+    """Print every participant with its ports and the sources of its inputs."""
+    sources: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
+    for connection in (*plan.connections, *plan.from_devices, *plan.to_devices):
+        source = f"{connection.source}.{connection.source_port}"
+        sources[connection.target, connection.target_port].append(source)
+    for planned in plan.participants.values():
+        console.print(
+            f"[bold]{planned.name}[/] ({planned.role} of kind {planned.kind}) on host {planned.host}",
+            soft_wrap=True,
+        )
+        for port in planned.ports:
+            arrow = "->" if port.causality == "output" else "<-"
+            details = (port.type, port.unit, port.frame and f"in {port.frame}")
+            detail = " ".join(part for part in details if part)
+            origin = ", ".join(sources.get((planned.name, port.name), ()))
+            console.print(
+                f"    {arrow} {port.name}  [dim]{escape(detail)}[/]{f'  from {origin}' if origin else ''}",
+                soft_wrap=True,
+            )
+    if plan.order:
+        console.print(f"order of stepping: {', '.join(plan.order)}", soft_wrap=True)
+
+
+def schema() -> None:
+    """Print the JSON schema of a scenario, with the parameters of every installed kind."""
+    typer.echo(scenario_schema(), nl=False)

@@ -1,0 +1,64 @@
+"""`trocar engine` and `trocar device`: host one participant of a session whose hub runs elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hub.command_line.options import Certificates
+
+__all__ = ["device", "engine"]
+
+Participant = Annotated[
+    str, typer.Argument(metavar="NAME", help="A participant with `host: remote` in the scenario.")
+]
+Connect = Annotated[
+    str,
+    typer.Option(
+        metavar="ENDPOINT",
+        help="Where the hub listens: tls/HUB:7447, or on this machine tcp/127.0.0.1:7447.",
+    ),
+]
+SessionName = Annotated[
+    str,
+    typer.Option("--session", metavar="NAME", help="The session to join; default: the one of that hub."),
+]
+Directory = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True, file_okay=False, help="Where relative paths of the scenario start on this machine."
+    ),
+]
+
+
+def engine(
+    name: Participant,
+    *,
+    connect: Connect,
+    session: SessionName = "*",
+    directory: Directory = None,
+    certs: Certificates = None,
+) -> None:
+    """Host one engine or controller here, for a session whose hub runs elsewhere."""
+    from hub.hosting.host_process import run_host
+
+    run_host(connect, session, f"remote/{name}", directory=directory, certificates=certs)
+
+
+def device(
+    name: Participant,
+    *,
+    connect: Connect,
+    session: SessionName = "*",
+    directory: Directory = None,
+    certs: Certificates = None,
+) -> None:
+    """Host one device here, for sessions whose hub runs elsewhere.
+
+    It joins again when the hub returns, until it is stopped.
+    """
+    from hub.hosting.host_process import run_device
+
+    run_device(connect, session, name, directory=directory, certificates=certs)
