@@ -157,8 +157,9 @@ def _ignore(_channel: int, _time_ns: int, _payload: bytes) -> None:
 
 
 def _ratio(name: str, step_ms: float, steps: int, rounds: int) -> float:
-    """Return loop time with a recorder over loop time without: the median over pairs of short blocks, so that
-    other load falls on both of a pair.
+    """Return loop time with a recorder over loop time without.
+
+    It is the median over pairs of short blocks: other load falls on both of a pair.
     """
     rows, turns = _messages(steps), _turns(step_ms * 1e-3)
     with tempfile.TemporaryDirectory() as directory:
@@ -169,8 +170,9 @@ def _ratio(name: str, step_ms: float, steps: int, rounds: int) -> float:
 
 
 def _cpu_us_per_step(name: str, rounds: int) -> float:
-    """Return the CPU time that recording a step takes in this process, writer thread and compression
-    included: the fastest round.
+    """Return the CPU time that recording a step takes in this process, of the fastest round.
+
+    Writer thread and compression are included.
     """
     rows, times = _messages(4000), list[float]()  # many, so that opening and closing the file do not count
     for _ in range(rounds):

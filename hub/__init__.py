@@ -1,3 +1,1 @@
-"""The hub: session, clock, hosts, coupling, recording, control and command line; and the participant side
-that others build on.
-"""
+"""The hub: sessions, hosts, transport, recording and command line, and the interface of participants."""

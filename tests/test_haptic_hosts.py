@@ -47,7 +47,7 @@ SCENARIO = {
 
 
 class Hand:
-    """The hand behind the stand-in: where it wants to be above its start (m), and whether it holds button 0."""
+    """The hand behind the stand-in: its goal above its start (m), and whether it holds button 0."""
 
     def __init__(self, world: HdWorld) -> None:
         self._world, self._device = world, world.devices[0]

@@ -26,7 +26,7 @@ __all__ = ["BagWriter"]
 _METADATA_VERSION = 9
 """As ROS 2 Jazzy writes it."""
 _FOREVER = QosTime(9223372036, 854775807)
-"""The largest duration (ns in 64 bits): what rosbag2 notes of a publisher without deadline, lifespan and lease."""
+"""The largest duration (ns in 64 bits): rosbag2 writes it where there is no deadline, lifespan or lease."""
 
 
 class BagWriter:
@@ -92,7 +92,7 @@ class BagWriter:
 
 
 def _quality(*, latched: bool) -> Qos:
-    """Return the quality of service of a reliable publisher: transient local if latched, else the last ten."""
+    """Return the QoS of a reliable publisher: transient local if latched, else the last ten messages."""
     durability, depth = (QosDurability.TRANSIENT_LOCAL, 1) if latched else (QosDurability.VOLATILE, 10)
     return Qos(
         QosHistory.KEEP_LAST,

@@ -116,8 +116,8 @@ def test_network_links_in_a_scenario():
     with pytest.raises(
         ValidationError,
         match=(
-            "150 ms is no preset; these are 0 ms, 70 ms, 100 ms, 200 ms, 300 ms, 500 ms. For any other delay, use"
-            " 'delay'"
+            r"150 ms is no preset; these are 0 ms, 70 ms, 100 ms, 200 ms, 300 ms, 500 ms\."
+            " For any other delay, use 'delay'"
         ),
     ):
         NetworkLinkSpec(preset="150 ms")
