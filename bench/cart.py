@@ -27,7 +27,6 @@ from hub.participant import Inputs, Setup
 from hub.planning.plan import PlannedParticipant
 from hub.session.launch import plan_of
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
 from schemas.lockstep import Ack
 from schemas.scenario import Scenario
 
@@ -78,7 +77,7 @@ def session_us() -> float:
     def on_ack(_member: PlannedParticipant, ack: Ack) -> None:
         reported.append((ack.step, time.thread_time()))
 
-    Session(scenario, plan, participants, Path(), endpoint=free_endpoint(range(1)), on_ack=on_ack).run()
+    Session(scenario, plan, participants, Path(), endpoint="tcp/127.0.0.1:0", on_ack=on_ack).run()
     (first, begun), (last, ended) = reported[len(reported) // 2], reported[-1]
     return (ended - begun) / (last - first) * 1e6
 

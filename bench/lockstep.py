@@ -25,7 +25,7 @@ from zenoh.handlers import FifoChannel
 from hub.participant import Params
 from hub.session.launch import plan_of
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
+from hub.transport.loopback_port import LoopbackPort
 from hub.transport.zenoh_session import open_session
 from schemas.scenario import Scenario
 
@@ -58,15 +58,14 @@ def trocar(participants: int, window: int, steps: int, *, one_host: bool) -> flo
     )
     plan, made = plan_of(scenario, dict.fromkeys(names, Params()))
     here = made if one_host else {}
-    return (
-        steps / Session(scenario, plan, here, Path.cwd(), endpoint=free_endpoint(range(1))).run().wall_time_s
-    )
+    return steps / Session(scenario, plan, here, Path.cwd(), endpoint="tcp/127.0.0.1:0").run().wall_time_s
 
 
 def bare(participants: int, window: int, steps: int) -> float:
     """Return the steps per second of a bare star (window 1) or ring."""
-    endpoint = free_endpoint(range(1))
-    with open_session("router", listen=[endpoint]) as hub:
+    port = LoopbackPort("tcp/127.0.0.1:0")
+    endpoint = port.endpoint
+    with port.listen() as hub:
         ready = hub.declare_subscriber("bare/ready/*", FifoChannel(64))
         results = (
             hub.declare_subscriber("bare/*/out", FifoChannel(4096))

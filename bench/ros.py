@@ -33,8 +33,7 @@ from ros_places import PLACES, Place
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
-from hub.transport.zenoh_session import open_session
+from hub.transport.loopback_port import LoopbackPort
 
 HERE = Path(__file__).parent
 ARMS = {
@@ -115,8 +114,9 @@ def _answer(process: subprocess.Popen[str]) -> dict[str, Any]:
 
 def bare(kind: str, place: Place, seconds: float) -> dict[str, Any]:
     """Measure a gateway alone."""
-    endpoint = free_endpoint(range(1))
-    with open_session("router", listen=[endpoint]):
+    port = LoopbackPort("tcp/127.0.0.1:0")
+    endpoint = port.endpoint
+    with port.listen():
         command = [
             sys.executable,
             str(HERE / "ros_bare.py"),
@@ -168,7 +168,7 @@ def in_session(
     with tempfile.TemporaryDirectory() as directory:
         file = Path(directory, "ros.yaml")
         file.write_text(json.dumps(scenario))
-        session = launch(load(str(file)), endpoint=free_endpoint(range(1)))
+        session = launch(load(str(file)), endpoint="tcp/127.0.0.1:0")
         result: dict[str, Any] = {}
         thread = Thread(
             target=_beside,

@@ -22,7 +22,6 @@ from two_mass import Mass, MassParams, SprungMass
 
 from hub.planning.wiring import make_plan
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Scenario
 
 ONE = MassParams(mass=1, stiffness=10, damping=0.1, x=1)
@@ -75,7 +74,7 @@ def positions(coupling: dict, step_ms: float, two: MassParams, duration_s: float
     )
     plan = make_plan(scenario, names, dict.fromkeys(names, "engine"))
     with np.errstate(all="ignore"):
-        Session(scenario, plan, names, Path.cwd(), endpoint=free_endpoint(range(1))).run()
+        Session(scenario, plan, names, Path.cwd(), endpoint="tcp/127.0.0.1:0").run()
     return np.array(names["one"].log)
 
 

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from hub.import_names import NAMES, collisions
 from hub.planning import registry
 from hub.security import credentials
-from hub.transport.endpoints import free_endpoint
+from hub.transport.loopback_port import LoopbackPort
 from hub.transport.zenoh_session import open_session
 from schemas.errors import TrocarError
 
@@ -96,8 +96,8 @@ def _import_names() -> Iterator[Finding]:
 def _zenoh() -> Iterator[Finding]:
     """Open a router on loopback and join it, as a session does."""
     try:
-        endpoint = free_endpoint([0])
-        with open_session("router", listen=[endpoint]), open_session("client", connect=[endpoint]):
+        port = LoopbackPort("tcp/127.0.0.1:0")
+        with port.listen(), open_session("client", connect=[port.endpoint]):
             pass
     except TrocarError as error:
         yield Finding(

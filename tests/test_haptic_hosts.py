@@ -16,9 +16,9 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
-from hub.transport.endpoints import free_endpoint
 from tests.devices.standins import build
 from tests.devices.standins.hd import VARIABLE, HdWorld, Row
+from tests.hub.authorities import free_endpoint
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
@@ -105,7 +105,7 @@ def test_the_hub_is_killed_with_force_on_the_hand_and_another_one_is_joined(
     file = tmp_path / "table.json"
     SCENARIO["participants"]["stylus"]["library"] = str(library)
     file.write_text(json.dumps(SCENARIO))
-    endpoint = free_endpoint(range(1))
+    endpoint = free_endpoint()
     hub = start("run", str(file), "--listen", endpoint)
     hand.until(lambda: _listens(endpoint), "the hub listens")
     start("device", "stylus", "--connect", endpoint, **{VARIABLE: str(world.file)})

@@ -12,7 +12,6 @@ import pytest
 from hub.planning.scenario_file import load
 from hub.recording.bag import Bag
 from hub.session.launch import launch, plan_of
-from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Connection
 
 pytest.importorskip("mujoco")
@@ -20,7 +19,7 @@ pytest.importorskip("ruckig")
 
 
 def run(name, *overrides):
-    summary = launch(load(name, list(overrides)), endpoint=free_endpoint(range(1)), one_host=True).run()
+    summary = launch(load(name, list(overrides)), endpoint="tcp/127.0.0.1:0", one_host=True).run()
     assert summary.state == "done"
     return summary.measures
 

@@ -45,12 +45,11 @@ def replay(
 ) -> None:
     """Publish the messages of a recording again, as the live session did."""
     from hub.recording.replay import replay as publish
-    from hub.transport.endpoints import free_endpoint, require_loopback
-    from hub.transport.zenoh_session import open_session
+    from hub.transport.loopback_port import LoopbackPort
 
-    endpoint = require_loopback(listen) if listen else free_endpoint()
-    console.print(f"publishing on {endpoint}")
-    with open_session("router", listen=[endpoint]) as session:
+    port = LoopbackPort(listen)
+    with port.listen() as session:
+        console.print(f"publishing on {port.endpoint}")
         show(asdict(publish(Recording(recording), session, rate)), as_json=as_json)
 
 

@@ -11,7 +11,7 @@ from hub.command_line.display import RunProgress, console, show
 from hub.command_line.options import Certificates, Json, Overrides, ScenarioName, with_places
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
-from hub.transport.endpoints import split_endpoints
+from hub.transport.loopback_port import listening_ports
 
 __all__ = ["run"]
 
@@ -51,7 +51,7 @@ def run(
 ) -> None:
     """Run a scenario, and show a summary."""
     file = load(scenario, [*(overrides or ()), *([f"pace={pace}"] if pace else ())])
-    inside, outside = split_endpoints(listen or ())
+    inside, outside = listening_ports(listen or ())
     with with_places(file.source):
         session = launch(
             file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host

@@ -20,6 +20,7 @@ from hub.security.access import access_settings
 from hub.security.credentials import HUB, examine, load
 from hub.security.gate import Gate
 from hub.session.session import Session
+from hub.transport.loopback_port import LoopbackPort
 from hub.transport.router_client import RouterClient
 from schemas.scenario import Scenario
 
@@ -47,7 +48,7 @@ def in_one_host(scenario: Scenario) -> Scenario:
 def launch(
     loaded: ScenarioFile,
     *,
-    endpoint: str | None = None,
+    endpoint: str | LoopbackPort | None = None,
     outside: Sequence[str] = (),
     certificates: Path | None = None,
     record: Path | None = None,

@@ -17,8 +17,7 @@ from hub.session.run import Run, SessionSpec
 from hub.session.run_state import RunState
 from hub.session.startup import start
 from hub.session.step_loop import OnAck, StepLoop
-from hub.transport.endpoints import free_endpoint, require_loopback
-from hub.transport.zenoh_session import open_session
+from hub.transport.loopback_port import LoopbackPort
 from schemas.errors import ScenarioError, SessionError
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import GrantMessage
@@ -51,7 +50,7 @@ class Session:
         participants: Mapping[str, Stepped | Device],
         directory: Path,
         *,
-        endpoint: str | None = None,
+        endpoint: str | LoopbackPort | None = None,
         gate: Gate | None = None,
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
@@ -60,7 +59,7 @@ class Session:
     ) -> None:
         self.scenario = scenario
         self.plan = plan
-        self.endpoint = require_loopback(endpoint) if endpoint else free_endpoint()
+        self._port = endpoint if isinstance(endpoint, LoopbackPort) else LoopbackPort(endpoint)
         self.gate = gate
         self.state = RunState()
         self._participants = participants
@@ -69,6 +68,11 @@ class Session:
         self._attachments = dict(attachments or {})
         self._grants = grants
         self._on_ack = on_ack
+
+    @property
+    def endpoint(self) -> str:
+        """Where the hub listens on loopback; one that was not given may become another one in `run`."""
+        return self._port.endpoint
 
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
         """Run to the end and return the summary. SIGTERM ends it as Ctrl-C does.
@@ -79,22 +83,22 @@ class Session:
         Raises ParticipantError or SessionError when the session fails (the recording is then closed and
         readable), ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
         """
-        spec = SessionSpec(
-            self.scenario,
-            self.plan,
-            self._participants,
-            self._directory,
-            self.endpoint,
-            self.gate,
-            resimulated=self._grants is not None,
-        )
         recorder = Recorder(self._record, attachments=self._attachments) if self._record is not None else None
         try:
             with (
                 Interrupt() as interrupt,
-                open_session("router", listen=[self.endpoint]) as session,
+                self._port.listen() as session,
                 ExitStack() as stack,
             ):
+                spec = SessionSpec(
+                    self.scenario,
+                    self.plan,
+                    self._participants,
+                    self._directory,
+                    self.endpoint,
+                    self.gate,
+                    resimulated=self._grants is not None,
+                )
                 run = Run(stack, spec, session, self.state, interrupt, recorder)
                 self._step(run, interrupt, progress)
         finally:

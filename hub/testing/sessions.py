@@ -12,7 +12,6 @@ from hub.planning.registry import Role
 from hub.planning.wiring import make_plan
 from hub.session.launch import in_one_host
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Scenario
 
 __all__ = ["run_in_process"]
@@ -46,4 +45,4 @@ def run_in_process(
     }
     plan = make_plan(checked, participants, roles)
     place = directory or Path.cwd()
-    return Session(checked, plan, participants, place, endpoint=free_endpoint(range(1))).run()
+    return Session(checked, plan, participants, place, endpoint="tcp/127.0.0.1:0").run()

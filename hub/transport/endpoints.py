@@ -3,41 +3,21 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterable
 from contextlib import suppress
 from ipaddress import ip_address
 
-from schemas.errors import ConnectError, ScenarioError
+from schemas.errors import ScenarioError
 
 __all__ = [
     "PORTS",
     "address",
-    "free_endpoint",
     "is_loopback",
     "listening_endpoints",
     "require_loopback",
-    "split_endpoints",
 ]
 
 PORTS = range(7447, 7467)
 """Zenoh's own port, and the next ones for further hubs on the same machine."""
-
-
-def free_endpoint(ports: Iterable[int] = PORTS) -> str:
-    """Return the endpoint of the first free loopback port; port 0 stands for any free one.
-
-    Raises ConnectError if all are taken.
-    """
-    for port in ports:
-        try:
-            with socket.create_server(("127.0.0.1", port)) as probe:
-                return _endpoint(probe.getsockname()[1])
-        except OSError:
-            continue
-    raise ConnectError(
-        f"no free port among {PORTS.start} to {PORTS.stop - 1} on 127.0.0.1: end a session that is not"
-        " needed, or give --listen tcp/127.0.0.1:PORT"
-    )
 
 
 def listening_endpoints() -> list[str]:
@@ -54,21 +34,6 @@ def _answers(address: str, port: int) -> bool:
     with socket.socket() as probe:
         probe.settimeout(0.2)
         return probe.connect_ex((address, port)) == 0
-
-
-def split_endpoints(endpoints: Iterable[str]) -> tuple[str, list[str]]:
-    """Return the loopback endpoint of a hub, and those at which its gate listens to other machines.
-
-    If `endpoints` has no loopback endpoint, a free one is chosen. Raises ScenarioError if one of them is
-    neither TCP on loopback nor TLS.
-    """
-    given = list(endpoints)
-    outside = [endpoint for endpoint in given if endpoint.startswith("tls/")]
-    inside = [require_loopback(endpoint) for endpoint in given if endpoint not in outside]
-    if len(inside) > 1:
-        raise ScenarioError(f"{', '.join(inside)}: a hub listens once on loopback")
-    taken = {address(endpoint)[1] for endpoint in outside}
-    return (inside[0] if inside else free_endpoint(port for port in PORTS if port not in taken)), outside
 
 
 def require_loopback(endpoint: str) -> str:

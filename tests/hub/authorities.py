@@ -33,3 +33,8 @@ def free_port() -> int:
     """Return a port that was free a moment ago."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         return probe.getsockname()[1]
+
+
+def free_endpoint() -> str:
+    """Return an endpoint on loopback whose port was free a moment ago."""
+    return f"tcp/127.0.0.1:{free_port()}"

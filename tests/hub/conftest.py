@@ -12,7 +12,6 @@ from hub.planning import registry
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
 
 PENDULUM = """
 from typing import Literal
@@ -143,6 +142,6 @@ def prepare(toys: None, tmp_path: Path) -> Prepare:
     def prepare(text: str, *overrides: str, **options: Any) -> Session:
         file = tmp_path / "session.yaml"
         file.write_text(text)
-        return launch(load(str(file), overrides), endpoint=free_endpoint(range(1)), **options)
+        return launch(load(str(file), overrides), endpoint="tcp/127.0.0.1:0", **options)
 
     return prepare

@@ -4,7 +4,6 @@ import pytest
 
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
-from hub.transport.endpoints import free_endpoint
 from schemas.errors import ParticipantError
 
 pytest.importorskip("mujoco")
@@ -53,14 +52,14 @@ def file(tmp_path):
 
 
 def test_wildcards_join_every_arm_both_ways_and_all_reach_their_goals(file):
-    session = launch(load(file), endpoint=free_endpoint(range(1)), one_host=True)
+    session = launch(load(file), endpoint="tcp/127.0.0.1:0", one_host=True)
     summary = session.run()
     assert (summary.state, summary.measures["done"]) == ("done", 1.0)
 
 
 def test_an_order_out_of_range_ends_the_session_with_the_reason_and_the_range(file):
     bad = "participants.routine.steps=[{do: move_jp, arm: PSM2, positions: [0, 0, 0.5, 0, 0, 0]}]"
-    session = launch(load(file, [bad]), endpoint=free_endpoint(range(1)), one_host=True)
+    session = launch(load(file, [bad]), endpoint="tcp/127.0.0.1:0", one_host=True)
     with pytest.raises(
         ParticipantError, match=r"PSM2: move_jp refused: joint insertion at 0\.5 m, allowed are 0 \.\. 0\.24"
     ):

@@ -9,7 +9,6 @@ import pytest
 
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
-from hub.transport.endpoints import free_endpoint
 from tests.devices.ros.bags.test_bags import SCENARIO
 from tests.devices.ros.dds.test_gateway import domain
 from tests.devices.ros.rclpy_environment import rclpy_python
@@ -25,7 +24,7 @@ def test_the_program_of_the_documentation_moves_an_arm(rclpy_python, domain, tmp
     (tmp_path / "psm.yaml").write_text(
         SCENARIO.format(device=gateway, pace="realtime", duration="120 s") + "  - motion.* -> ros.*\n"
     )
-    session = launch(load(str(tmp_path / "psm.yaml")), endpoint=free_endpoint(range(1)))
+    session = launch(load(str(tmp_path / "psm.yaml")), endpoint="tcp/127.0.0.1:0")
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
     def program():

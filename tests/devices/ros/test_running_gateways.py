@@ -8,11 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from devices.ros.command_line import app
-from hub.transport.endpoints import free_endpoint
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.keys import Keys
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
+from tests.hub.authorities import free_endpoint
 
 STATUS = GatewayStatus(
     kind="ros2-dds",
@@ -34,7 +34,7 @@ STATUS = GatewayStatus(
 @pytest.fixture
 def endpoint() -> Generator[str]:
     """A hub with a gateway that publishes its status every 0.1 s, and with one that publishes nonsense."""
-    endpoint, over = free_endpoint(range(1)), threading.Event()
+    endpoint, over = free_endpoint(), threading.Event()
 
     def tell() -> None:
         while not over.wait(0.1):
@@ -64,6 +64,6 @@ def test_programs_get_json(endpoint: str) -> None:
 
 
 def test_nobody_there() -> None:
-    result = CliRunner().invoke(app, ["--connect", free_endpoint(range(1))])
+    result = CliRunner().invoke(app, ["--connect", free_endpoint()])
     assert result.exit_code == 0
     assert "no gateway to ROS is running" in result.stdout

@@ -10,7 +10,7 @@ import pytest
 from hub.command_line import main
 from hub.command_line.display import latency_rows
 from hub.planning.scenario_file import installed_scenarios
-from hub.transport.endpoints import free_endpoint
+from tests.hub.authorities import free_endpoint
 
 SCENARIO = """\
 name: swinging
@@ -187,7 +187,7 @@ def test_a_failing_participant_is_exit_code_1_and_a_clean_message(trocar, swingi
 
 def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
     (tmp_path / "session.yaml").write_text(REMOTE)
-    endpoint = free_endpoint([0])
+    endpoint = free_endpoint()
     command = [sys.executable, "-P", "-m", "hub.command_line"]
     hub = subprocess.Popen(
         [*command, "run", "session.yaml", "--listen", endpoint, "--json"],

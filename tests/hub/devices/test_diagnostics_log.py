@@ -6,7 +6,6 @@ import pytest
 from hub.devices.diagnostics_log import DiagnosticsLog
 from hub.participant import Device, Params
 from hub.planning.wiring import make_plan
-from hub.transport.endpoints import free_endpoint
 from hub.transport.refusals import Refusals
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
@@ -14,6 +13,7 @@ from schemas.keys import Keys
 from schemas.ports import Port
 from schemas.ros import DiagnosticStatus, StringMessage
 from schemas.scenario import Scenario
+from tests.hub.authorities import free_endpoint
 
 TYPE = DiagnosticStatus.ros_type
 
@@ -45,7 +45,7 @@ def wire():
         {name: Stylus(name, Params()) for name in specs},
         dict.fromkeys(specs, "device"),
     )
-    endpoint, refusals, keys = free_endpoint([0]), Refusals(), Keys("s")
+    endpoint, refusals, keys = free_endpoint(), Refusals(), Keys("s")
     with (
         open_session("router", listen=[endpoint]) as hub,
         open_session("client", connect=[endpoint]) as device,

@@ -10,7 +10,7 @@ from signal import SIGKILL, SIGTERM
 from time import monotonic, sleep
 
 from hub.remote.live_sessions import live_sessions
-from hub.transport.endpoints import free_endpoint
+from tests.hub.authorities import free_endpoint
 from tests.hub.proxy import Proxy
 
 SCENARIO = """\
@@ -198,7 +198,7 @@ def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
 
 def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
     (tmp_path / "session.yaml").write_text(SCENARIO)
-    endpoint = free_endpoint(range(1))
+    endpoint = free_endpoint()
     command = [
         sys.executable,
         "-P",

@@ -12,10 +12,9 @@ from hub.security import certs
 from hub.security.access import access_settings
 from hub.security.credentials import Credentials, load
 from hub.security.gate import Gate
-from hub.transport.endpoints import free_endpoint
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
-from tests.hub.authorities import Authority, free_port
+from tests.hub.authorities import Authority, free_endpoint, free_port
 
 PLAN = Plan(step_ns=1, order=(), participants={}, connections=(), from_devices=(), to_devices=(), bonds=())
 
@@ -32,7 +31,7 @@ def stranger(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def inside():
-    endpoint = free_endpoint(range(1))
+    endpoint = free_endpoint()
     with open_session("router", listen=[endpoint]):
         yield endpoint
 

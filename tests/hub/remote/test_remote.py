@@ -14,7 +14,6 @@ import pytest
 from hub.planning.scenario_file import load as load_scenario
 from hub.remote.live_sessions import live_sessions
 from hub.session.launch import launch
-from hub.transport.endpoints import free_endpoint
 from tests.hub.authorities import Authority, free_port
 
 SCENARIO = """\
@@ -75,7 +74,7 @@ class Site:
         file.write_text(SCENARIO.replace("FILE", str(self.told)))
         self.session = launch(
             load_scenario(str(file), ()),
-            endpoint=free_endpoint(range(1)),
+            endpoint="tcp/127.0.0.1:0",
             outside=[self.endpoint],
             certificates=self.authority.directory,
         )

@@ -10,7 +10,6 @@ from hub.security.access import access_settings
 from hub.session.joined_hosts import JoinedHosts
 from hub.session.launch import launch, plan_of
 from hub.transport.control_messages import JoinRequest
-from hub.transport.endpoints import free_endpoint
 from schemas.errors import ConnectError, MessageError
 from tests.hub.authorities import Authority, free_port
 
@@ -49,11 +48,11 @@ ALONE = (
 
 
 def test_its_hashes_are_the_same(loaded, tmp_path):
-    expected = launch(loaded(text=ALONE), endpoint=free_endpoint(range(1))).run()
+    expected = launch(loaded(text=ALONE), endpoint="tcp/127.0.0.1:0").run()
     authority, endpoint = Authority.founded(tmp_path / "certs"), f"tls/127.0.0.1:{free_port()}"
     session = launch(
         loaded("participants.far.host=remote", text=ALONE),
-        endpoint=free_endpoint(range(1)),
+        endpoint="tcp/127.0.0.1:0",
         outside=[endpoint],
         certificates=authority.directory,
     )

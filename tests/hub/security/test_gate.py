@@ -23,12 +23,11 @@ from hub.planning.plan import (
 from hub.security.access import access_settings
 from hub.security.credentials import Credentials
 from hub.security.gate import Gate
-from hub.transport.endpoints import free_endpoint
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
 from schemas.keys import Keys
 from schemas.ports import Port
-from tests.hub.authorities import Authority, free_port
+from tests.hub.authorities import Authority, free_endpoint, free_port
 
 KEYS = Keys("s")
 PLAN = Plan(
@@ -99,7 +98,7 @@ class Hub:
     def __init__(self, directory):
         self.authority = Authority.founded(directory / "own")
         self.stranger = Authority.founded(directory / "strange")
-        self.port, inside = free_port(), free_endpoint(range(1))
+        self.port, inside = free_port(), free_endpoint()
         self.endpoint = f"tls/127.0.0.1:{self.port}"
         self.heard: list[str] = []
         self.router = open_session("router", listen=[inside])
@@ -431,7 +430,7 @@ def _opens(hub):
 
 
 def test_a_gate_that_cannot_listen_says_so(tmp_path):
-    authority, inside = Authority.founded(tmp_path), free_endpoint(range(1))
+    authority, inside = Authority.founded(tmp_path), free_endpoint()
     with socket.create_server(("127.0.0.1", 0)) as taken, open_session("router", listen=[inside]):
         gate = Gate(
             [f"tls/127.0.0.1:{taken.getsockname()[1]}"],

@@ -13,7 +13,7 @@ import pytest
 from hub.hosting.interrupt import Interrupt
 from hub.recording.recording import Recording
 from hub.recording.recover import recover
-from hub.transport.endpoints import free_endpoint
+from tests.hub.authorities import free_endpoint
 from tests.hub.processes import hosts, processes
 
 ENDLESS = """\
@@ -48,7 +48,7 @@ class Hub:
 
     def __init__(self, directory: Path, text: str, **options):
         (directory / "session.yaml").write_text(text)
-        self.endpoint = free_endpoint(range(1))
+        self.endpoint = free_endpoint()
         self.recording = directory / "recording"
         run = ["run", "session.yaml", "--listen", self.endpoint, "--record", "recording"]
         self.errors = (directory / "stderr").open("w+")

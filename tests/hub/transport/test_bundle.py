@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from zenoh.handlers import FifoChannel
 
 from hub.transport.bundle import Bundle, bundled, unpacked
-from hub.transport.endpoints import free_endpoint
 from hub.transport.zenoh_session import open_session
 from schemas.errors import MessageError
+from tests.hub.authorities import free_endpoint
 from tests.hub.parts import Part, Stylus, into, out, plan_of
 
 
 @pytest.fixture(scope="module")
 def bundle():
-    with open_session("router", listen=[free_endpoint(range(1))]) as session:
+    with open_session("router", listen=[free_endpoint()]) as session:
         made = Bundle(session, "trocar/test/engine/arm/signals/console")
         made.received = session.declare_subscriber("trocar/test/engine/arm/signals/console", FifoChannel(100))
         until = time.monotonic() + 5.0

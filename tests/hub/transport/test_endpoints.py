@@ -3,8 +3,8 @@ import socket
 import pytest
 
 from hub.transport import endpoints as endpoint
-from hub.transport.endpoints import is_loopback, require_loopback
-from schemas.errors import ConnectError, ScenarioError
+from hub.transport.endpoints import require_loopback
+from schemas.errors import ScenarioError
 
 
 @pytest.fixture
@@ -14,15 +14,6 @@ def taken():
         listener.bind(("127.0.0.1", 0))
         listener.listen()
         yield listener.getsockname()[1]
-
-
-def test_a_taken_port_is_skipped(taken):
-    assert endpoint.free_endpoint([taken, 0]) != f"tcp/127.0.0.1:{taken}"
-
-
-def test_no_free_port_is_an_error_with_a_remedy(taken):
-    with pytest.raises(ConnectError, match="give --listen"):
-        endpoint.free_endpoint([taken])
 
 
 def test_listeners_are_found(taken, monkeypatch):
@@ -36,19 +27,6 @@ def test_a_gate_is_not_taken_for_a_hub(monkeypatch):
     with socket.create_server(("0.0.0.0", 0)) as gate:
         monkeypatch.setattr(endpoint, "PORTS", [gate.getsockname()[1]])
         assert endpoint.listening_endpoints() == []
-
-
-def test_the_hub_stays_on_loopback_beside_its_gate(taken):
-    inside, outside = endpoint.split_endpoints(["tls/0.0.0.0:7447"])
-    assert outside == ["tls/0.0.0.0:7447"]
-    assert is_loopback(inside)
-    assert endpoint.address(inside)[1] != 7447
-    assert endpoint.split_endpoints(["tcp/127.0.0.1:5", "tls/0.0.0.0:6", "tls/[::]:6"]) == (
-        "tcp/127.0.0.1:5",
-        ["tls/0.0.0.0:6", "tls/[::]:6"],
-    )
-    with pytest.raises(ScenarioError, match="once on loopback"):
-        endpoint.split_endpoints(["tcp/127.0.0.1:5", "tcp/127.0.0.1:6"])
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,6 @@ from devices.ros.zenoh.gateway import ZenohGateway
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
-from hub.transport.endpoints import free_endpoint
 from hub.verify import verify
 from schemas.codec import message_type, validated
 from schemas.errors import MessageError, RecordingError
@@ -70,7 +69,7 @@ def recorded(directory, device, connections="", *, pace="fast", duration="20 s",
     directory.mkdir()
     file = directory / "bags.yaml"
     file.write_text(SCENARIO.format(device=device, pace=pace, duration=duration) + connections)
-    session = launch(load(str(file)), endpoint=free_endpoint(range(1)), record=directory / "recording")
+    session = launch(load(str(file)), endpoint="tcp/127.0.0.1:0", record=directory / "recording")
     failures = []
 
     def driving():

@@ -12,7 +12,6 @@ import pytest
 from devices.ros.ros1.gateway import Ros1Gateway
 from hub.planning.wiring import make_plan
 from hub.session.session import Session
-from hub.transport.endpoints import free_endpoint
 from schemas.scenario import Scenario
 from tests.devices.ros.helpers import until
 from tests.devices.ros.ideal_robot import IdealRobot, motion
@@ -50,7 +49,7 @@ def session(ros, directory):
         }
     )
     plan = make_plan(scenario, participants, {"motion": "controller", "robot": "engine", "ros": "device"})
-    it = Session(scenario, plan, participants, directory, endpoint=free_endpoint(range(1)))
+    it = Session(scenario, plan, participants, directory, endpoint="tcp/127.0.0.1:0")
     with Program(ros) as console, ThreadPoolExecutor(1) as pool:
         assert console.arm("PSM1", "connected", 0.0) is False
         run = pool.submit(it.run)

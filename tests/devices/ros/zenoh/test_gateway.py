@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from devices.ros.zenoh.gateway import ZenohGateway
-from hub.transport.endpoints import free_endpoint
 from hub.transport.zenoh_session import open_session
 from schemas.codec import message_type
 from schemas.crtk import OperatingState
@@ -22,6 +21,7 @@ from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
 from tests.devices.ros.helpers import joint_fields, received, until
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built, flat
+from tests.hub.authorities import free_endpoint
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 STATE, COMMAND, EVENT = "/PSM1/measured_js", "/PSM1/servo_jp", "/PSM1/operating_state"
@@ -31,7 +31,7 @@ JOINTS, STATE_TYPE = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState
 @contextmanager
 def router():
     """A hub's router; yields its endpoint."""
-    endpoint = free_endpoint(range(1))
+    endpoint = free_endpoint()
     with open_session("router", listen=[endpoint]):
         yield endpoint
 
@@ -190,7 +190,7 @@ def test_a_console_that_comes_back_is_there_again(psm, hub):
 
 
 def test_the_gateway_is_there_again_when_the_hub_is(tmp_path):
-    endpoint = free_endpoint(range(1))
+    endpoint = free_endpoint()
     with ExitStack() as stack:
         hub = stack.enter_context(open_session("router", listen=[endpoint]))
         psm = stack.enter_context(showing(endpoint, tmp_path, **ARM))

@@ -16,7 +16,6 @@ from engines.mujoco.pictures.recorded_scene import RecordedScene
 from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
-from hub.transport.endpoints import free_endpoint
 from schemas.codec import decode
 from schemas.errors import RecordingError
 from schemas.ros import Image as Picture
@@ -69,7 +68,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]
     made: dict[str, Recording] = {}
     for host in ("hub", "tissue"):
         loaded = load(str(place / "seen.yaml"), [f"participants.tissue.host={host}"])
-        launch(loaded, endpoint=free_endpoint(range(1)), record=place / host).run()
+        launch(loaded, endpoint="tcp/127.0.0.1:0", record=place / host).run()
         made[host] = Recording(place / host)
     return made
 
@@ -174,6 +173,6 @@ def test_a_scene_on_the_cart_is_drawn_as_it_was_stated(tmp_path: Path) -> None:
         "name: cart\nstep: 5 ms\nduration: 10 ms\nparticipants: {robot: {kind: mujoco, mounting: cart, looks:"
         " false, arms: {PSM1: {instrument: palpation-probe}, ECM: {endoscope: up}}}}\n"
     )
-    launch(load(str(file)), endpoint=free_endpoint(range(1)), record=tmp_path / "bag").run()
+    launch(load(str(file)), endpoint="tcp/127.0.0.1:0", record=tmp_path / "bag").run()
     picture = RecordedScene(Recording(tmp_path / "bag")).picture(0, camera="left", size=(40, 30))
     assert picture.shape == (30, 40, 3)

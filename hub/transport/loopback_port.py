@@ -1,0 +1,96 @@
+"""The port on loopback where a hub listens."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterable, Sequence
+
+import zenoh
+
+from hub.transport.endpoints import PORTS, address, require_loopback
+from hub.transport.zenoh_session import open_session
+from schemas.errors import ConnectError, ScenarioError
+
+__all__ = ["LoopbackPort", "listening_ports"]
+
+
+class LoopbackPort:
+    """A port that is given, or a free one that no other process can take before the hub listens there.
+
+    Of hubs that start in the same moment each holds a port of its own, by a socket that is bound to it.
+    """
+
+    def __init__(self, endpoint: str | None = None, ports: Sequence[int] = PORTS) -> None:
+        """Hold a free port if `endpoint` is None or names port 0, which stands for any free one.
+
+        Args:
+            endpoint: such as tcp/127.0.0.1:7447.
+            ports: from which a free one is chosen if no endpoint is given.
+
+        Raises ScenarioError if `endpoint` is not on loopback, ConnectError if no port is free.
+        """
+        self._ports: Sequence[int] = ports
+        self._held: socket.socket | None = None
+        self.endpoint = "" if endpoint is None else require_loopback(endpoint)
+        """Where the hub listens; a port that is not given may become another one in `listen`."""
+        if endpoint is not None:
+            port = address(endpoint)[1]
+            self._ports = (0,) if port == 0 else ()
+        if self._ports:
+            self._hold()
+
+    def listen(self) -> zenoh.Session:
+        """Open the hub's Zenoh session on the port. Raises ConnectError if a port that was given is taken."""
+        while True:
+            self.release()
+            try:
+                return open_session("router", listen=[self.endpoint])
+            except ConnectError:
+                if not self._ports or _bound(address(self.endpoint)[1]) is not None:
+                    raise
+                self._hold()  # another process has taken it in the moment between
+
+    def release(self) -> None:
+        """Hold the port no longer."""
+        if self._held is not None:
+            self._held.close()
+            self._held = None
+
+    def _hold(self) -> None:
+        for port in self._ports:
+            held = _bound(port)
+            if held is not None:
+                self._held, self.endpoint = held, f"tcp/127.0.0.1:{held.getsockname()[1]}"
+                return
+        raise ConnectError(
+            f"no free port among {self._ports[0]} to {self._ports[-1]} on 127.0.0.1: end a session that is"
+            " not needed, or give --listen tcp/127.0.0.1:PORT"
+        )
+
+
+def listening_ports(endpoints: Iterable[str]) -> tuple[LoopbackPort, list[str]]:
+    """Return the loopback port of a hub, and the endpoints at which its gate listens to other machines.
+
+    If `endpoints` has no loopback endpoint, a free port is chosen. Raises ScenarioError if one of them is
+    neither TCP on loopback nor TLS.
+    """
+    given = list(endpoints)
+    outside = [endpoint for endpoint in given if endpoint.startswith("tls/")]
+    inside = [require_loopback(endpoint) for endpoint in given if endpoint not in outside]
+    if len(inside) > 1:
+        raise ScenarioError(f"{', '.join(inside)}: a hub listens once on loopback")
+    if inside:
+        return LoopbackPort(inside[0]), outside
+    taken = {address(endpoint)[1] for endpoint in outside}
+    return LoopbackPort(ports=[port for port in PORTS if port not in taken]), outside
+
+
+def _bound(port: int) -> socket.socket | None:
+    """Return a socket that is bound to `port`; None if the port is taken."""
+    held = socket.socket()
+    try:
+        held.bind(("127.0.0.1", port))
+    except OSError:
+        held.close()
+        return None
+    return held
