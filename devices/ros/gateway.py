@@ -18,7 +18,7 @@ from devices.ros.topics.arbitration import CommandArbiter
 from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.kinematics import kinematics_handler
 from devices.ros.topics.publications import EventTopic, PeriodicTopic, Publications, State
-from devices.ros.topics.refusals import Refusals
+from devices.ros.topics.refusal_reports import RefusalReports
 from devices.ros.topics.row import Row
 from devices.ros.topics.subscriptions import SubscribedTopic
 from devices.ros.topics.vrep_table import vrep_table
@@ -76,7 +76,7 @@ class Gateway(Device):
         self._states: dict[str, State] = {}
         self._events: dict[str, EventTopic] = {}
         self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(CommandArbiter)
-        self._refusals = Refusals(self.name, self._publish_text)
+        self._refusals = RefusalReports(self.name, self._publish_text)
         self._received: deque[Sample] = deque()
         self._has_received = threading.Event()
         self._status_due_ns = 0

@@ -400,7 +400,7 @@ def test_the_same_mistake_is_told_again_later_with_how_often_it_came(
     gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [10**12]
-    monkeypatch.setattr("devices.ros.topics.refusals.monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("devices.ros.topics.refusal_reports.monotonic_ns", lambda: now[0])
     for _ in range(5):
         gateway.transport.send("/PSM1/servo_jp", joints(0.0))
     now[0] += 2_000_000_000

@@ -11,7 +11,7 @@ from devices.ros.topics.row import Row
 from robots.dvrk.crtk import REPEAT_NS
 from schemas.ros import StringMessage
 
-__all__ = ["Refusals"]
+__all__ = ["RefusalReports"]
 
 log = logging.getLogger(__name__)
 
@@ -19,7 +19,7 @@ _MOST = 8
 """Different texts reported of one topic within that time: a client may have a new error each time."""
 
 
-class Refusals:
+class RefusalReports:
     """Reports refused messages, and counts those that are not reported; for use from any thread."""
 
     def __init__(self, name: str, publish: Callable[[str, StringMessage], None]) -> None:
