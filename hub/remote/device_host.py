@@ -137,7 +137,7 @@ class DeviceHost:
                 raise self._failure
 
     def _device_loop(self, reply: JoinReply) -> DeviceThread:
-        """Return the thread of the device: that of the last run, unless kind, parameters or period have changed."""
+        """Return the thread of the device: the last one, unless kind, parameters or period have changed."""
         planned, params = reply.plan.participants[self._name], reply.params[self._name]
         wanted = (planned.kind, params, planned.read_ns, reply.directory)
         if self._loop is None or self._held != wanted:
