@@ -42,11 +42,11 @@ class Arms(Params):
 class TopicParams(Params):
     """Which topics exist: those of simulated arms, real arms and teleoperation components."""
 
-    profile: Literal["dvrk", "paper"] = Field(
+    profile: Literal["dvrk", "vrep"] = Field(
         default="dvrk",
         description=(
             "topics of the real system, or of the authors' simulator, behind which a participant of kind"
-            " `paper` stands"
+            " `vrep` stands"
         ),
     )
     arms: Arms = Field(default=Arms(), description="the simulated arms, as in the motion controller")

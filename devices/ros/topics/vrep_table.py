@@ -1,4 +1,4 @@
-"""The table of a gateway with `profile: paper`: the topics of the authors' simulator, in V-REP.
+"""The table of a gateway with `profile: vrep`: the topics of the authors' simulator, in V-REP.
 
 Behind it is a participant of kind `paper`. Names and types as in the scripts of their scenes
 (unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with the topics that their Python client publishes in

@@ -22,7 +22,7 @@ __all__ = ["periods_between", "robot_description", "whole_robot_sources"]
 def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, MessageSource]:
     """Return what is published of all arms together, by row name; `states`: by the names of their ports.
 
-    The authors' simulator (profile `paper`) has no such topics.
+    The authors' simulator (profile `vrep`) has no such topics.
     """
     if params.profile != "dvrk":
         return {}

@@ -100,7 +100,7 @@ def test_a_program_homes_all_arms_by_the_console_and_reads_what_the_console_says
 def test_a_program_for_the_authors_simulator_moves_an_arm() -> None:
     robot = IdealRobot(motion(arms=ARMS))
     gateway = MemoryGateway(
-        "ros", GatewayParams.model_validate({"profile": "paper", "arms": ARMS, "publish_period": "4545 us"})
+        "ros", GatewayParams.model_validate({"profile": "vrep", "arms": ARMS, "publish_period": "4545 us"})
     )
     goal = np.array([0.2, -0.1, 0.1, 0.3, 0.2, -0.4])
 

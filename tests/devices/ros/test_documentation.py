@@ -78,7 +78,7 @@ def way_of(row):
 def tables():
     """Return the tables of the page."""
     own = GatewayParams.model_validate(
-        {"profile": "paper", "arms": {"PSM1": HOLDING, "PSM2": HOLDING, "ECM": {}}}
+        {"profile": "vrep", "arms": {"PSM1": HOLDING, "PSM2": HOLDING, "ECM": {}}}
     )
     missing = [f"| `{name}` | {why} |" for name, why in NOT_SERVED.items()]
     return {"TABLE": lines_of(dvrk_table(SHOWN)), "MISSING": missing, "PAPER": lines_of(vrep_table(own))}

@@ -131,7 +131,7 @@ def test_the_tools_of_ros_show_it(ros, psm):
 
 def test_every_row_of_the_authors_topics(ros, tmp_path):
     arms = {name: WHOLE["arms"][name] for name in ("PSM1", "PSM2", "ECM")}
-    with showing(ros, tmp_path, profile="paper", arms=arms) as gateway, Program(ros) as console:
+    with showing(ros, tmp_path, profile="vrep", arms=arms) as gateway, Program(ros) as console:
         table = TablePeer(console)
         table.join(gateway.rows)
         exercise(gateway, table)
