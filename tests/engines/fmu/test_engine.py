@@ -19,11 +19,6 @@ from tests.engines.fmus import build
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
 
-CLOCK = (
-    '<Clock name="tick" intervalVariability="constant" intervalDecimal="0.1" valueReference="30"'
-    ' causality="input"/>'
-)
-
 
 class TestPorts:
     def test_the_test_fmus_are_valid(self, make: Make) -> None:
@@ -114,7 +109,6 @@ class TestBadFmus:
             ),
             (SPRING, {'fmiVersion="2.0"': 'fmiVersion="4.0"'}, "Unsupported FMI version"),
             (SPRING, {"<ModelVariables>": "<Model"}, "XMLSyntaxError"),
-            (BALL, {'<Binary name="image"': CLOCK + '<Binary name="image"'}, "tick"),
         ],
     )
     def test_what_cannot_be_co_simulated(
