@@ -129,7 +129,7 @@ class FmuEngine(Stepped):
 
         Outputs are those at `t + h`: after the step and, in FMI 3, after the events of that instant. What is
         read after fmi2DoStep belongs to the end of the step (FMI 2.0.4 section 4.2.1), and in FMI 3 with an
-        event mode discrete outputs change in that mode only (FMI 3.0.1 section 4.2.1). FMPy's `simulate_fmu`
+        event mode discrete outputs change in that mode only (FMI 3.0.1, Event Mode). FMPy's `simulate_fmu`
         records before and after an event: the second sample is this one (docs/decisions/0036). Once the FMU
         has ended the simulation its last outputs are held.
         """
