@@ -20,11 +20,11 @@ from schemas.errors import ScenarioError
 __all__ = ["opened_archive", "unpack"]
 
 LARGEST_FILE = 1 << 30
-"""Bytes of one unpacked file. The largest in the FMUs of the FMI cross-check are below 100 MB."""
+"""Bytes of one unpacked file."""
 LARGEST_TOTAL = 2 << 30
 """Bytes of all unpacked files together."""
 LARGEST_XML = 128 << 20
-"""Bytes of modelDescription.xml: some 500 000 variables."""
+"""Bytes of modelDescription.xml: 500 000 variables at some 250 bytes each."""
 MOST_FILES = 100_000
 
 _READ_XML = ("modelDescription.xml", "sources/buildDescription.xml")

@@ -126,7 +126,7 @@ def co_simulation(path: Path, model: ModelDescription, major: int, names: Collec
 
 
 def _is_time_based_input(row: ModelVariable) -> bool:
-    """Return whether a variable is a clock that the importer must let tick at times (FMI 3.0.1, clock types)."""
+    """Return whether a variable is an input clock that ticks at times the importer must know (FMI 3.0.1)."""
     return row.type == "Clock" and row.causality == "input" and row.intervalVariability != "triggered"
 
 
