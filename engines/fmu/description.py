@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from engines.fmu.model import co_simulation, read_model
 from engines.fmu.start import Start, declared_start, given_start, settable, size_of, unit_of
 from engines.fmu.variables import Variable, number_type, port_name
-from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
+from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import Port
 from schemas.ros import Float64Message, Float64MultiArray
 
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["Description", "describe"]
 
 _log = logging.getLogger(__name__)
+
+MOST_ELEMENTS = 1_000_000
+"""Of one array. A larger one in a port would fill the memory of all hosts at every step."""
 
 
 @dataclass(frozen=True)
@@ -43,29 +46,30 @@ class Description:
     """The start values that the scenario gives, as the FMU takes them."""
 
 
-def describe(path: Path, start: Mapping[str, Any]) -> Description:
+def describe(path: Path, start: Mapping[str, Any], *, strict: bool = True) -> Description:
     """Read the FMU at `path`; `start` holds start values by FMU variable name, in the variables' units.
+
+    `strict` false: read what can be read of a modelDescription.xml that breaks rules of FMI.
 
     Raises ScenarioError, and MissingExtraError without FMPy.
     """
-    model = _read(path)
-    major = int(model.fmiVersion.split(".")[0])
-    co_simulation = _co_simulation(path, model, major)
+    model, major, names = read_model(path, strict=strict)
+    part = co_simulation(path, model, major, names)
     starts = {value.name: value for value in _starts(path, model, major, start)}
     variables: dict[str, list[Variable]] = {"input": [], "output": []}
     ports: list[Port] = []
     for row in model.modelVariables:
         if row.causality not in variables or row.alias is not None:
             continue
-        variable = _variable(path, row, major, size_of(row, start))
+        variable = _variable(path, row, major, _size(path, row, start))
         if variable is not None:
             variables[row.causality].append(variable)
-            ports.append(_port(row, variable, _input_start(path, row, variable, starts)))
+            ports.append(_port(row, variable, _input_start(path, row, variable, starts, strict=strict)))
     return Description(
         path,
         major,
         model.guid,
-        co_simulation,
+        part,
         tuple(variables["input"]),
         tuple(variables["output"]),
         tuple(ports),
@@ -73,8 +77,22 @@ def describe(path: Path, start: Mapping[str, Any]) -> Description:
     )
 
 
+def _size(path: Path, row: ModelVariable, start: Mapping[str, Any]) -> int:
+    """Return the number of elements of a variable. Raises ScenarioError if it has none or too many."""
+    try:
+        size = size_of(row, start)
+    except (TypeError, ValueError):  # of given structural parameters `_starts` has taken care
+        size = -1
+    if not 0 <= size <= MOST_ELEMENTS:
+        raise ScenarioError(
+            f"'{path}': the dimensions of variable '{row.name}' (line {row.sourceline}) are no numbers whose"
+            f" product is at most {MOST_ELEMENTS}"
+        )
+    return size
+
+
 def _input_start(
-    path: Path, row: ModelVariable, variable: Variable, starts: Mapping[str, Start]
+    path: Path, row: ModelVariable, variable: Variable, starts: Mapping[str, Start], *, strict: bool
 ) -> tuple[float, ...] | None:
     if row.causality != "input":
         return None
@@ -83,65 +101,14 @@ def _input_start(
     try:
         return declared_start(row, variable.size)
     except ValueError as error:
-        raise ScenarioError(
-            f"'{path}': the FMU declares the start value '{row.start}' for '{row.name}': not a number"
-        ) from error
-
-
-def _read(path: Path) -> ModelDescription:
-    try:
-        from fmpy import read_model_description
-        from fmpy.model_description import ValidationError
-    except ImportError as error:
-        raise MissingExtraError("engine 'fmu'", "fmu", "fmpy") from error
-    if not path.is_file():
-        raise ScenarioError(f"the FMU '{path}' does not exist")
-    try:
-        with path.open("rb") as file:  # given a path, FMPy leaves the file open if there is an error in it
-            try:
-                return read_model_description(file)
-            except ValidationError as error:
-                # tools write many FMUs that run well and break a rule of the schema
-                _log.warning(
-                    "%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems)
-                )
-                return read_model_description(file, validate=False)
-    except Exception as error:  # FMPy raises BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
-        raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {error}") from error
-
-
-def _co_simulation(path: Path, model: ModelDescription, major: int) -> CoSimulation:
-    """Return the co-simulation part of the FMU.
-
-    Raises ScenarioError if it has none that runs on this platform.
-    """
-    import fmpy
-
-    if major not in (2, 3):
-        raise ScenarioError(f"'{path}' is an FMI {model.fmiVersion} FMU; FMI 2.0 and 3.0 are allowed")
-    if model.coSimulation is None:
-        raise ScenarioError(
-            f"'{path}' cannot be co-simulated: it is for model exchange or scheduled execution only. Export"
-            " it for co-simulation."
-        )
-    clocks = [
-        v.name
-        for v in model.modelVariables
-        if v.type == "Clock" and v.causality == "input" and v.intervalVariability != "triggered"
-    ]
-    if clocks:
-        raise ScenarioError(
-            f"'{path}' has time-based input clocks ({', '.join(clocks)}), which Trocar does not support."
-            " Export it without clocks."
-        )
-    folder = fmpy.platform if major == 2 else fmpy.platform_tuple
-    with zipfile.ZipFile(path) as archive:
-        names = archive.namelist()
-    if f"binaries/{folder}/{model.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}" not in names:
-        found = {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
-        binaries = ", ".join(sorted(found)) or "none"
-        raise ScenarioError(f"'{path}' has no binary for this platform, {folder}; it has: {binaries}")
-    return model.coSimulation
+        problem = f"input '{row.name}' (line {row.sourceline}) has the start value {row.start!r}, no number"
+        if strict:
+            raise ScenarioError(
+                f"'{path}': modelDescription.xml breaks a rule of FMI: {problem}. Export the FMU again with a"
+                " corrected one, or load it all the same with 'strict: false' and connect the input."
+            ) from error
+        _log.warning("%s: modelDescription.xml breaks a rule of FMI: %s", path, problem)
+        return None
 
 
 def _starts(path: Path, model: ModelDescription, major: int, start: Mapping[str, Any]) -> Iterator[Start]:
@@ -187,5 +154,5 @@ def _port(row: ModelVariable, variable: Variable, start: tuple[float, ...] | Non
         unit=unit_of(row),
         start=start,
         description=f"FMU variable '{row.name}' ({row.type})"
-        + (f": {row.description}" if row.description else ""),
+        + (f": {' '.join(row.description.split())}" if row.description else ""),
     )

@@ -50,6 +50,13 @@ class FmuParams(Params):
         gt=0,
         description="communication step of the FMU, a divisor of the period; default: the period",
     )
+    strict: bool = Field(
+        default=True,
+        description=(
+            "false: load the FMU although its modelDescription.xml breaks a rule of FMI in a way that leaves"
+            " something undefined, as FMPy does with validation off"
+        ),
+    )
 
     @field_validator("path")
     @classmethod
@@ -84,7 +91,7 @@ class FmuEngine(Stepped):
     @cached_property
     def _description(self) -> Description:
         try:
-            return describe(self.params.path, self.params.start)
+            return describe(self.params.path, self.params.start, strict=self.params.strict)
         except ScenarioError as error:
             error.path = ("participants", self.name, *(error.path or ("path",)))
             raise
@@ -118,13 +125,28 @@ class FmuEngine(Stepped):
         return self._read(0)
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        """Advance the FMU from `t` to `t + h` (ns)."""
+        """Advance the FMU from `t` to `t + h` (ns), or to where it ends the simulation.
+
+        Outputs are those at `t + h`: after the step and, in FMI 3, after the events of that instant. What is
+        read after fmi2DoStep belongs to the end of the step (FMI 2.0.4 section 4.2.1), and in FMI 3 with an
+        event mode discrete outputs change in that mode only (FMI 3.0.1, Event Mode). FMPy's `simulate_fmu`
+        records before and after an event: the second sample is this one (docs/decisions/0036). Once the FMU
+        has ended the simulation its last outputs are held.
+        """
         instance = self._running()
         sub = self.params.step or h
         for begin in range(0, h, sub):
-            instance.set_inputs(inputs, begin / 1e9, sub / 1e9)
-            instance.advance(t + begin, sub)
+            instance.now_ns = t + begin
+            if not instance.ended:
+                instance.set_inputs(inputs, begin / 1e9, sub / 1e9)
+            if not instance.ended:
+                instance.advance(t + begin, sub)
         return self._read(t + h)
+
+    @property
+    def ended(self) -> str:
+        """When and how the FMU has ended the simulation; empty while it goes on."""
+        return self._running().ended if self._instance else ""
 
     def state_hash(self) -> int:
         """Return the hash of the FMU's state, or else of its inputs, outputs and time."""
@@ -163,6 +185,8 @@ class FmuEngine(Stepped):
         return self._instance
 
     def _check_can_save(self) -> None:
+        if self._running().can_save:
+            return
         capabilities = self._description.co_simulation
         for flag in ("canGetAndSetFMUstate", "canSerializeFMUstate"):
             if not getattr(capabilities, flag):
@@ -170,6 +194,10 @@ class FmuEngine(Stepped):
                     f"participant '{self.name}': '{self.params.path.name}' cannot save its state, its"
                     f" modelDescription.xml says {flag}=false"
                 )
+        raise StateError(
+            f"participant '{self.name}': '{self.params.path.name}' cannot save its state, its library lacks"
+            " functions for it"
+        )
 
     def _read(self, t: int) -> Outputs:
         self._time[0] = t

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +15,10 @@ from engines.fmu.instance import DISCARD, Instance
 from engines.fmu.log import fmi2_callbacks, log_everything
 from engines.fmu.start import Start
 from hub.participant import Inputs
-from schemas.errors import SessionError
 
 __all__ = ["Fmi2Instance"]
 
-_LAST_SUCCESSFUL_TIME = 2
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 """fmi2StatusKind (fmi2FunctionTypes.h)."""
 
 
@@ -30,16 +30,26 @@ class Fmi2Instance(Instance):
     state_word = "FMUstate"
     deserialise_word = "DeSerialize"
     byte = ctypes.c_char
+    required = (
+        "Instantiate",
+        "SetupExperiment",
+        "EnterInitializationMode",
+        "ExitInitializationMode",
+        "DoStep",
+        "FreeInstance",
+    )
 
     def __init__(self, description: Description, name: str) -> None:
         """Load and instantiate the FMU."""
         from fmpy.fmi2 import FMU2Slave
 
-        super().__init__(
-            FMU2Slave, description, name, {"callbacks": fmi2_callbacks(), "loggingOn": log_everything()}
-        )
+        options = {"callbacks": fmi2_callbacks(), "loggingOn": log_everything()}
+        super().__init__(FMU2Slave, description, name, [options])
         self._do_step: Callable[..., int] = self._function("DoStep")
-        interpolates = description.co_simulation.canInterpolateInputs
+        self._varies = description.co_simulation.canHandleVariableCommunicationStepSize
+        interpolates = description.co_simulation.canInterpolateInputs and self.library.has(
+            "fmi2SetRealInputDerivatives"
+        )
         continuous = [
             variable
             for variable in description.inputs
@@ -84,18 +94,33 @@ class Fmi2Instance(Instance):
                 raise self.failure("SetRealInputDerivatives", status)
 
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h` (ns)."""
-        status = self._do_step(self._component, t / 1e9, h / 1e9, not self.can_save)
-        if status > WARNING:
-            raise self._step_failure(status, t, h)
+        """Bring the FMU from `t` to `t + h` (ns), or to where it ends the simulation.
 
-    def _step_failure(self, status: int, t: int, h: int) -> SessionError:
+        The point and the size of a step add up to the next point in every bit, so that an FMU finds no gap
+        between its steps, unless it only takes steps of one size (FMI 2.0.4 section 4.2.2, fmi2DoStep: "the
+        slave must integrate until time instant tc[i+1] = tc[i] + hc[i]").
+        """
+        now = t / 1e9
+        size = (t + h) / 1e9 - now if self._varies else h / 1e9
+        status = self._do_step(self._component, now, size, not self.can_save)
+        if status > WARNING:
+            self._take_failure(status, t, h)
+
+    def _take_failure(self, status: int, t: int, h: int) -> None:
+        """Note that the FMU has ended the simulation; raises SessionError if it has failed."""
         reached = ctypes.c_double()
+        known = status == DISCARD and self._status("GetRealStatus", _LAST_SUCCESSFUL_TIME, reached)
+        ended = ctypes.c_int()
+        if status == DISCARD and self._status("GetBooleanStatus", _TERMINATED, ended) and ended.value:
+            self._end(reached.value if known else t / 1e9, "fmi2Terminated")
+            return
         about = f" for the step from {t / 1e9:.9g} s to {(t + h) / 1e9:.9g} s"
-        if (
-            status == DISCARD
-            and self._function("GetRealStatus")(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached))
-            <= WARNING
-        ):
+        if known:
             about += f", of which it got to {reached.value:.9g} s"
-        return self.failure("DoStep", status, about)
+        raise self.failure("DoStep", status, about)
+
+    def _status(self, function: str, kind: int, value: Any) -> bool:
+        """Ask the FMU for a status; returns whether it answered."""
+        if not self.library.has(f"fmi2{function}"):
+            return False
+        return self._function(function)(self._component, kind, ctypes.byref(value)) <= WARNING

@@ -36,25 +36,29 @@ class Fmi3Instance(Instance):
     state_word = "FMUState"
     deserialise_word = "Deserialize"
     byte = ctypes.c_uint8
+    required = (
+        "InstantiateCoSimulation",
+        "EnterInitializationMode",
+        "ExitInitializationMode",
+        "DoStep",
+        "FreeInstance",
+    )
 
     def __init__(self, description: Description, name: str) -> None:
         """Load and instantiate the FMU."""
         from fmpy.fmi3 import FMU3Slave
 
         capabilities = description.co_simulation
-        self._has_events = capabilities.hasEventMode
-        self._splits = capabilities.hasEventMode and capabilities.canHandleVariableCommunicationStepSize
 
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:  # noqa: ARG001
             log_message(name, status, category, message)
 
-        options = {
-            "eventModeUsed": self._has_events,
-            "earlyReturnAllowed": True,
-            "logMessage": log,
-            "loggingOn": log_everything(),
-        }
-        super().__init__(FMU3Slave, description, name, options)
+        # some FMUs declare an event mode that their library does not have (Roberts of the Reference FMUs)
+        modes = [True, False] if capabilities.hasEventMode else [False]
+        common = {"earlyReturnAllowed": True, "logMessage": log, "loggingOn": log_everything()}
+        super().__init__(FMU3Slave, description, name, [common | {"eventModeUsed": used} for used in modes])
+        self._has_events = bool(self.options["eventModeUsed"])
+        self._splits = self._has_events and capabilities.canHandleVariableCommunicationStepSize
         self._event_blocks = [block for block in self.inputs if block.discrete and self._has_events]
         self._step_blocks = [block for block in self.inputs if block not in self._event_blocks]
         # time of the next event, discrete inputs
@@ -89,7 +93,8 @@ class Fmi3Instance(Instance):
         self.call("EnterInitializationMode", tolerance is not None, tolerance or 0.0, 0.0, False, 0.0)
         self.call("ExitInitializationMode")
         if self._has_events:
-            self._update_discrete_states()
+            if not self._update_discrete_states():
+                raise SessionError(f"the FMU asks to end the simulation before it begins{self._reason()}")
             self.call("EnterStepMode")
 
     def set_inputs(self, inputs: Inputs, tau: float, dt: float) -> None:
@@ -107,10 +112,10 @@ class Fmi3Instance(Instance):
         values = np.concatenate([block.values for block in self._event_blocks])
         if not np.array_equal(values, self.memory[1:]):
             self.memory[1:] = values
-            self._handle_event(self._event_blocks)
+            self._handle_event(self._event_blocks, at=self.now_ns / 1e9)
 
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h` (ns), from event to event."""
+        """Bring the FMU from `t` to `t + h` (ns), from event to event, or to where it ends the simulation."""
         now, end = t / 1e9, (t + h) / 1e9
         for _ in range(_MOST_EVENTS):
             target = min(end, float(self.memory[0])) if self._splits else end
@@ -120,9 +125,9 @@ class Fmi3Instance(Instance):
                 needs_event = self._has_events and (
                     self._event.value or now > self.memory[0] - _SAME_INSTANT_S
                 )
-            if needs_event:
-                self._handle_event()
-            if end - now < _SAME_INSTANT_S:
+            if needs_event and not self.ended:
+                self._handle_event(at=now)
+            if self.ended or end - now < _SAME_INSTANT_S:
                 return
         raise SessionError(
             f"the FMU reached only {now:.9g} s in {_MOST_EVENTS} events of the step to {end:.9g} s"
@@ -133,26 +138,33 @@ class Fmi3Instance(Instance):
         status = self._do_step(now, target - now, not self.can_save, *self._step_results)
         if status > WARNING:
             raise self.failure("DoStep", status, f" for the step from {now:.9g} s to {target:.9g} s")
+        reached = self._reached.value if self._early.value else target
         if self._terminate.value:
-            raise SessionError(f"the FMU asks to end the simulation at {self._reached.value:.9g} s")
-        return self._reached.value if self._early.value else target
+            self._end(reached, "terminateSimulation of fmi3DoStep")
+        return reached
 
-    def _handle_event(self, inputs: Sequence[Block] = ()) -> None:
+    def _handle_event(self, inputs: Sequence[Block] = (), *, at: float) -> None:
+        """Handle the event at `at` (s). Where the FMU ends the simulation it is left in event mode."""
         self.call("EnterEventMode")
         for block in inputs:
             self.transfer(block)
-        self._update_discrete_states()
-        self.call("EnterStepMode")
+        if self._update_discrete_states():
+            self.call("EnterStepMode")
+        else:
+            self._end(at, "terminateSimulation of fmi3UpdateDiscreteStates")
 
-    def _update_discrete_states(self) -> None:
-        """Iterate the event until the discrete states stay, and note when the next one is due."""
+    def _update_discrete_states(self) -> bool:
+        """Iterate the event until the discrete states stay, and note when the next one is due.
+
+        Returns whether the simulation goes on: the FMU may ask to end it.
+        """
         for _ in range(_MOST_EVENTS):
             self.call("UpdateDiscreteStates", *self._update_results)
             if self._terminate.value:
-                raise SessionError("the FMU asks to end the simulation at an event")
+                return False
             if not self._again.value:
                 self.memory[0] = self._next.value if self._scheduled.value else math.inf
-                return
+                return True
         raise SessionError(
             f"the discrete states of the FMU do not settle in {_MOST_EVENTS} iterations of one event"
         )

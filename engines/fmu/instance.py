@@ -14,8 +14,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.fmu.archive import unpack
 from engines.fmu.blocks import WARNING, Block, grouped, prepared
 from engines.fmu.description import Description
+from engines.fmu.library import Library, load_library
 from engines.fmu.log import last_warning
 from engines.fmu.start import Start
 from hub.participant import Inputs
@@ -27,27 +29,6 @@ _log = logging.getLogger(__name__)
 _STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 DISCARD, _ERROR, _FATAL = 2, 3, 4
 """FMI statuses (fmi2Status, fmi3Status)."""
-
-
-def _load(slave: type[Any], description: Description, directory: Path, name: str) -> Any:
-    """Load the FMU that was extracted to `directory` through FMPy's class `slave`.
-
-    Raises ScenarioError if its library cannot be loaded.
-    """
-    identifier = description.co_simulation.modelIdentifier
-    try:
-        # FMPy changes the directory to load, and leaves it changed when that fails
-        with contextlib.chdir(Path.cwd()):
-            return slave(
-                guid=description.guid,
-                modelIdentifier=identifier,
-                unzipDirectory=str(directory),
-                instanceName=name,
-            )
-    except (
-        Exception
-    ) as error:  # FMPy raises a bare Exception or, for a function that is missing, AttributeError
-        raise ScenarioError(f"the library of '{description.path}' cannot be loaded: {error}") from error
 
 
 class Instance(ABC):
@@ -65,30 +46,39 @@ class Instance(ABC):
     byte: ClassVar[Any]
     """C type of a serialised state's elements."""
 
+    required: ClassVar[Sequence[str]]
+    """Functions that are called of every FMU, without their prefix."""
+
     def __init__(
-        self, slave: type[Any], description: Description, name: str, options: Mapping[str, Any]
+        self,
+        slave: type[Any],
+        description: Description,
+        name: str,
+        options: Sequence[Mapping[str, Any]],
     ) -> None:
-        """Extract and load the FMU through FMPy's class `slave` and instantiate it with `options`.
+        """Unpack and load the FMU through FMPy's class `slave` and instantiate it.
 
-        Raises ScenarioError if the library cannot be loaded, SessionError if the FMU refuses to be
-        instantiated.
+        `options`: what it is instantiated with; if it refuses the first ones, the next are tried.
+
+        Raises ScenarioError if the archive is refused, if the library cannot be loaded or lacks a function
+        that is needed, and SessionError if the FMU refuses to be instantiated.
         """
-        from fmpy import extract
-
         self._name = name
+        self.ended = ""
+        """When and how the FMU has ended the simulation; empty while it goes on."""
+        self.now_ns = 0
+        """The time at which inputs are set."""
         with contextlib.ExitStack() as stack:
             directory = stack.enter_context(tempfile.TemporaryDirectory(prefix="trocar-fmu-"))
-            extract(description.path, directory)
-            self._fmu = _load(slave, description, Path(directory), name)
+            unpack(description.path, Path(directory))
+            self._fmu = load_library(slave, description, Path(directory), name)
             stack.callback(self._fmu.freeLibrary)
-            try:
-                self._fmu.instantiate(**options)
-            except Exception as error:  # FMPy raises a bare Exception
-                raise SessionError(f"'{description.path}' cannot be instantiated{self._reason()}") from error
+            self.library: Library = self._fmu.dll
+            self._check_functions(description)
+            self.options = self._instantiate(description, options)
+            """Those that the FMU has taken."""
             self._loaded = stack.pop_all()
-        self.can_save = (
-            description.co_simulation.canGetAndSetFMUstate and description.co_simulation.canSerializeFMUstate
-        )
+        self.can_save = self._can_save(description)
         self._component: int = self._fmu.component
         self._initialised = False
         self._worst = 0
@@ -100,6 +90,44 @@ class Instance(ABC):
         self._serialised: Any = (self.byte * 0)()
         self.inputs = [Block("Set", group, self._access) for group in grouped(description.inputs)]
         self.outputs = [Block("Get", group, self._access) for group in grouped(description.outputs)]
+
+    def _check_functions(self, description: Description) -> None:
+        needed = dict.fromkeys(self.prefix + name for name in self.required)
+        needed |= dict.fromkeys(f"{self.prefix}Set{v.type.access}" for v in description.inputs)
+        needed |= dict.fromkeys(f"{self.prefix}Get{v.type.access}" for v in description.outputs)
+        needed |= dict.fromkeys(f"{self.prefix}Set{start.access}" for start in description.starts)
+        if missing := self.library.missing(needed):
+            raise ScenarioError(
+                f"the library of '{description.path}' cannot be used: it lacks {', '.join(missing)}"
+            )
+
+    def _instantiate(
+        self, description: Description, options: Sequence[Mapping[str, Any]]
+    ) -> Mapping[str, Any]:
+        """Instantiate the FMU with the first of `options` that it takes, and return them."""
+        for which in options:
+            try:
+                self._fmu.instantiate(**which)
+            except Exception as error:  # FMPy raises a bare Exception
+                failure = f"'{description.path}' cannot be instantiated{self._reason()}"
+                if which is options[-1]:
+                    raise SessionError(failure) from error
+                _log.warning("%s; it is tried without an option that it says it has", failure)
+            else:
+                return which
+        raise ValueError("there are no options to instantiate an FMU with")
+
+    def _can_save(self, description: Description) -> bool:
+        flags = description.co_simulation
+        if not (flags.canGetAndSetFMUstate and flags.canSerializeFMUstate):
+            return False
+        word = self.state_word
+        verbs = ("Get", "Set", "Free", "Serialize", self.deserialise_word)
+        names = [f"{self.prefix}{verb}{word}" for verb in verbs]
+        missing = self.library.missing([*names, f"{self.prefix}Serialized{word}Size"])
+        if missing:
+            _log.warning("%s: the FMU cannot save its state, its library lacks %s", self._name, missing[0])
+        return not missing
 
     def initialise(self, starts: Sequence[Start], tolerance: float | None) -> None:
         """Set the start values and bring the FMU to time 0."""
@@ -115,7 +143,7 @@ class Instance(ABC):
 
     @abstractmethod
     def advance(self, t: int, h: int) -> None:
-        """Bring the FMU from `t` to `t + h`, both in nanoseconds."""
+        """Bring the FMU from `t` to `t + h`, both in nanoseconds, or to where it ends the simulation."""
 
     def read_outputs(self) -> None:
         """Bring the FMU's outputs into the blocks."""
@@ -135,6 +163,7 @@ class Instance(ABC):
 
     def deserialise(self, state: bytes) -> None:
         """Bring the FMU back to a state that `serialise` returned."""
+        self.ended = ""
         restored = ctypes.c_void_p()
         self.call(
             f"{self.deserialise_word}{self.state_word}",
@@ -157,6 +186,7 @@ class Instance(ABC):
             if (
                 self._initialised
                 and self._worst < _ERROR
+                and self.library.has(f"{self.prefix}Terminate")
                 and self._function("Terminate")(self._component) > WARNING
             ):
                 _log.warning("%s: %sTerminate failed%s", self._name, self.prefix, self._reason())
@@ -182,7 +212,11 @@ class Instance(ABC):
         return f"; the FMU reports: {message}" if message else ""
 
     def _function(self, name: str) -> Callable[..., int]:
-        return getattr(self._fmu.dll, self.prefix + name)
+        return getattr(self.library, self.prefix + name)
+
+    def _end(self, time_s: float, how: str) -> None:
+        """Note that the FMU asks to end the simulation."""
+        self.ended = f"the FMU asks to end the simulation at {time_s:.9g} s ({how}){self._reason()}"
 
     def _access(self, function: str, references: Sequence[int], raw: NDArray[Any]) -> Callable[[], int]:
         return prepared(self._function(function), self._component, references, raw, counted=self.counted)

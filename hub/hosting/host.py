@@ -83,6 +83,11 @@ class Host:
         waiting = (source for (source, _), cell in self._remote_cells.items() if cell.waiting)
         return next(waiting, self._stepping)
 
+    @property
+    def ended(self) -> dict[str, str]:
+        """The participants that end the session, and why."""
+        return {one.name: reason for one in self._hosted if (reason := one.participant.ended)}
+
     def configure(self, directory: Path) -> dict[str, tuple[BondSide, ...]]:
         """Configure every participant and publish its outputs at time 0.
 

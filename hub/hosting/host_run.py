@@ -53,6 +53,7 @@ class HostRun:
         self._session, self._request, self._directory = session, request, directory
         self._keys, self._run, self._step_ns = Keys(reply.session), reply.run, reply.plan.step_ns
         self._next_step = 0
+        self._ended: set[str] = set()
         plan, host, keys = reply.plan, request.host, self._keys
         mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
         made = {
@@ -172,6 +173,11 @@ class HostRun:
         return grant
 
     def _acknowledge(self, planned: PlannedParticipant, ack: Ack) -> None:
+        reason = self._host.ended.get(planned.name)
+        if reason and planned.name not in self._ended:
+            self._ended.add(planned.name)
+            # before the ack: the hub gives no grant after it
+            self._send_to_hub(self._request.model_copy(update={"ended": f"{planned.name}: {reason}"}))
         self._acks[planned.name].put(pack_ack(ack))
 
     def _report_failure(self, name: str, cause: str) -> None:

@@ -52,6 +52,8 @@ class Summary:
     largest_s. In the device's clock: one that follows simulated time has simulated latencies.
     """
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
+    ending: str | None = None
+    """Which participant has ended the session, at what simulated time and why; None if none has."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the summary as a flat mapping, with the measures beside the rest."""

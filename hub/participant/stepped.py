@@ -84,6 +84,15 @@ class Stepped(Participant):
         """The bonds that may be connected; after `configure` with their effective masses."""
         return ()
 
+    @property
+    def ended(self) -> str:
+        """Why this participant ends the session, in one clause with the time; empty while it goes on.
+
+        It is read when a grant is done: the session then ends in good order, with state `done`. Until there
+        the participant is stepped on and returns outputs as ever.
+        """
+        return ""
+
     @abstractmethod
     def configure(self, setup: Setup) -> Outputs:
         """Build the model, and return every output at time 0."""

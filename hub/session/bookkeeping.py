@@ -38,7 +38,7 @@ class Bookkeeping:
         self.phase = "starting"
         """`starting`, `running`, `paused`, `done` or `failed`."""
         self.detail = ""
-        """Why the run has failed."""
+        """Why the run has failed, or who has ended it before its duration."""
         self._scenario = scenario
         self._plan = plan
         self._run = run
@@ -134,6 +134,7 @@ class Bookkeeping:
             energy_residual_j=self._observers.energy.residual_j,
             latency=by_way(self._latencies),
             measures=self._observers.measures.results(),
+            ending=self.detail or None,
         )
 
     @property

@@ -27,6 +27,7 @@ class JoinedHosts:
         run: The number of the run.
         watched: Outputs of which the hub needs every value.
         failed: Is called with participant and cause when a host reports a failure.
+        ended: Is called with participant and reason when a host reports that one ends the session.
     """
 
     def __init__(
@@ -37,6 +38,7 @@ class JoinedHosts:
         run: int,
         watched: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
+        ended: Callable[[str, str], None],
     ) -> None:
         self._watched = list(watched)
         self._scenario = scenario
@@ -44,12 +46,16 @@ class JoinedHosts:
         self._directory = directory
         self._run = run
         self._failed = failed
+        self._ended = ended
         self._hosts: dict[str, JoinRequest] = {}
         self._admissions = 0
         self._changed = threading.Condition()
 
     def join(self, request: JoinRequest) -> JoinReply | Empty:
-        """Answer a host that joins, is ready or has failed; raises MessageError to refuse it."""
+        """Answer a host that joins, is ready, has failed or ends the session.
+
+        Raises MessageError to refuse it.
+        """
         names = [name for name, planned in self._plan.participants.items() if planned.host == request.host]
         if not names or request.host == "hub":
             hosts = (
@@ -58,9 +64,11 @@ class JoinedHosts:
             raise MessageError(
                 f"session '{self._scenario.name}' has no host '{request.host}'; it has {hosts}"
             )
-        participant, _, cause = request.failed.partition(": ")
-        if request.failed and participant not in names:
-            raise MessageError(f"host '{request.host}' has no participant '{participant}' that could fail")
+        participant, _, cause = (request.failed or request.ended).partition(": ")
+        if participant and participant not in names:
+            raise MessageError(
+                f"host '{request.host}' has no participant '{participant}' that could fail or end the session"
+            )
         with self._changed:
             known = self._hosts.get(request.host)
             if known is not None and known.pid != request.pid:
@@ -74,7 +82,9 @@ class JoinedHosts:
             self._changed.notify_all()
         if request.failed:
             self._failed(participant, cause)
-        if request.ready or request.failed:
+        elif request.ended:
+            self._ended(participant, cause)
+        if request.ready or request.failed or request.ended:
             return Empty()
         params = {name: self._scenario.participants[name].params for name in names}
         far = request.host.startswith("remote/")

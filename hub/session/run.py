@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -41,6 +42,8 @@ from schemas.keys import Keys
 from schemas.scenario import Scenario
 
 __all__ = ["Run", "SessionSpec"]
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ class Run:
         )
         watched = list(self.observers.away.values())
         self.joined_hosts = JoinedHosts(
-            scenario, plan, spec.directory, self.number, watched, self.failure.report
+            scenario, plan, spec.directory, self.number, watched, self.failure.report, self.end
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.observers)
         answering.callback(self.status.undeclare)
@@ -125,6 +128,16 @@ class Run:
             plan, self.processes, scenario.answer_limit, lambda: self.host.awaited, self.failure.report
         )
         stack.callback(self.watchdog.end)
+
+    def end(self, participant: str, reason: str) -> None:
+        """End the session in good order when the present grant is done; from any thread.
+
+        The first participant that asks for it is the one that status and summary name.
+        """
+        if not self.bookkeeping.detail:
+            self.bookkeeping.detail = f"participant '{participant}' has ended the session: {reason}"
+            log.info("%s", self.bookkeeping.detail)
+        self.state.shutdown()
 
     def _host(self) -> Host:
         """Return the host of this process, connected to the others over Zenoh."""

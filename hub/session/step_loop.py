@@ -125,6 +125,8 @@ class StepLoop:
         run.host.run(grant, self._done_here)
         self._receive_acks([name for name in due if name in self._away], grant, steps)
         run.bookkeeping.acknowledged(granted_ns)
+        for participant, reason in run.host.ended.items():
+            run.end(participant, reason)
         if run.clock.realtime:
             self.book_acks()  # now rather than when the next sample of a device waits
         count = (grant.horizon_ns - grant.start_ns) // self._step_ns

@@ -49,6 +49,8 @@ class JoinRequest(_Json):
     bonds: dict[str, tuple[BondSide, ...]] = {}
     failed: str = ""
     """Why the host has failed: `participant: cause`."""
+    ended: str = ""
+    """Why a participant of the host ends the session: `participant: reason`."""
 
 
 class ClockReply(_Json):

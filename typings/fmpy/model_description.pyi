@@ -1,6 +1,9 @@
 class SimpleType:
     unit: str | None
 
+class Unit:
+    name: str
+
 class CoSimulation:
     modelIdentifier: str
     canHandleVariableCommunicationStepSize: bool
@@ -26,6 +29,8 @@ class ModelVariable:
     declaredType: SimpleType | None
     dimensions: list[Dimension]
     unit: str | None
+    displayUnit: str | None
+    sourceline: int
     start: str | None
     alias: ModelVariable | None
 
@@ -34,6 +39,7 @@ class ModelDescription:
     guid: str
     coSimulation: CoSimulation | None
     modelVariables: list[ModelVariable]
+    unitDefinitions: list[Unit]
 
 class ValidationError(Exception):
     problems: list[str]

@@ -3,7 +3,6 @@ from __future__ import annotations
 import logging
 import math
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,73 +12,19 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from engines.fmu.engine import FmuEngine, FmuParams
-from hub.participant import Inputs, Setup
+from hub.participant import Setup
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
-from schemas.ports import Port
+from tests.engines.fmu.driving import BALL, MS, SPRING, STAIR, Make, inputs_of, ports, run
 from tests.engines.fmus import build
 
 pytestmark = pytest.mark.skipif(not build.USABLE, reason=build.WHY_NOT)
-
-MS = 10**6
-SPRING, BALL = "mass_spring_damper", "bouncing_ball"
-CLOCK = (
-    '<Clock name="tick" intervalVariability="constant" intervalDecimal="0.1" valueReference="30"'
-    ' causality="input"/>'
-)
-Make = Callable[..., FmuEngine]
-
-
-@pytest.fixture(scope="session")
-def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return {model: build.compile_library(model, tmp_path_factory.mktemp(model)) for model in (SPRING, BALL)}
-
-
-@pytest.fixture
-def make(libraries: dict[str, Path], tmp_path: Path) -> Iterator[Make]:
-    """Makes an engine of a test FMU, configured unless `period` is 0."""
-    engines: list[FmuEngine] = []
-
-    def make(model: str, period: int = MS, edits: dict[str, str] | None = None, **params: Any) -> FmuEngine:
-        path = build.pack(model, libraries[model], tmp_path / f"{model}{len(engines)}.fmu", edits)
-        engines.append(FmuEngine("plant", FmuParams(path=path, **params)))
-        if period:
-            engines[-1].configure(Setup(period_ns=period, directory=tmp_path))
-        return engines[-1]
-
-    yield make
-    for engine in engines:
-        engine.close()
-
-
-def inputs_of(engine: FmuEngine, rates: dict[str, float] | None = None, **values: Any) -> Inputs:
-    given = {p.name: np.array(p.start, np.float64) for p in engine.ports if p.causality == "input"}
-    inputs = Inputs(
-        given | {name: np.atleast_1d(np.asarray(value, np.float64)) for name, value in values.items()}
-    )
-    inputs._rates = {name: np.array([rate]) for name, rate in (rates or {}).items()}
-    return inputs
-
-
-def run(
-    engine: FmuEngine, steps: int, period: int = MS, start: int = 0, inputs: Inputs | None = None
-) -> dict[str, float]:
-    """Step the engine; return the first element of every output at the end."""
-    outputs: Any = {}
-    inputs = inputs or inputs_of(engine)
-    for i in range(start, start + steps):
-        outputs = engine.step(i * period, period, inputs)
-    return {name: float(value[0]) for name, value in outputs.items()}
-
-
-def ports(engine: FmuEngine) -> dict[str, Port]:
-    return {port.name: port for port in engine.ports}
 
 
 class TestPorts:
     def test_the_test_fmus_are_valid(self, make: Make) -> None:
         from fmpy.validation import validate_fmu
 
-        for model in (SPRING, BALL):
+        for model in (SPRING, BALL, STAIR):
             assert validate_fmu(str(make(model, period=0).params.path)) == []
 
     def test_fmi2_variables_with_unit_start_and_type(self, make: Make) -> None:
@@ -164,7 +109,6 @@ class TestBadFmus:
             ),
             (SPRING, {'fmiVersion="2.0"': 'fmiVersion="4.0"'}, "Unsupported FMI version"),
             (SPRING, {"<ModelVariables>": "<Model"}, "XMLSyntaxError"),
-            (BALL, {'<Binary name="image"': CLOCK + '<Binary name="image"'}, "tick"),
         ],
     )
     def test_what_cannot_be_co_simulated(
@@ -382,11 +326,6 @@ class TestEvents:
         outputs = run(engine, 10, start=10, inputs=inputs_of(engine, frozen=0))
         assert outputs["h"] == pytest.approx(1 - self.G * 0.01**2 / 2)
         assert run(engine, 10, start=20, inputs=inputs_of(engine, frozen=1))["h"] == outputs["h"]
-
-    @pytest.mark.parametrize("edits", [None, {' hasEventMode="true"': ""}])
-    def test_an_fmu_that_ends_the_simulation(self, make: Make, edits: dict[str, str] | None) -> None:
-        with pytest.raises(SessionError, match="asks to end the simulation"):
-            run(make(BALL, start={"ends_at": 0.2}, edits=edits), 2000)
 
     def test_discrete_states_that_do_not_settle(self, make: Make) -> None:
         with pytest.raises(SessionError, match="do not settle"):

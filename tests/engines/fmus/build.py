@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 USABLE = COMPILER is not None and sys.platform == "linux" and platform.machine() == "x86_64"
 WHY_NOT = "the test FMUs are compiled from C: this needs 'cc' or 'gcc' and Linux on x86_64"
-FOLDERS = {"mass_spring_damper": "linux64", "bouncing_ball": "x86_64-linux"}
+FOLDERS = {"mass_spring_damper": "linux64", "bouncing_ball": "x86_64-linux", "stair": "linux64"}
 """Platform folders of FMI 2.0 and 3.0."""
 
 
@@ -22,8 +22,9 @@ def compile_library(model: str, folder: Path, *flags: str) -> Path:
     """Compile the shared library of `model` into `folder`."""
     assert COMPILER, WHY_NOT
     library = folder / f"{model}.so"
-    options = ["-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", *flags]
-    subprocess.run([COMPILER, *options, str(HERE / model / "model.c"), "-lm", "-o", str(library)], check=True)
+    options = ["-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    source = str(HERE / model / "model.c")
+    subprocess.run([COMPILER, *options, source, "-lm", *flags, "-o", str(library)], check=True)
     return library
 
 

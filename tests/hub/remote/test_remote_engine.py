@@ -97,7 +97,13 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
     assert [port.name for port in seen.participants["deaf"].ports] == ["hand"]
     assert (seen.connections, len(seen.from_devices)) == ((), 1)
     joined_hosts = JoinedHosts(
-        file.scenario, plan, file.source.directory, 1, [("near", "out"), ("hand", "hand")], lambda *_: None
+        file.scenario,
+        plan,
+        file.source.directory,
+        1,
+        [("near", "out"), ("hand", "hand")],
+        lambda *_: None,
+        lambda *_: None,
     )
     reply = joined_hosts.join(JoinRequest(host="remote/hand", pid=1))
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])

@@ -45,6 +45,12 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
         log(environment, ERROR, "logStatusError", "wrong token");
         return NULL;
     }
+#ifdef NO_EVENT_MODE /* whatever its modelDescription.xml says */
+    if (event_mode) {
+        log(environment, ERROR, "logStatusError", "no event mode here");
+        return NULL;
+    }
+#endif
     Instance *i = calloc(1, sizeof *i);
     i->event_mode = event_mode;
     i->early_return = early_return;

@@ -1,0 +1,148 @@
+"""The archive of an FMU, which may come from a stranger: it is checked before anything in it is read.
+
+An FMU is a program: its library runs with all rights of the process that loads it, and no check here changes
+that. The checks keep the steps before that harmless: a scenario that is only listed, validated or drawn reads
+modelDescription.xml and loads nothing.
+"""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+from xml.parsers import expat
+
+from schemas.errors import ScenarioError
+
+__all__ = ["opened_archive", "unpack"]
+
+LARGEST_FILE = 1 << 30
+"""Bytes of one unpacked file."""
+LARGEST_TOTAL = 2 << 30
+"""Bytes of all unpacked files together."""
+LARGEST_XML = 128 << 20
+"""Bytes of modelDescription.xml: 500 000 variables at some 250 bytes each."""
+MOST_FILES = 100_000
+
+_READ_XML = ("modelDescription.xml", "sources/buildDescription.xml")
+"""The files that FMPy parses."""
+_ENCRYPTED = 1
+"""Bit of a ZIP entry's flags (APPNOTE.TXT 4.4.4)."""
+
+
+@contextmanager
+def opened_archive(path: Path) -> Generator[tuple[IO[bytes], zipfile.ZipFile]]:
+    """Open the FMU at `path` as a file and as an archive that passed all checks.
+
+    Raises ScenarioError if it could write outside the directory it is unpacked to, is larger than the limits
+    or brings XML entities, and what `zipfile` raises if it is no archive.
+    """
+    with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+        problem = _problem(archive.infolist()) or _xml_problem(archive)
+        if problem:
+            raise ScenarioError(f"the FMU '{path}' is refused: {problem}")
+        file.seek(0)
+        yield file, archive
+
+
+def unpack(path: Path, directory: Path) -> None:
+    """Unpack the FMU at `path` into `directory`.
+
+    Raises ScenarioError, with nothing written, if it is refused.
+    """
+    with opened_archive(path) as (_, archive):
+        try:
+            archive.extractall(directory)
+        except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
+            raise ScenarioError(f"the FMU '{path}' cannot be unpacked: {error}") from error
+
+
+def _problem(entries: Iterable[zipfile.ZipInfo]) -> str:
+    """Return what is wrong with the entries of an archive, as a clause; empty if nothing is."""
+    total, seen = 0, set[str]()
+    for count, entry in enumerate(entries, start=1):
+        name = entry.orig_filename  # `filename` is cut at a NUL
+        problem = _name_problem(name) or _kind_problem(entry)
+        if problem:
+            return f"its archive holds {name!r}, {problem}"
+        if name in seen:
+            return f"its archive holds {name!r} twice"
+        seen.add(name)
+        total += entry.file_size
+        limit = LARGEST_XML if name in _READ_XML else LARGEST_FILE
+        if entry.file_size > limit:
+            return f"{name!r} has {_size(entry.file_size)} unpacked, allowed are {_size(limit)}"
+        if total > LARGEST_TOTAL:
+            return f"it has more than {_size(LARGEST_TOTAL)} unpacked"
+        if count > MOST_FILES:
+            return f"its archive holds more than {MOST_FILES} files"
+    return ""
+
+
+def _name_problem(name: str) -> str:
+    if "\\" in name or ":" in name or not name.isprintable():
+        return "a name with a backslash, a colon or a control character"
+    if name.startswith("/"):
+        return "an absolute path"
+    if set(name.removesuffix("/").split("/")) & {"", ".", ".."}:
+        return "a path with an empty part, '.' or '..': it could leave the directory it is unpacked to"
+    return ""
+
+
+def _kind_problem(entry: zipfile.ZipInfo) -> str:
+    kind = stat.S_IFMT(entry.external_attr >> 16)  # 0 where the archive was not made on Unix
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "a link" if kind == stat.S_IFLNK else "neither a file nor a directory"
+    return "which is encrypted" if entry.flag_bits & _ENCRYPTED else ""
+
+
+def _xml_problem(archive: zipfile.ZipFile) -> str:
+    """Return what is wrong with the XML that FMPy parses: a document type could declare entities.
+
+    Entities expand without bound, or bring in files of this machine. FMI uses none.
+    """
+    for name in _READ_XML:
+        if name in archive.namelist():
+            with archive.open(name) as stream:
+                problem = _prolog_problem(stream)
+            if problem:
+                return f"{name} {problem}"
+    return ""
+
+
+class _RootReachedError(Exception):
+    """The root element begins: no document type can follow."""
+
+
+class _DocumentTypeError(Exception):
+    """A document type begins."""
+
+
+def _prolog_problem(stream: IO[bytes]) -> str:
+    """Return what is wrong with an XML file before its root element; the rest is left to FMPy."""
+
+    def reached(*_: object) -> None:
+        raise _RootReachedError
+
+    def found(*_: object) -> None:
+        raise _DocumentTypeError
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = reached
+    parser.StartDoctypeDeclHandler = found
+    try:
+        parser.ParseFile(stream)
+    except _RootReachedError:
+        return ""
+    except _DocumentTypeError:
+        return "has a document type (<!DOCTYPE>), which FMI does not use"
+    except (expat.ExpatError, ValueError) as error:  # ValueError: UTF-7, which another parser may read
+        return f"is not XML in UTF-8: {error}"
+    return "has no root element"
+
+
+def _size(count: int) -> str:
+    return f"{count / (1 << 20):.0f} MiB"

@@ -1,0 +1,150 @@
+"""An FMU's modelDescription.xml, read by FMPy and checked before its names go anywhere."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from engines.fmu.archive import opened_archive
+from engines.fmu.start import settable, unit_of
+from schemas.errors import MissingExtraError, ScenarioError
+
+if TYPE_CHECKING:
+    from typing import IO
+
+    from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
+
+__all__ = ["co_simulation", "read_model"]
+
+_log = logging.getLogger(__name__)
+
+
+def read_model(path: Path, *, strict: bool) -> tuple[ModelDescription, int, list[str]]:
+    """Return the description of the FMU at `path`, the major version of FMI, and the names in its archive.
+
+    Rules of FMI that FMPy finds broken are logged: tools write many FMUs that run well and break one. Where
+    the description breaks a rule such that FMPy cannot check it, or a name is not fit to be shown, the error
+    names variable and line; `strict` false ignores the former.
+
+    Raises ScenarioError, and MissingExtraError without FMPy.
+    """
+    try:
+        import fmpy  # noqa: F401  # pyright: ignore[reportUnusedImport]
+    except ImportError as error:
+        raise MissingExtraError("engine 'fmu'", "fmu", "fmpy") from error
+    if not path.is_file():
+        raise ScenarioError(f"the FMU '{path}' does not exist")
+    try:
+        with opened_archive(path) as (file, archive):
+            model, names = _read(path, file, strict=strict), archive.namelist()
+            major = int(model.fmiVersion.split(".")[0])
+    except ScenarioError:
+        raise
+    except Exception as error:  # FMPy raises BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
+        if "(line " in str(error):
+            raise ScenarioError(f"'{path}': modelDescription.xml breaks a rule of FMI: {error}") from error
+        raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {error}") from error
+    if major not in (2, 3):
+        raise ScenarioError(f"'{path}' is an FMI {model.fmiVersion} FMU; FMI 2.0 and 3.0 are allowed")
+    _check_texts(path, model)
+    return model, major, names
+
+
+def _read(path: Path, file: IO[bytes], *, strict: bool) -> ModelDescription:
+    from fmpy import read_model_description
+    from fmpy.model_description import ValidationError
+
+    try:
+        return read_model_description(file)
+    except ValidationError as error:
+        _log.warning("%s: modelDescription.xml breaks rules of FMI: %s", path, "; ".join(error.problems))
+        return read_model_description(file, validate=False)
+    except Exception as error:
+        model = read_model_description(file, validate=False)  # if this fails as well, its error is clearer
+        problem = "; ".join(_undefined_display_units(model)) or f"{type(error).__name__}: {error}"
+        if strict:
+            raise ScenarioError(
+                f"'{path}': modelDescription.xml breaks rules of FMI: {problem}. Export the FMU again with a"
+                " corrected one, or load it all the same with 'strict: false'."
+            ) from error
+        _log.warning("%s: modelDescription.xml breaks rules of FMI: %s", path, problem)
+        return model
+
+
+def _undefined_display_units(model: ModelDescription) -> Iterator[str]:
+    """Yield the variables on which FMPy's own check fails: they have a display unit and no defined unit."""
+    units = {unit.name for unit in model.unitDefinitions}
+    for row in model.modelVariables:
+        if row.displayUnit is not None and unit_of(row) not in units:
+            yield (
+                f"variable '{_shown(row.name)}' (line {row.sourceline}) has the display unit"
+                f" '{_shown(row.displayUnit)}' and no unit that the FMU defines"
+            )
+
+
+def _check_texts(path: Path, model: ModelDescription) -> None:
+    """Refuse names and units that terminals and pages could take for commands.
+
+    FMI's flat names exclude carriage return, line feed and tab (FMI 2.0.4 section 2.2.9); angle brackets
+    occur in quoted Modelica names alone.
+    """
+    for row in model.modelVariables:
+        if row.causality in {"input", "output"} or settable(row):
+            for kind, text in (("name", row.name), ("unit", unit_of(row))):
+                if not text.isprintable() or "<" in text or ">" in text:
+                    raise ScenarioError(
+                        f"the FMU '{path}' is refused: the {kind} {_shown(text)!r} of a variable (line"
+                        f" {row.sourceline}) has a control character or an angle bracket"
+                    )
+
+
+def _shown(text: str) -> str:
+    """Return `text` such that it can be shown in one line."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text[:80])
+
+
+def co_simulation(path: Path, model: ModelDescription, major: int, names: Collection[str]) -> CoSimulation:
+    """Return the co-simulation part of the FMU, whose archive holds `names`.
+
+    Raises ScenarioError if it has none that runs on this platform.
+    """
+    if model.coSimulation is None:
+        raise ScenarioError(
+            f"'{path}' cannot be co-simulated: it is for model exchange or scheduled execution only. Export"
+            " it for co-simulation."
+        )
+    clocks = [v.name for v in model.modelVariables if _is_time_based_input(v)]
+    if clocks:
+        raise ScenarioError(
+            f"'{path}' has time-based input clocks ({', '.join(map(_shown, clocks))}), which Trocar does not"
+            " support. Export it without clocks, or with triggered input clocks."
+        )
+    _require_binary(path, model.coSimulation.modelIdentifier, major, names)
+    return model.coSimulation
+
+
+def _is_time_based_input(row: ModelVariable) -> bool:
+    """Return whether a variable is an input clock that ticks at times the importer must know (FMI 3.0.1)."""
+    return row.type == "Clock" and row.causality == "input" and row.intervalVariability != "triggered"
+
+
+def _require_binary(path: Path, identifier: str, major: int, names: Collection[str]) -> None:
+    import fmpy
+
+    platform = fmpy.platform if major == 2 else fmpy.platform_tuple
+    library = f"binaries/{platform}/{identifier}{fmpy.sharedLibraryExtension}"
+    if library in names:
+        return
+    files = [name for name in names if name.startswith("binaries/") and not name.endswith("/")]
+    here = sorted(name.split("/", 2)[2] for name in files if name.startswith(f"binaries/{platform}/"))
+    if here or f"binaries/{platform}/" in names:
+        raise ScenarioError(
+            f"'{path}' has no file '{_shown(library)}', the library that its modelDescription.xml names"
+            f" (modelIdentifier). That folder holds: {', '.join(here) or 'nothing'}."
+        )
+    platforms = sorted({name.split("/")[1] for name in files if name.count("/") > 1})
+    raise ScenarioError(
+        f"'{path}' has no binary for this platform, {platform}; it has: {', '.join(platforms) or 'none'}"
+    )
