@@ -84,8 +84,8 @@ def run_device(
     request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
     connect = partial(reach, endpoint, name, certificates)
     host = DeviceHost(name, connect, Keys(session_name), request, directory)
-    with Interrupt(), contextlib.suppress(KeyboardInterrupt):
-        host.serve()
+    with Interrupt() as interrupt, contextlib.suppress(KeyboardInterrupt):
+        host.serve(interrupt.check)
 
 
 @contextlib.contextmanager

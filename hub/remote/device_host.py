@@ -65,8 +65,8 @@ class DeviceHost:
         self._over = threading.Event()
         """The run is over: the hub is gone, or the device has failed."""
 
-    def serve(self) -> None:
-        """Take part in one run after the other, until an error.
+    def serve(self, check: Callable[[], None]) -> None:
+        """Take part in one run after the other, until an error; `check` raises an interrupt that was lost.
 
         Raises ConnectError or MessageError if the first one cannot be joined, and ParticipantError if the
         device fails.
@@ -78,7 +78,7 @@ class DeviceHost:
                     with self._connect() as session:
                         reply = join_session(session, self._keys, self._request)
                         joined, logged = True, ""
-                        self._take_part(session, reply)
+                        self._take_part(session, reply, check)
                     log.warning(
                         "device '%s': lost the hub; the device receives nothing until the hub returns and it"
                         " joins again",
@@ -90,12 +90,13 @@ class DeviceHost:
                     if str(error) != logged:
                         logged = str(error)
                         log.info("device '%s' waits for the hub: %s", self._name, logged)
+                    check()
                     sleep(_RETRY_S)
         finally:
             if self._loop is not None:
                 self._loop.close()
 
-    def _take_part(self, session: zenoh.Session, reply: JoinReply) -> None:
+    def _take_part(self, session: zenoh.Session, reply: JoinReply, check: Callable[[], None]) -> None:
         """Take part in a run until it is over."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
@@ -126,7 +127,7 @@ class DeviceHost:
             self._ask(session, self._request.model_copy(update={"ready": True}))
             log.info("device '%s' takes part in session '%s'", self._name, keys.session)
             while not self._over.wait(_POLL_S):
-                pass
+                check()
             if self._failure is not None:
                 self._ask(
                     session,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterable, Sequence
+from weakref import finalize
 
 import zenoh
 
@@ -60,6 +61,7 @@ class LoopbackPort:
         for port in self._ports:
             held = _bound(port)
             if held is not None:
+                finalize(self, held.close)  # where no hub ever listens
                 self._held, self.endpoint = held, f"tcp/127.0.0.1:{held.getsockname()[1]}"
                 return
         raise ConnectError(

@@ -142,6 +142,6 @@ def prepare(toys: None, tmp_path: Path) -> Prepare:
     def prepare(text: str, *overrides: str, **options: Any) -> Session:
         file = tmp_path / "session.yaml"
         file.write_text(text)
-        return launch(load(str(file), overrides), endpoint="tcp/127.0.0.1:0", **options)
+        return launch(load(str(file), overrides), **{"endpoint": "tcp/127.0.0.1:0"} | options)
 
     return prepare

@@ -2,6 +2,7 @@
 device: real processes.
 """
 
+import os
 import subprocess
 import sys
 import threading
@@ -9,7 +10,13 @@ from contextlib import ExitStack, contextmanager
 from signal import SIGKILL, SIGTERM
 from time import monotonic, sleep
 
+import pytest
+
+from hub.remote.device_host import DeviceHost
+from hub.remote.hub_connection import reach
 from hub.remote.live_sessions import live_sessions
+from hub.transport.control_messages import JoinRequest
+from schemas.keys import Keys
 from tests.hub.authorities import free_endpoint
 from tests.hub.proxy import Proxy
 
@@ -110,14 +117,29 @@ def test_a_host_outlives_the_hub_and_joins_the_next_session_of_its_name(prepare,
         first.end()
         sleep(1.0)
         assert process.poll() is None
-        again = prepare(SCENARIO)
-        again.endpoint = first.session.endpoint
-        second = Running(again)
+        second = Running(prepare(SCENARIO, endpoint=first.session.endpoint))
         until(lambda: second.is_followed())
         second.end()
     said = " ".join((tmp_path / "player.log").read_text().split())
     assert "device 'player': lost the hub; the device receives nothing until the hub returns" in said
     assert said.count("takes part in session 'hand'") == 2
+
+
+def test_an_interrupt_that_was_lost_ends_the_host(prepare):
+    """SIGTERM may arrive while Zenoh calls back in the main thread: it swallows what is raised there."""
+    running = Running(prepare(SCENARIO))
+    until(lambda: running.status)
+    endpoint = running.session.endpoint
+    request = JoinRequest(host="remote/player", pid=os.getpid())
+    host = DeviceHost("player", lambda: reach(endpoint, "player"), Keys("hand"), request, None)
+
+    def lost():
+        if running.fresh:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        host.serve(lost)
+    running.end()
 
 
 def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
