@@ -10,6 +10,8 @@ import pytest
 
 from hub.planning.registry import kinds
 
+pytestmark = pytest.mark.xdist_group("site")  # its fixtures are expensive: made once, in one process
+
 pytest.importorskip("mkdocs")
 ROOT = Path(__file__).parents[2]
 LOADED = re.compile(r"<(?:script|link|img|iframe|source|video|audio|object|embed)\b[^>]*>")

@@ -17,6 +17,8 @@ from tests.devices.standins import build as standins
 from tests.hub.authorities import free_port
 from tests.wheel.environments import CLEAN, bare, install, run, succeed, with_our_packages
 
+pytestmark = pytest.mark.xdist_group("wheel")  # its fixtures are expensive: made once, in one process
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

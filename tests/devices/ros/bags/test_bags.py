@@ -33,6 +33,8 @@ from tests.devices.ros.rospy_peer import environment, needs_rospy, rospy_python
 from tests.devices.ros.zenoh.test_gateway import JOINTS, STATE_TYPE, joints
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built
 
+pytestmark = pytest.mark.xdist_group("bags")  # its fixtures are expensive: made once, in one process
+
 __all__ = ["rclpy_python"]
 
 pytest.importorskip("mujoco")

@@ -20,6 +20,10 @@ from schemas.codec import decode
 from schemas.errors import RecordingError
 from schemas.ros import Image as Picture
 
+pytestmark = pytest.mark.xdist_group(
+    "recorded scene"
+)  # its fixtures are expensive: made once, in one process
+
 SCENARIO = """
 name: seen
 step: 1 ms
