@@ -193,13 +193,14 @@ class DeviceStatus(Message):
     ros_type: ClassVar[str] = "trocar_msgs/msg/DeviceStatus"
     device: String
     offset_ns: Int64 = 0
-    """What is added to the monotonic clock of the device's host to have that of the hub."""
+    """Added to the monotonic clock of the device's host it gives that of the hub."""
     round_trip_ns: Int64 = -1
-    """Of the exchange that told the offset, which is right within half of it; -1: there was none yet, or the
-    host is the hub's own.
+    """Of the exchange that measured the offset, which is exact within half of it.
+
+    -1: there was no exchange yet, or the host is the hub's own.
     """
     link: String = ""
-    """What lies between device and hub by the scenario, or by what was set since; empty: nothing."""
+    """The network link between device and hub, as the scenario or a later change sets it; empty: none."""
     latencies: list[Latency] = Field(default_factory=list[Latency])
 
 

@@ -49,6 +49,15 @@ def test_words_are_plain(page):
         assert not NOT_OURS.search(line), f"{page}:{number}: {line}"
 
 
+@pytest.mark.parametrize(
+    "folder", ["hub", "schemas", "robots", "engines", "controllers", "devices", "trocar"]
+)
+def test_words_of_what_ships_are_plain(folder):
+    for file in sorted((ROOT / folder).rglob("*.py")):
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
+            assert not NOT_OURS.search(line), f"{file}:{number}: {line}"
+
+
 @cache
 def source():
     """All code as one text, without the seams between the parts of a string."""
