@@ -6,14 +6,15 @@
     joints = trocar.Recording(summary.recording)["robot.PSM1/measured_js"]
     joints.time, joints["position"]     # (n,) s of simulated time, (n, 6) rad and m
 
-What is in `__all__` here, in `trocar.messages` (ROS 2 messages) and in `trocar.quantities` (parameters with
-units) is public. All other modules of the distribution (`schemas`, `robots`, `hub`, `engines`, `controllers`,
-`devices`, `configs`) are private: they may change in any release. `python -m trocar` is the command line.
+What is in `__all__` here, in `trocar.messages` (ROS 2 messages), in `trocar.quantities` (parameters with
+units) and in `trocar.records` (state with named fields) is public. All other modules of the distribution
+(`schemas`, `robots`, `hub`, `engines`, `controllers`, `devices`, `configs`) are private: they may change in
+any release. `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `load_scenario`, `run_in_process`
 Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `write_bag` for samples to play
-Participants      `Stepped`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`, `Sample`, `Value`,
-                  `state_hash`, `restore_arrays`
+Participants      `Stepped`, `Controller`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`,
+                  `Sample`, `Value`, `state_hash`, `restore_arrays`
 Power bonds       `BondSide`, `BondPlan`, `ForceSide`, `MotionSide`
 Conformance       `check_engine`, `check_device`
 Kinematics        `chain`, `inverse`
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from hub.observation.summary import Summary
     from hub.participant import (
         BondPlan,
+        Controller,
         Device,
         ForceSide,
         Inputs,
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BondPlan",
     "BondSide",
+    "Controller",
     "Device",
     "ForceSide",
     "Inputs",
@@ -91,6 +94,7 @@ _MODULES = {
     "hub.observation.summary": ("Summary",),
     "hub.participant": (
         "BondPlan",
+        "Controller",
         "Device",
         "ForceSide",
         "Inputs",

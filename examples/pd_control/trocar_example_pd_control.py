@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from trocar import Inputs, Outputs, Params, Port, Setup, Stepped, state_hash
+from trocar import Controller, Inputs, Outputs, Params, Port, Setup
+from trocar.records import Record, array, number
 
 
 class PdControlParams(Params):
@@ -13,7 +14,14 @@ class PdControlParams(Params):
     limit: float = 1.0  # N m
 
 
-class PdControl(Stepped):
+class PdState(Record):
+    """All that the controller remembers: it is hashed, saved and restored by the base class."""
+
+    goal = number()  # rad
+    torque = array(1)  # N m
+
+
+class PdControl(Controller):
     """Holds the angle while the goal is stale: its device has stopped sending."""
 
     params_model = PdControlParams
@@ -24,20 +32,18 @@ class PdControl(Stepped):
         Port(name="torque", causality="output", unit="N*m"),
     )
 
+    def __init__(self, name: str, params: PdControlParams) -> None:
+        super().__init__(name, params)
+        self.state = PdState()
+        self.keep(self.state)
+
     def configure(self, setup: Setup) -> Outputs:
-        self.state = np.zeros(2)  # goal (rad), torque (N m)
-        return {"torque": self.state[1:].copy()}
+        return {"torque": self.state.torque}
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
-        p, goal, angle = self.params, self.state[0], inputs["angle"][0]
+        p, state = self.params, self.state
         if not inputs.stale("goal"):
-            goal = inputs["goal"][0]
-        torque = p.stiffness * (goal - angle) - p.damping * inputs["rate"][0]
-        self.state[:] = goal, np.clip(torque, -p.limit, p.limit)
-        return {"torque": self.state[1:].copy()}
-
-    def state_hash(self) -> int:
-        return state_hash(self.state)
-
-    def close(self) -> None:
-        """Nothing is held."""
+            state.goal = inputs["goal"][0]
+        torque = p.stiffness * (state.goal - inputs["angle"][0]) - p.damping * inputs["rate"][0]
+        state.torque[0] = np.clip(torque, -p.limit, p.limit)
+        return {"torque": state.torque}

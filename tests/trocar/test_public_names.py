@@ -13,6 +13,7 @@ import pytest
 import trocar
 import trocar.messages
 import trocar.quantities
+import trocar.records
 import trocar.sessions
 from schemas.message import Message
 
@@ -21,6 +22,7 @@ PRIVATE = {"schemas", "robots", "hub", "engines", "controllers", "devices", "con
 PUBLIC = [
     "BondPlan",
     "BondSide",
+    "Controller",
     "Device",
     "ForceSide",
     "Inputs",
@@ -71,6 +73,7 @@ def test_the_public_names_are_these() -> None:
         "__main__",
         "messages",
         "quantities",
+        "records",
         "sessions",
     }
 
