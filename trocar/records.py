@@ -8,7 +8,7 @@
         torque = array(1)     # N m, a view that is written in place
         holds = flag()
 
-A `trocar.Controller` is told its records once, by `keep`, and needs no `state_hash`, `save`, `restore` and
+A `trocar.Controller` declares its records once, by `keep`, and needs no `state_hash`, `save`, `restore` and
 `close` of its own.
 """
 
