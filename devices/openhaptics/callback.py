@@ -18,10 +18,15 @@ from devices.openhaptics.hdapi import (
     errors,
 )
 from devices.openhaptics.stylus import Phase, Stylus
+from schemas.errors import DeviceError
 
 __all__ = ["Servo"]
 
 _LAST_FRAME_S = 0.1
+_UNWATCHED, _ABANDONED = 100, 1000
+"""Ticks without a sign of life of the watcher after which there is no force, and after which this process is
+of no use. Ticks, not seconds: after a pause of the whole machine the watcher is not the one to blame.
+"""
 
 
 class Servo:
@@ -30,10 +35,11 @@ class Servo:
     HDAPI has one scheduler thread, and a frame makes its device the current one.
     """
 
-    def __init__(self, hd: Hdapi, styluses: list[Stylus]) -> None:
-        """`styluses`: those that were opened."""
+    def __init__(self, hd: Hdapi, styluses: list[Stylus], beat: memoryview) -> None:
+        """`styluses`: those that were opened; `beat`: the watcher's counter in the shared memory."""
         self._hd, self._styluses = hd, styluses
         self._by_handle = {stylus.handle: [stylus] for stylus in styluses}
+        self._beat, self._last_beat, self._unwatched = beat, 0, 0
         self._ending, self._ended = False, threading.Event()
         self._callback = SERVO_CALLBACK(self._call)
         self._schedule: int | None = None
@@ -69,7 +75,12 @@ class Servo:
                 self._release(now)
                 self._ended.set()
                 return CALLBACK_DONE
-            device_errors = [device_error for stylus in self._styluses for device_error in stylus.frame(now)]
+            watched = self._is_watched()
+            device_errors = [
+                device_error
+                for stylus in self._styluses
+                for device_error in stylus.frame(now, watched=watched)
+            ]
             for code, handle in device_errors + errors(self._hd):
                 for stylus in self._by_handle.get(handle, self._styluses):
                     stylus.on_error(code, now)
@@ -91,6 +102,15 @@ class Servo:
             ctypes.pythonapi.PyGILState_Ensure()
             self._known = True
         return self.tick(perf_counter())
+
+    def _is_watched(self) -> bool:
+        """Return whether the watcher runs. Raises DeviceError if it has not for long."""
+        beat = self._beat[0]
+        self._unwatched = 0 if beat != self._last_beat else self._unwatched + 1
+        self._last_beat = beat
+        if self._unwatched >= _ABANDONED:
+            raise DeviceError("the process that watches the servo process has ended or stands still")
+        return self._unwatched < _UNWATCHED
 
     def _release(self, now: float) -> None:
         for stylus in self._styluses:

@@ -56,6 +56,11 @@ def present(state: State, refusal: str) -> tuple[Level, str]:
     if phase is Phase.WARNED:
         cool = "; let its motors cool" if state.code == Code.WARM_MOTORS else ""
         return Level.WARN, f"no force: the device warns of {Code.text(state.code)}{cool}"
+    if phase is Phase.UNWATCHED:
+        return (
+            Level.WARN,
+            "no force: the process that watches the servo process is late; is the machine busy?",
+        )
     if refusal:
         return Level.ERROR, f"no force: {refusal}"
     return FORCE_DIAGNOSES[_CONDITIONS[state.cause]]

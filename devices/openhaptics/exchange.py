@@ -4,6 +4,8 @@ Each direction is a ring with one writer and one reader. A slot has its number a
 and content, so a record that is being overwritten is recognised, on any processor, and a writer that ends
 half-way leaves the slots before intact: neither side ever waits. The memory has no name that could outlive
 its users: on Linux the reading process inherits the file, on Windows it ends with the last handle.
+
+Behind the rings is a counter, the sign of life of the process that watches the servo process.
 """
 
 from __future__ import annotations
@@ -26,8 +28,10 @@ __all__ = [
     "RingWriter",
     "State",
     "attach",
+    "beat",
     "create",
     "device_ends",
+    "memory_size",
     "model_doubles",
     "planes_in",
     "ring_size",
@@ -154,6 +158,17 @@ class RingReader(_Ring):
 
 STYLUS_BYTES = ring_size(MODEL_SLOTS, MODEL_DOUBLES) + ring_size(STATE_SLOTS, STATE_DOUBLES)
 """What one stylus takes of the shared memory."""
+_BEAT_BYTES = 8
+
+
+def memory_size(styluses: int) -> int:
+    """Return the bytes of shared memory for this number of styluses."""
+    return styluses * STYLUS_BYTES + _BEAT_BYTES
+
+
+def beat(memory: memoryview) -> memoryview:
+    """Return the watcher's counter: one integer, which is 0 before the watcher runs."""
+    return memory[-_BEAT_BYTES:].cast("Q")
 
 
 def servo_ends(memory: memoryview, index: int) -> tuple[RingReader, RingWriter]:

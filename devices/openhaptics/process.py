@@ -1,4 +1,4 @@
-"""The servo process, from the device's side: start it, send to it, receive from it, end it.
+"""The servo process and its watcher, from the device's side: start, send, receive, end.
 
 Only `close` waits for it.
 """
@@ -18,8 +18,9 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from devices.haptics.limits import Limits
-from devices.openhaptics.exchange import STYLUS_BYTES, RingReader, RingWriter, create, device_ends
+from devices.openhaptics.exchange import RingReader, RingWriter, create, device_ends, memory_size
 from devices.openhaptics.stylus import Spec
+from devices.openhaptics.watcher import HAS_KILLED
 
 __all__ = ["ServoProcess"]
 
@@ -27,7 +28,8 @@ _ENVIRONMENT: dict[str, str] = {} if sys.platform == "win32" else {"GTDD_HOME": 
 """The Linux driver needs to know the directory of its devices' configuration and calibration (TouchDriver
 2019.2.15).
 """
-_PATIENCE_S = 1.0
+_PATIENCE_S, _WATCHER_PATIENCE_S = 1.0, 0.2
+_NO_WINDOW: int = subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0
 
 
 class ServoProcess:
@@ -36,7 +38,7 @@ class ServoProcess:
     def __init__(self, library: Path, specs: Sequence[Spec]) -> None:
         """Start it. Raises OSError if the system has no process left."""
         self.names = tuple(spec.name for spec in specs)
-        size = STYLUS_BYTES * len(specs)
+        size = memory_size(len(specs))
         shared, handle = create(size)
         ends = [device_ends(memoryview(shared), index) for index in range(len(specs))]
         self.models: dict[str, RingWriter] = {
@@ -55,8 +57,14 @@ class ServoProcess:
                 pass_fds=inherited,
                 process_group=0,  # Ctrl-C is for this process, which then ends that one
                 env={**_ENVIRONMENT, **os.environ},
-                creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
+                creationflags=_NO_WINDOW,
             )
+            try:
+                self._watcher = _watcher(handle, len(specs), self._process.pid)
+            except OSError:
+                self._process.kill()
+                self._process.communicate()
+                raise
         finally:
             for file in inherited:
                 os.close(file)
@@ -74,6 +82,11 @@ class ServoProcess:
     def is_alive(self) -> bool:
         """Whether it runs."""
         return self._process.poll() is None
+
+    @property
+    def was_killed_by_watcher(self) -> bool:
+        """Whether it stood still with force on a hand, and was killed for that; known after `close`."""
+        return self._watcher.returncode == HAS_KILLED
 
     def said(self, timeout_s: float = 0.0) -> list[dict[str, Any]]:
         """Return its messages since the last call; wait up to `timeout_s` for the first."""
@@ -107,6 +120,11 @@ class ServoProcess:
         except subprocess.TimeoutExpired:
             self.kill()
             self._process.wait()
+        try:
+            self._watcher.wait(_WATCHER_PATIENCE_S)  # it ends by itself
+        except subprocess.TimeoutExpired:
+            self._watcher.kill()
+            self._watcher.wait()
         self._listener.join()
 
     def _send(self, message: dict[str, Any]) -> None:
@@ -123,3 +141,26 @@ class ServoProcess:
             for line in lines:
                 self._said.put(json.loads(line))
         self._said.put({"ended": True})
+
+
+def _watcher(memory: int | str, styluses: int, pid: int) -> subprocess.Popen[bytes]:
+    """Start the watcher of process `pid`, which the caller has not reaped."""
+    process = pid if sys.platform == "win32" else os.pidfd_open(pid)
+    files = () if sys.platform == "win32" else (int(memory), process)
+    try:
+        return subprocess.Popen(
+            [
+                sys.executable,
+                "-P",
+                "-m",
+                "devices.openhaptics.watcher",
+                *map(str, (memory, styluses, process)),
+            ],
+            stdin=subprocess.DEVNULL,
+            pass_fds=files,
+            process_group=0,  # as for the servo process
+            creationflags=_NO_WINDOW,
+        )
+    finally:
+        if sys.platform != "win32":
+            os.close(process)

@@ -7,8 +7,6 @@ closes it and when the device's process ends. Then the hand gets one last frame,
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import gc
 import json
 import os
@@ -17,20 +15,21 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from ctypes import c_double
 from pathlib import Path
+from time import sleep
 from typing import Any, NoReturn
 
 from devices.haptics.limits import Limits
 from devices.openhaptics.callback import Servo
-from devices.openhaptics.exchange import STYLUS_BYTES, attach, servo_ends
+from devices.openhaptics.exchange import attach, beat, memory_size, servo_ends
 from devices.openhaptics.hdapi import INVALID_HANDLE, Get, Hdapi, errors, load
+from devices.openhaptics.priority import SERVO, raise_priority
 from devices.openhaptics.stylus import Spec, Stylus
 from schemas.errors import DeviceError
 
 __all__ = ["main"]
 
-_FIFO_PRIORITY = 20
-"""Above everything that is not real-time, below the kernel's interrupt threads (50)."""
-_HIGH_PRIORITY_CLASS = 0x80
+_FIRST_BEAT = 5.0
+"""How long the watcher may take to start, s."""
 
 Say = Callable[[Mapping[str, Any]], None]
 
@@ -67,19 +66,13 @@ def _number(hd: Hdapi, what: int) -> float:
     return value.value
 
 
-def _raise_priority() -> str:
-    """Raise the priority of this process as far as the system allows; return what was reached."""
-    if sys.platform == "win32":
-        kernel = ctypes.windll.kernel32
-        kernel.GetCurrentProcess.restype = ctypes.c_void_p
-        kernel.SetPriorityClass.argtypes = (ctypes.c_void_p, ctypes.c_uint)
-        return (
-            "high" if kernel.SetPriorityClass(kernel.GetCurrentProcess(), _HIGH_PRIORITY_CLASS) else "normal"
-        )
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_FIFO_PRIORITY))
-        return "real-time"
-    return "normal"
+def _await_watcher(sign: memoryview) -> None:
+    """Wait until the watcher runs: no tick is without it. Raises DeviceError if it does not start."""
+    for _ in range(round(_FIRST_BEAT / 0.005)):
+        if sign[0]:
+            return
+        sleep(0.005)
+    raise DeviceError(f"the process that watches the servo process has not started within {_FIRST_BEAT:g} s")
 
 
 def _output() -> Say:
@@ -105,7 +98,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, _terminate)
     say = _output()
     config = json.loads(sys.stdin.readline())
-    memory = memoryview(attach(config["memory"], STYLUS_BYTES * len(config["styluses"])))
+    memory = memoryview(attach(config["memory"], memory_size(len(config["styluses"]))))
     try:
         hd = load(Path(config["library"]))
     except DeviceError as error:
@@ -113,10 +106,12 @@ def main() -> NoReturn:
         sys.exit(1)
     say({"loaded": True})
     styluses = dict(_opened(hd, config, memory, say))
-    servo = Servo(hd, list(styluses.values()))
+    sign = beat(memory)
+    servo = Servo(hd, list(styluses.values()), sign)
     try:
         if styluses:
-            say({"priority": _raise_priority()})
+            _await_watcher(sign)
+            say({"priority": raise_priority(SERVO)})
             gc.collect()
             gc.freeze()
             gc.disable()
@@ -124,6 +119,8 @@ def main() -> NoReturn:
         for line in sys.stdin:
             order = json.loads(line)
             styluses[order["stylus"]].allow(Limits(**order["limits"]), passivity=order["passivity"])
+    except DeviceError as error:
+        say({"failed": str(error)})
     finally:
         servo.stop()
         if servo.failure:

@@ -51,6 +51,8 @@ class Phase(IntEnum):
     """Another program has it."""
     FAULT = 6
     """It, or the servo callback, has failed."""
+    UNWATCHED = 7
+    """It has a pose, and no force: the process that watches the servo process gives no sign of life."""
 
     @property
     def is_lost(self) -> bool:
@@ -64,7 +66,7 @@ class Phase(IntEnum):
 
 
 _LOST = {Phase.ABSENT, Phase.BUSY, Phase.FAULT}
-_POSED = {Phase.READY, Phase.WARNED}
+_POSED = {Phase.READY, Phase.WARNED, Phase.UNWATCHED}
 _READY, _SETTLING, _CALIBRATED = Phase.READY, Phase.SETTLING, Calibration.OK.value
 """As plain names: Python 3.11 takes 0.25 us to look up a member of an enumeration."""
 
@@ -108,8 +110,8 @@ class Stylus:
         """Allow force within `limits`."""
         self._loop = HapticLoop(limits, passivity=passivity)
 
-    def frame(self, now: float) -> list[tuple[int, int]]:
-        """Do one frame, which begins at `now` (s of time.perf_counter).
+    def frame(self, now: float, *, watched: bool) -> list[tuple[int, int]]:
+        """Do one frame, which begins at `now` (s of time.perf_counter); without force if not `watched`.
 
         Returns those errors (code, handle) of this tick that are no longer on HDAPI's stack.
         """
@@ -121,7 +123,7 @@ class Stylus:
         self._permitted = self._dead_man()
         moved = self._tip.move(self._transform[:], self._velocity[:], now)
         device_errors = self._calibrate()
-        self._judge(now, valid=moved)
+        self._judge(now, valid=moved, watched=watched)
         self._send(self._render(now))
         return device_errors
 
@@ -186,7 +188,7 @@ class Stylus:
         self._hd.hdGetIntegerv(Get.CALIBRATION_STYLE, self._styles)
         return next((style for style in Style if self._styles.value & style), 0)
 
-    def _judge(self, now: float, *, valid: bool) -> None:
+    def _judge(self, now: float, *, valid: bool, watched: bool) -> None:
         phase = self.phase
         if phase.is_lost:
             return
@@ -201,6 +203,8 @@ class Stylus:
             self.phase, self._code = Phase.UNCALIBRATED, self._style
         elif now - self._warned < _WARNING:
             self.phase = Phase.WARNED
+        elif not watched:
+            self.phase, self._code = Phase.UNWATCHED, 0
         elif phase is not _READY:
             self.phase, self._code = _READY, 0
 

@@ -32,6 +32,7 @@ _LOADING, _OPENING, _SILENCE = 20.0, 10.0, 1.0
 """How long a process may take (s) to load the library, until its first frame, and between frames."""
 _ENDING = 1.0
 
+_STOOD_STILL = "the servo process stood still with force on the hand and was killed, which closes the device"
 _NO_PRIORITY = (
     "the servo process has no real-time priority, so the force may falter while the machine is busy: allow it"
     " with the line '@users - rtprio 20' in /etc/security/limits.conf, and log in again"
@@ -156,10 +157,11 @@ class Supervisor:
         if not ended and self._ending is not None and now - self._ending > _ENDING:
             process.kill()
         if ended:
-            if self._ending is None:
-                for name in process.names:
-                    self._lose(name, Phase.FAULT, 0, "the servo process has ended", now)
             process.close()
+            if self._ending is None:
+                cause = _STOOD_STILL if process.was_killed_by_watcher else "the servo process has ended"
+                for name in process.names:
+                    self._lose(name, Phase.FAULT, 0, cause, now)
             self._process = None
 
     def _end(self, process: ServoProcess, now: float) -> None:

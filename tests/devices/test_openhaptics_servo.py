@@ -26,11 +26,12 @@ from devices.haptics.safety import Condition
 from devices.openhaptics import diagnoses, hdapi
 from devices.openhaptics.callback import Servo
 from devices.openhaptics.exchange import (
-    STYLUS_BYTES,
     RingReader,
     RingWriter,
     State,
+    beat,
     device_ends,
+    memory_size,
     model_doubles,
     servo_ends,
 )
@@ -69,7 +70,8 @@ class Rig:
         self.hd.standin_use.argtypes = [ctypes.c_void_p]
         self.hd.standin_tick.argtypes = [ctypes.c_double]
         self.hd.standin_use(self.world.address)
-        memory = memoryview(bytearray(2 * STYLUS_BYTES))
+        memory = memoryview(bytearray(memory_size(2)))
+        self.beat, self.watched = beat(memory), True
         self.styluses: list[Stylus] = []
         self.models: list[RingWriter] = []
         self._states: list[RingReader] = []
@@ -87,7 +89,7 @@ class Rig:
             models, states = device_ends(memory, index)
             self.models.append(models)
             self._states.append(states)
-        self.servo = Servo(self.hd, self.styluses)
+        self.servo = Servo(self.hd, self.styluses, self.beat)
         self._last: list[State] = [
             None,
             None,
@@ -109,6 +111,7 @@ class Rig:
         planes = [FLOOR] if touching else planes
         for _ in range(ticks):
             self.now += DT
+            self.beat[0] += self.watched
             self.hd.standin_tick(DT)
             if planes is not None:
                 for models in self.models:
@@ -368,13 +371,48 @@ def test_silence_of_the_simulation_takes_the_force_within_150_ms(rig: Callable[.
     assert np.diff(quiet).max() < 0.1
 
 
+def test_a_watcher_without_a_sign_of_life_takes_the_force_and_returns_it_slowly(
+    rig: Callable[..., Rig],
+) -> None:
+    one = rig()
+    one.press()
+    one.watched = False
+    assert one.run(99, touching=True).force[2] > 1.0
+    state = one.run(1, touching=True)
+    assert (Phase(state.phase), state.force) == (Phase.UNWATCHED, (0.0, 0.0, 0.0))
+    assert Phase(state.phase).has_pose
+    assert diagnoses.present(state, "") == (
+        Level.WARN,
+        "no force: the process that watches the servo process is late; is the machine busy?",
+    )
+    one.watched = True
+    calm = len(one.sent)
+    assert Phase(one.run(200, touching=True).phase) is Phase.READY
+    assert not any(one.sent[calm:])  # the hand has not left the contact
+    one.world.devices[0].target[1] = 0.03
+    one.run(500, touching=True)
+    one.world.devices[0].target[1] = -0.005
+    assert one.run(2000, touching=True).force[2] > 1.0
+    assert max(np.diff(one.sent)) < 0.1 + 1e-9
+
+
+def test_a_watcher_that_does_not_return_ends_the_schedule(rig: Callable[..., Rig]) -> None:
+    one = rig()
+    one.press()
+    one.watched = False
+    state = one.run(1001, touching=True)
+    assert (one.answer, Phase(state.phase)) == (CALLBACK_DONE, Phase.FAULT)
+    assert "the process that watches the servo process has ended" in one.servo.failure
+    assert [math.hypot(*one.world.motors(i)) for i in (0, 1)] == [0.0, 0.0]
+
+
 def test_an_exception_in_the_callback_ends_in_a_frame_without_force_on_every_hand(
     rig: Callable[..., Rig], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = rig()
     one.press()
 
-    def fails(now: float) -> None:
+    def fails(now: float, *, watched: bool) -> None:
         raise ValueError("a bug")
 
     monkeypatch.setattr(one.styluses[1], "frame", fails)

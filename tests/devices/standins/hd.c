@@ -41,6 +41,7 @@ typedef struct {
     int64_t owner; /* process that has the device */
     int64_t force_output;
     int64_t updates, last_style; /* calls of hdUpdateCalibration that were granted */
+    int64_t blocked;             /* as long as it is 1, hdBeginFrame does not return; 2: hdEndFrame, with the force sent */
     double motors[3];            /* force that the hand gets, N */
     double target[3], amplitude[3], frequency, turn_amplitude;
     double mass, stiffness, damping; /* of the hand */
@@ -153,9 +154,14 @@ void hdDisableDevice(HHD handle) {
 void hdMakeCurrentDevice(HHD handle) { current = handle; }
 HHD hdGetCurrentDevice(void) { return current; }
 
+static void block(const Device *d, int64_t where) {
+    while (((const volatile Device *)d)->blocked == where) usleep(1000);
+}
+
 void hdBeginFrame(HHD handle) {
     Handle *h = opened(current = handle);
     if (!h) return;
+    block(&world->device[handle], 1);
     if (h->framed || h->done) {
         push(0x0400, handle);
         return;
@@ -183,6 +189,7 @@ void hdEndFrame(HHD handle) {
     if (!d->plugged) push(0x0302, handle);
     else if (!owns(d) && !d->silent) push(0x0304, handle);
     if (d->error_frames > 0) d->error_frames--, push((HDerror)d->error, handle);
+    block(d, 2);
 }
 
 HDErrorInfo hdGetError(void) {

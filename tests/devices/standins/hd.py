@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+import os
+import select
 from ctypes import c_char, c_double, c_int64
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -26,7 +29,7 @@ _ORDERS = (
     "plugged calibration calibration_at_power_on styles inkwell safety_switch buttons silent placeholder"
     " error error_frames"
 )
-_WHOLE = f"{_ORDERS} owner force_output updates last_style"
+_WHOLE = f"{_ORDERS} owner force_output updates last_style blocked"
 _TRIPLES = ("motors", "target", "amplitude")
 _REST = (
     "frequency turn_amplitude mass stiffness damping max_force max_continuous_force max_stiffness max_damping"
@@ -90,3 +93,19 @@ class HdWorld:
         """
         rows = self._rows[: self._logged.value]
         return rows[(rows[:, Row.DEVICE] == device) & (rows[:, Row.TIME] >= since)].copy()
+
+    def release(self, device: int, owner: int, patience_s: float = 30.0) -> float:
+        """Wait until `device` gives no force: the motors are at zero, or process `owner` has ended, which
+        closes it. Return when, s of CLOCK_MONOTONIC. Raises TimeoutError after `patience_s`.
+        """
+        handle = os.pidfd_open(owner)
+        try:
+            ended = select.poll()
+            ended.register(handle, select.POLLIN)
+            until = monotonic() + patience_s
+            while not ended.poll(1) and any(self.motors(device)):
+                if monotonic() > until:
+                    raise TimeoutError(f"the motors give {self.motors(device)} N after {patience_s:g} s")
+            return monotonic()
+        finally:
+            os.close(handle)

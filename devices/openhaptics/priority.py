@@ -1,0 +1,33 @@
+"""The priority of a process whose delay a hand would feel."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import sys
+
+__all__ = ["SERVO", "WATCHER", "raise_priority"]
+
+SERVO, WATCHER = 20, 21
+"""SCHED_FIFO: above everything that is not real-time, below the kernel's interrupt threads (50). The watcher
+is above the servo, which would delay it if it never slept.
+"""
+_HIGH_PRIORITY_CLASS = 0x80
+
+
+def raise_priority(fifo: int) -> str:
+    """Raise the priority of this process as far as the system allows; return what was reached.
+
+    On Linux `fifo` with SCHED_FIFO (`real-time`), on Windows the class `high`; else `normal`.
+    """
+    if sys.platform == "win32":
+        kernel = ctypes.windll.kernel32
+        kernel.GetCurrentProcess.restype = ctypes.c_void_p
+        kernel.SetPriorityClass.argtypes = (ctypes.c_void_p, ctypes.c_uint)
+        raised = kernel.SetPriorityClass(kernel.GetCurrentProcess(), _HIGH_PRIORITY_CLASS)
+        return "high" if raised else "normal"
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(fifo))
+        return "real-time"
+    return "normal"
