@@ -1,6 +1,8 @@
-"""The servo process of the haptic styluses: jitter of its ticks, and the force after its host is killed.
+"""The servo process of the haptic styluses: jitter of its ticks, and how long a force outlives a fault.
 
-    python bench/servo.py [--seconds 20] [--styluses 2] [--planes 4] [--idle]
+The faults: its host is killed; the servo process itself is stopped; a call of the driver does not return.
+
+    python bench/servo.py [--seconds 20] [--styluses 2] [--planes 4] [--stops 10] [--idle]
 
 Styluses of the stand-in for HDAPI, all in contact, beside a device host that reads them at 1 kHz and sends
 contact models at 250 Hz, and, unless `--idle`, one busy process on every core. Needs a C compiler.
@@ -10,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -56,6 +59,35 @@ def measured(seconds: float, styluses: int, planes: int, folder: Path) -> None:
         print(f"{device.name.decode()}: {timing(run)}; {force(run, after, killed)}")
 
 
+def stood_still(stops: int, planes: int, folder: Path) -> None:
+    """Stop the servo process, or block a call of the driver, in turn, and print how long the force stays."""
+    library = build.compile_library("hd.c", folder / "libHD.so")
+    world = hd.HdWorld(library, folder / "still")
+    environment = {**os.environ, hd.VARIABLE: str(world.file), "PYTHONPATH": str(Path(__file__).parents[1])}
+    device = world.devices[0]
+    times: dict[str, list[float]] = {"stopped": [], "blocked": []}
+    host = subprocess.Popen([sys.executable, str(HOST), str(library), str(planes), "1"], env=environment)
+    try:
+        for stop in range(stops):
+            how = ("stopped", "blocked")[stop % 2]
+            while not device.owner or np.linalg.norm(world.motors(0)) < 1.2:
+                for height in (0.03, -0.005):
+                    device.buttons, device.target[1] = 1, height
+                    sleep(0.7)
+            servo, start = device.owner, monotonic()
+            if how == "stopped":
+                os.kill(servo, signal.SIGSTOP)
+            else:
+                device.blocked = 2
+            times[how].append((world.release(0, servo) - start) * 1e3)
+            device.blocked, device.motors[:] = 0, (0.0, 0.0, 0.0)
+    finally:
+        host.kill()
+    for how, ms in times.items():
+        if ms:
+            print(f"{how}: no force after {min(ms):.0f} to {max(ms):.0f} ms, median {np.median(ms):.0f} ms")
+
+
 def timing(rows: np.ndarray) -> str:
     callback, gap = rows[:, hd.Row.CALLBACK] * 1e6, rows[:, hd.Row.GAP]
     p50, p99 = np.percentile(callback, [50, 99])
@@ -80,6 +112,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--styluses", type=int, choices=(1, 2), default=2)
     parser.add_argument("--planes", type=int, default=4)
+    parser.add_argument("--stops", type=int, default=10, help="of the servo process, with force on the hand")
     parser.add_argument("--idle", action="store_true")
     arguments = parser.parse_args()
     burning = (
@@ -90,6 +123,8 @@ def main() -> None:
     try:
         with tempfile.TemporaryDirectory() as folder:
             measured(arguments.seconds, arguments.styluses, arguments.planes, Path(folder))
+            stood_still(arguments.stops, arguments.planes, Path(folder))
+            print(f"load average {os.getloadavg()[0]:.1f}")
     finally:
         for process in burning:
             process.kill()

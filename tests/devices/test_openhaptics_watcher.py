@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -176,7 +176,7 @@ class Machine:
 
 
 @contextmanager
-def _measured() -> Iterator[Machine]:
+def _measured() -> Generator[Machine]:
     machine, over = Machine(), threading.Event()
 
     def sleeper() -> None:
@@ -221,14 +221,11 @@ def test_a_servo_that_stands_still_loses_its_device_in_time(held: Held, how: str
         killed, servo = monotonic(), held.servo
         os.kill(servo, signal.SIGKILL)
         machine.clearing = held.world.release(0, servo) - killed
-    print(
-        f"{how}: no force after {(freed - still) * 1e3:.0f} ms; a kill takes {machine.clearing * 1e3:.1f} ms"
-    )
     assert STOP_S < freed - still < BOUND_S + machine.allowance
 
 
 def test_a_short_stop_comes_back_without_a_step(held: Held) -> None:
-    servo, longest = held.servo, 0.0
+    servo, longest, begun = held.servo, 0.0, 0.0
     for _ in range(10):
         begun = monotonic()
         os.kill(servo, signal.SIGSTOP)
