@@ -9,9 +9,9 @@ import sys
 
 __all__ = ["SERVO", "WATCHER", "raise_priority"]
 
-SERVO, WATCHER = 20, 21
+SERVO, WATCHER = 19, 20
 """SCHED_FIFO: above everything that is not real-time, below the kernel's interrupt threads (50). The watcher
-is above the servo, which would delay it if it never slept.
+is above the servo, which would delay it if it never slept. A user is allowed the larger (limits.conf).
 """
 _HIGH_PRIORITY_CLASS = 0x80
 

@@ -35,7 +35,7 @@ _ENDING = 1.0
 _STOOD_STILL = "the servo process stood still with force on the hand and was killed, which closes the device"
 _NO_PRIORITY = (
     "the servo process has no real-time priority, so the force may falter while the machine is busy: allow it"
-    " with the line '@users - rtprio 21' in /etc/security/limits.conf, and log in again"
+    " with the line '@users - rtprio 20' in /etc/security/limits.conf, and log in again"
 )
 
 
