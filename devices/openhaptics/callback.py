@@ -89,7 +89,8 @@ class Servo:
                 self._ending = self._ending or stylus.phase.is_lost
         # an exception that leaves a ctypes callback is lost, and the force would stay
         except BaseException as error:  # noqa: BLE001
-            self.failure = f"{type(error).__name__}: {error}"
+            known = isinstance(error, DeviceError)
+            self.failure = str(error) if known else f"{type(error).__name__}: {error}"
             for stylus in self._styluses:
                 stylus.phase = Phase.FAULT
             self._release(now)  # styluses that had their frame of this tick get the last one at the next
