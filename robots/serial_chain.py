@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from robots.limits import ANGLE_TOLERANCE, TOLERANCE, distinct
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -59,6 +60,11 @@ class Joint:
         """Of a position: rad or m."""
         return "rad" if self.kind == "revolute" else "m"
 
+    def refusal(self, position: float) -> str:
+        """Return the sentence that refuses a position out of range, in rad or m."""
+        value, lower, upper = distinct(position, self.lower, self.upper)
+        return f"joint {self.name} at {value} {self.unit}, allowed are {lower} .. {upper}"
+
     def transform(self, q: float) -> Vector:
         """Return the pose of this link in the link before it, shape (4, 4), at joint position `q`."""
         theta, d = (self.theta + q, self.d) if self.kind == "revolute" else (self.theta, self.d + q)
@@ -101,6 +107,9 @@ class SerialChain:
         self.acceleration = np.array([joint.acceleration for joint in joints])  # (n,)
         self.jerk = np.array([joint.jerk for joint in joints])  # (n,)
         self.effort = np.array([joint.effort for joint in joints])  # (n,)
+        self.tolerance = np.array(
+            [ANGLE_TOLERANCE if joint.kind == "revolute" else TOLERANCE for joint in joints]
+        )  # (n,), by which a position may be outside its range and is clamped
         self._prismatic = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
         # A link's transform is affine in (cos q, sin q) or in q: all of them come from one multiplication.
         zero = np.array([joint.transform(0.0) for joint in joints])
@@ -170,14 +179,11 @@ class SerialChain:
         poses[..., n, :, :] = poses[..., n - 1, :, :] @ self.tip
         return poses
 
-    def out_of_range(self, q: Vector, *, slack: float = 0.0) -> list[str]:
-        """Return what is wrong with `q`, shape (n,).
-
-        That is a sentence for each joint outside its range by more than `slack`.
-        """
+    def out_of_range(self, q: Vector) -> list[str]:
+        """Return a sentence for each joint of `q`, shape (n,), outside its range by more than `tolerance`."""
         return [
-            f"joint {joint.name} at {value:.6g} {joint.unit}, allowed are {joint.lower:g} .. {joint.upper:g}"
-            for joint, value in zip(self.joints, q.tolist(), strict=True)
+            joint.refusal(value)
+            for joint, value, slack in zip(self.joints, q.tolist(), self.tolerance.tolist(), strict=True)
             if not joint.lower - slack <= value <= joint.upper + slack
         ]
 
@@ -191,7 +197,7 @@ class SerialChain:
             raise MotionError(f"not all positions are finite: {wrong.tolist()} of {names}")
 
     def check(self, q: Vector) -> None:
-        """Raise MotionError if `q` is not n finite numbers, each inside the range of its joint."""
+        """Raise MotionError if `q` is not n finite numbers, each inside its joint's range or `tolerance`."""
         self.check_form(q)
         if q.ndim > 1:
             raise MotionError(
@@ -199,6 +205,11 @@ class SerialChain:
             )
         if wrong := self.out_of_range(q):
             raise MotionError("; ".join(wrong))
+
+    def within(self, q: Vector) -> Vector:
+        """Return `q`, shape (n,), clamped to the joint ranges. Raises MotionError as `check` does."""
+        self.check(q)
+        return np.clip(q, self.lower, self.upper)
 
     def forward(self, q: Vector) -> Vector:
         """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n).

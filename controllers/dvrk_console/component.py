@@ -20,6 +20,7 @@ from controllers.dvrk_console.ports import EventOutputs
 from controllers.dvrk_console.readiness import Readiness
 from controllers.teleoperation.engagement import Phase
 from hub.participant import Inputs, Record, choice, flag, integer, number
+from robots.limits import TOLERANCE, distinct
 from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 from schemas.message import Message
@@ -151,12 +152,12 @@ class Component:
                     f"there is no state_command '{command.string}'.{did_you_mean(command.string, _COMMANDS)}"
                 )
         for scale in cast("tuple[Float64Message, ...]", inputs.events(f"{self.name}/set_scale")):
-            if 0.0 < scale.data <= 1.0:
-                self.set_scale(scale.data)
+            if 0.0 < scale.data <= 1.0 + TOLERANCE:
+                self.set_scale(min(scale.data, 1.0))
             else:
+                value = distinct(scale.data, 0.0, 1.0)[0]
                 self.warn(
-                    f"scale {scale.data:g} is refused, allowed is above 0 and up to 1; it stays"
-                    f" {state.scale:g}"
+                    f"scale {value} is refused, allowed is above 0 and up to 1; it stays {state.scale:g}"
                 )
         for lock in self._bools(inputs, "lock_rotation"):
             state.rotation_locked = lock.data

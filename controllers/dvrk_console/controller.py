@@ -17,6 +17,7 @@ from controllers.dvrk_console.ports import EventOutputs, console_ports
 from controllers.dvrk_console.readiness import Readiness
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, choice, flag
 from robots.dvrk.console_topics import PEDALS
+from robots.limits import TOLERANCE, distinct
 from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 from schemas.ports import Port
@@ -128,10 +129,11 @@ class DvrkConsole(Controller):
                 for arm in self.params.arms:
                     self._events.publish(f"{arm}/state_command", StringStamped(string=command))
         for volume in cast("tuple[Float64Message, ...]", inputs.events("system/set_volume")):
-            if 0.0 <= volume.data <= 1.0:
-                self._events.publish("system/volume", volume)
+            if -TOLERANCE <= volume.data <= 1.0 + TOLERANCE:
+                self._events.publish("system/volume", Float64Message(data=min(max(volume.data, 0.0), 1.0)))
             else:
-                self._warn(f"volume {volume.data:g} is refused, allowed are 0 to 1")
+                value = distinct(volume.data, 0.0, 1.0)[0]
+                self._warn(f"volume {value} is refused, allowed are 0 to 1")
 
     def _execute_commands(self, inputs: Inputs) -> None:
         for enable in cast("tuple[BoolMessage, ...]", inputs.events("console/teleop/enable")):
@@ -167,12 +169,14 @@ class DvrkConsole(Controller):
         self._events.publish("console/teleop/enabled", BoolMessage(data=enabled))
 
     def _set_scale(self, scale: Float64Message) -> None:
-        if not 0.0 < scale.data <= 1.0:
-            self._warn(f"scale {scale.data:g} is refused, allowed is above 0 and up to 1")
+        if not 0.0 < scale.data <= 1.0 + TOLERANCE:
+            value = distinct(scale.data, 0.0, 1.0)[0]
+            self._warn(f"scale {value} is refused, allowed is above 0 and up to 1")
             return
-        self._events.publish("console/teleop/scale", scale)
+        accepted = min(scale.data, 1.0)
+        self._events.publish("console/teleop/scale", Float64Message(data=accepted))
         for component in self._components.values():
-            component.set_scale(scale.data)
+            component.set_scale(accepted)
 
     def _rivals(self, component: Component) -> list[Component]:
         """Return those that are selected and have the same master or the same arm."""

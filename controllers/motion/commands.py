@@ -13,6 +13,7 @@ import numpy as np
 from controllers.motion import goals
 from controllers.motion.drives import Drives
 from hub.participant import Record, array, flag
+from robots.limits import TOLERANCE, distinct
 from schemas.errors import MotionError
 from schemas.ros import BoolMessage, EmptyMessage, Float64Message, JointState
 from schemas.vectors import Vector
@@ -115,6 +116,7 @@ class Commands:
 
 
 def _share(message: Float64Message) -> float:
-    if not 0.0 < message.data <= 1.0:
-        raise MotionError(f"ratio {message.data:g}, allowed is above 0 and up to 1")
-    return message.data
+    if not 0.0 < message.data <= 1.0 + TOLERANCE:
+        value = distinct(message.data, 0.0, 1.0)[0]
+        raise MotionError(f"ratio {value}, allowed is above 0 and up to 1")
+    return min(message.data, 1.0)

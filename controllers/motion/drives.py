@@ -104,7 +104,7 @@ class Drives:
 
         Raises MotionError if it is out of range.
         """
-        axes.chain.check(goal)
+        goal = axes.chain.within(goal)
         self._take_over(axes)
         axes.follow(goal, h, velocity)
 
@@ -118,7 +118,7 @@ class Drives:
 
         Raises MotionError if it is out of range.
         """
-        axes.chain.check(goal)
+        goal = axes.chain.within(goal)
         if axes is self.joints:
             self._leave()
         axes.move(goal, ratio)

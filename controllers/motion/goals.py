@@ -11,7 +11,8 @@ from typing import Literal
 import numpy as np
 
 from robots import rotation
-from robots.serial_chain import SerialChain
+from robots.limits import TOLERANCE, distinct
+from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.ros import JointState, Point, Pose, Quaternion, Twist, Vector3, Wrench
 from schemas.vectors import Vector
@@ -59,17 +60,25 @@ def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
 
 
 def efforts(chain: SerialChain, message: JointState) -> Vector:
-    """Return the efforts, shape (n,), all within what the drives can do."""
+    """Return the efforts, shape (n,), clamped to what the drives can do.
+
+    Raises MotionError if one is beyond that by more than `TOLERANCE`.
+    """
     values = joint_values(chain, message, "effort")
     wrong = [
-        f"joint {joint.name} at {value:.6g} {'N m' if joint.kind == 'revolute' else 'N'}, allowed are"
-        f" {-joint.effort:g} .. {joint.effort:g}"
+        _excessive(joint, value)
         for joint, value in zip(chain.joints, values.tolist(), strict=True)
-        if abs(value) > joint.effort
+        if abs(value) > joint.effort + TOLERANCE
     ]
     if wrong:
         raise MotionError("; ".join(wrong))
-    return values
+    return np.clip(values, -chain.effort, chain.effort)
+
+
+def _excessive(joint: Joint, effort: float) -> str:
+    value, lower, upper = distinct(effort, -joint.effort, joint.effort)
+    unit = "N m" if joint.kind == "revolute" else "N"
+    return f"joint {joint.name} at {value} {unit}, allowed are {lower} .. {upper}"
 
 
 def check_frame(frame_id: str, *allowed: str) -> str:

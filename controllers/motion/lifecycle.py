@@ -14,6 +14,8 @@ from controllers.motion.drives import Drives
 from controllers.motion.messages import Messages
 from controllers.motion.operating_state import Desired, Repeats, State, refusal
 from hub.participant import Record, choice, flag, number
+from robots.limits import distinct
+from robots.serial_chain import Joint
 from schemas.crtk import StringStamped
 from schemas.vectors import Vector
 
@@ -211,9 +213,7 @@ class Lifecycle:
             return ""
         rows = zip(joints.chain.joints, away.tolist(), self._tolerance.tolist(), strict=True)
         return "tracking error, " + "; ".join(
-            f"joint {joint.name} is {distance:.3g} {joint.unit} from its setpoint, allowed are {most:g}"
-            for joint, distance, most in rows
-            if distance > most
+            _astray(joint, distance, most) for joint, distance, most in rows if distance > most
         )
 
     def _check_home(self, h: float) -> None:
@@ -224,7 +224,13 @@ class Lifecycle:
             return
         self._now.late += h
         if self._now.late > _HOMING_TIMEOUT:
+            distance, allowed = distinct(away, _GOAL_TOLERANCE, digits=3)
             self._fault(
-                f"home not reached {_HOMING_TIMEOUT:g} s after its trajectory, {away:.3g} (rad, m) away,"
-                f" allowed are {_GOAL_TOLERANCE:.3g}"
+                f"home not reached {_HOMING_TIMEOUT:g} s after its trajectory, {distance} (rad, m) away,"
+                f" allowed are {allowed}"
             )
+
+
+def _astray(joint: Joint, distance: float, most: float) -> str:
+    away, allowed = distinct(distance, most, digits=3)
+    return f"joint {joint.name} is {away} {joint.unit} from its setpoint, allowed are {allowed}"

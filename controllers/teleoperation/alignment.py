@@ -14,6 +14,7 @@ import numpy as np
 
 from hub.participant import Record, array, flag, number
 from robots import rotation
+from robots.limits import distinct
 from schemas.vectors import Vector
 
 __all__ = ["AlignmentGate"]
@@ -90,10 +91,10 @@ class AlignmentGate:
             return ""
         state.waited = 0.0
         if state.angle > self._tolerance:
-            away, allowed = degrees(state.angle), degrees(self._tolerance)
+            away, allowed = distinct(degrees(state.angle), degrees(self._tolerance), digits=3)
             return (
-                f"the master is turned {away:.1f} deg away from the instrument, allowed are {allowed:g}; turn"
-                " it as the instrument is"
+                f"the master is turned {away} deg away from the instrument, allowed are {allowed}; turn it"
+                " as the instrument is"
             )
         return (
             f"no hand seems to hold the master; roll it by {degrees(_ROLL):g} deg, or move its gripper by"

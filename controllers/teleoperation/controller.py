@@ -16,6 +16,7 @@ from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, integer, number
 from robots import rotation
+from robots.limits import TOLERANCE, distinct
 from schemas.crtk import OperatingState
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Header, JointState, Joy, StringMessage, Time
@@ -178,14 +179,12 @@ class Teleoperation(Controller):
     def _set_scale(self, scale: float) -> list[str]:
         """Set the scale; return why it is refused, once."""
         is_new, self._now.requested_scale = scale != self._now.requested_scale, scale
-        if 0.0 < scale <= 1.0:
-            self._now.scale = scale
+        if 0.0 < scale <= 1.0 + TOLERANCE:
+            self._now.scale = min(scale, 1.0)
             return []
-        return (
-            [f"scale {scale:g} is refused, allowed is above 0 and up to 1; it stays {self._now.scale:g}"]
-            if is_new
-            else []
-        )
+        value = distinct(scale, 0.0, 1.0)[0]
+        refusal = f"scale {value} is refused, allowed is above 0 and up to 1; it stays {self._now.scale:g}"
+        return [refusal] if is_new else []
 
     def _lead(self, inputs: Inputs, to_base: Vector, seconds: float) -> None:
         """Let the command follow the hand."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from robots.dvrk import ecm
+from robots.limits import TOLERANCE, distinct
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
 from schemas.vectors import Vector
@@ -26,8 +27,6 @@ SafeDistanceFromRCMBuffer).
 """
 _ECM_SAFE, _ECM_START = 0.040, 0.050
 """m: nearest goal, and insertion beyond which Cartesian control may begin."""
-_ROUNDING = 1e-6
-"""m by which a goal may be nearer than where the arm is, so that holding its pose is no retreat."""
 _INSERTION = 2
 """Index of the joint."""
 
@@ -60,20 +59,22 @@ class Cannula:
 
     def not_past(self, q: Vector) -> str:
         """Return why Cartesian control cannot begin at `q`, shape (n,); empty if it can."""
-        if (depth := self.depth(q)) >= self.start:
+        if (depth := self.depth(q)) >= self.start - TOLERANCE:
             return ""
+        value, allowed = distinct(depth, self.start, digits=4)
         return (
-            f"{self.what} is {depth:.4g} m past the remote centre, allowed from {self.start:g} on; insert it"
-            " in joint space first"
+            f"{self.what} is {value} m past the remote centre, allowed from {allowed} on; insert it in joint"
+            " space first"
         )
 
     def check(self, goal: Vector, q: Vector) -> None:
         """Raise MotionError if `goal` is too near to the remote centre.
 
-        It is not if it is further away than `q`, where the arm is; both have shape (n,).
+        It is not if it is no nearer than `q`, where the arm is, within the tolerance; both have shape (n,).
         """
         depth = self.depth(goal)
-        if depth < self.safe and depth < self.depth(q) - _ROUNDING:
+        if depth < min(self.safe, self.depth(q)) - TOLERANCE:
+            value, allowed = distinct(depth, self.safe, digits=4)
             raise MotionError(
-                f"{self.what} would be {depth:.4g} m past the remote centre, allowed from {self.safe:g} on"
+                f"{self.what} would be {value} m past the remote centre, allowed from {allowed} on"
             )

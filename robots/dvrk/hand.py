@@ -24,6 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from robots.dvrk.contact_spheres import ContactSphere
+from robots.limits import TOLERANCE, distinct
 from robots.serial_chain import Joint
 from schemas.errors import MotionError, did_you_mean
 from schemas.vectors import Vector
@@ -194,8 +195,10 @@ class Hand:
         pattern = self.modes.get(mode)
         if pattern is None:
             raise MotionError(f"no mode '{mode}'.{did_you_mean(mode, self.modes)}")
-        if not 0.0 <= closing <= 1.0:
-            raise MotionError(f"closing {closing:g} of mode '{mode}', allowed are 0 (open) to 1 (closed)")
+        if not -TOLERANCE <= closing <= 1.0 + TOLERANCE:
+            value = distinct(closing, 0.0, 1.0)[0]
+            raise MotionError(f"closing {value} of mode '{mode}', allowed are 0 (open) to 1 (closed)")
+        closing = min(max(closing, 0.0), 1.0)
         start, end = np.array(pattern.open), np.array(pattern.closed)
         return start + closing * (end - start)
 

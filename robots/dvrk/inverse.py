@@ -28,22 +28,22 @@ from numpy.typing import NDArray
 
 from robots.dvrk import ecm, psm
 from robots.dvrk.cart import inverse_pose
+from robots.limits import ANGLE_TOLERANCE, distinct
 from robots.serial_chain import Joint, SerialChain
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
 __all__ = ["ORIENTATION_TOLERANCE", "branches", "inverse"]
 
-ORIENTATION_TOLERANCE = radians(20.0)
+ORIENTATION_TOLERANCE = radians(45.0)
 """Between the ECM's goal and the nearest orientation at its position, rad.
 
-The real controller (jhu-dvrk/sawIntuitiveResearchKit, robManipulatorECM.cpp) has no bound. Below the 30
-degrees by which endoscopes differ, so that a goal meant for another one is refused; above the 11 degrees that
-20 mm sideways at a depth of 100 mm need, a step for which no orientation should have to be computed.
+The real controller (jhu-dvrk/sawIntuitiveResearchKit, robManipulatorECM.cpp) has no bound: programs command
+positions and keep the orientation. dvrk_arm_test.py of jhu-dvrk/dvrk_python moves the ECM by 40 mm along x
+and y from an insertion of 120 mm, for which 25 degrees remain. Goals in another frame or with axes in another
+order are about 90 degrees away and refused.
 """
 
-_SLACK = 1e-9
-"""rad and m by which rounding may carry a joint past its limit."""
 _RIGID = 1e-6
 """Largest entry of R^T R - 1 that is taken for rounding, of a pose that was written with 7 digits."""
 _FAR = 1e3
@@ -87,7 +87,9 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     branches = _unwind(chain, branches, start)
     excess = np.maximum(chain.lower - branches, branches - chain.upper)  # (branches, N, n)
     cost = np.where(
-        (excess <= _SLACK).all(axis=-1), (((branches - start) / chain.velocity) ** 2).sum(axis=-1), np.inf
+        (excess <= chain.tolerance).all(axis=-1),
+        (((branches - start) / chain.velocity) ** 2).sum(axis=-1),
+        np.inf,
     )
     best, each = cost.argmin(axis=0), np.arange(len(poses))
     reached = np.isfinite(cost[best, each])
@@ -257,7 +259,7 @@ def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
     central = q + _TURN * np.round(((lower + upper) / 2 - q) / _TURN)
     unwound = branches.copy()
     unwound[..., revolute] = np.where(
-        (nearest >= lower - _SLACK) & (nearest <= upper + _SLACK), nearest, central
+        (nearest >= lower - ANGLE_TOLERANCE) & (nearest <= upper + ANGLE_TOLERANCE), nearest, central
     )
     return unwound
 
@@ -268,7 +270,7 @@ def _unreachable(chain: SerialChain, branches: Vector, index: np.intp, count: in
         chain.upper - chain.lower
     )
     q = branches[beyond.sum(axis=-1).argmin()]
-    reasons = "; ".join(chain.out_of_range(q, slack=_SLACK))
+    reasons = "; ".join(chain.out_of_range(q))
     return MotionError(f"pose{f' {index}' if count > 1 else ''} cannot be reached: {reasons}")
 
 
@@ -277,10 +279,10 @@ def _check_orientation(reached: Vector, asked: Vector) -> None:
     difference = np.linalg.norm(reached[:, :3, :3] - asked[:, :3, :3], axis=(-2, -1))
     angles: NDArray[np.float64] = 2.0 * np.arcsin(np.minimum(difference / np.sqrt(8.0), 1.0))
     worst = int(angles.argmax())
-    if angles[worst] > ORIENTATION_TOLERANCE:
+    if angles[worst] > ORIENTATION_TOLERANCE + ANGLE_TOLERANCE:
+        away, allowed = distinct(degrees(angles[worst]), degrees(ORIENTATION_TOLERANCE), digits=3)
         where = f" {worst}" if len(asked) > 1 else ""
         raise MotionError(
-            f"pose{where} cannot be reached: four joints leave its orientation {degrees(angles[worst]):.1f}"
-            f" degrees away at this position, allowed are {degrees(ORIENTATION_TOLERANCE):g}; the shaft"
-            " points away from the remote centre of motion"
+            f"pose{where} cannot be reached: four joints leave its orientation {away} degrees away at"
+            f" this position, allowed are {allowed}; the shaft points away from the remote centre of motion"
         )

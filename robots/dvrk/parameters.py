@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
 
 from robots.dvrk import psm, setup_joints
 from robots.dvrk.instruments import Instrument, instrument
+from robots.limits import ANGLE_TOLERANCE, distinct
 from robots.serial_chain import SerialChain
 from schemas.errors import MotionError
 from schemas.quantity import Angle, Length
@@ -33,7 +34,7 @@ ArmName = Literal["PSM1", "PSM2", "PSM3"]
 def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
     norm = float(np.linalg.norm(value))
     if abs(norm - 1.0) > 1e-6:
-        raise ValueError(f"{value} is no unit quaternion (x, y, z, w): its norm is {norm:.6g}")
+        raise ValueError(f"{value} is no unit quaternion (x, y, z, w): its norm is {distinct(norm, 1.0)[0]}")
     return value
 
 
@@ -115,16 +116,19 @@ def check_start(
     range_ = tool.jaw if tool is not None else None
     if range_ is None and jaw:
         raise ValueError(f"jaw at {jaw:g} rad, but what the arm holds has no jaw; leave it out")
-    if range_ is not None and not range_.lower <= jaw <= range_.upper:
-        raise ValueError(f"jaw at {jaw:g} rad, allowed are {range_.lower:g} .. {range_.upper:g}")
+    if range_ is not None and not _inside(jaw, range_.lower, range_.upper):
+        value, lower, upper = distinct(jaw, range_.lower, range_.upper)
+        raise ValueError(f"jaw at {value} rad, allowed are {lower} .. {upper}")
     joints = tool.hand.joints if tool is not None and tool.hand is not None else ()
     if not joints and any(hand):
         raise ValueError("closings of a hand, but what the arm holds is none; leave them out")
     for joint, closing in zip(joints, hand, strict=bool(joints)):
-        if not joint.lower <= closing <= joint.upper:
-            raise ValueError(
-                f"{joint.name} at {closing:g} rad, allowed are {joint.lower:g} .. {joint.upper:g}"
-            )
+        if not _inside(closing, joint.lower, joint.upper):
+            raise ValueError(joint.refusal(closing))
+
+
+def _inside(angle: float, lower: float, upper: float) -> bool:
+    return lower - ANGLE_TOLERANCE <= angle <= upper + ANGLE_TOLERANCE
 
 
 def settable(arm: setup_joints.CartArm) -> AfterValidator:
@@ -132,9 +136,8 @@ def settable(arm: setup_joints.CartArm) -> AfterValidator:
 
     def check(positions: tuple[float, ...]) -> tuple[float, ...]:
         try:
-            setup_joints.chain(arm).check(np.array(positions, np.float64))
+            return tuple(setup_joints.chain(arm).within(np.array(positions, np.float64)).tolist())
         except MotionError as error:
             raise ValueError(str(error)) from error
-        return positions
 
     return AfterValidator(check)

@@ -1,9 +1,11 @@
+from math import radians
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.dvrk import arms
+from robots.dvrk import arms, ecm
 from robots.dvrk.instruments import instruments
 from robots.dvrk.inverse import ORIENTATION_TOLERANCE, inverse
 from robots.serial_chain import Joint
@@ -186,13 +188,46 @@ def test_the_endoscope_takes_a_step_aside_with_the_orientation_nearest_to_the_on
 
 def test_an_orientation_that_the_endoscope_cannot_have_is_refused():
     turn = np.eye(4)
-    for angle, refused in ((ORIENTATION_TOLERANCE - 1e-6, False), (ORIENTATION_TOLERANCE + 1e-6, True)):
+    for angle, refused in ((ORIENTATION_TOLERANCE, False), (ORIENTATION_TOLERANCE + 2e-5, True)):
         turn[:3, :3] = Joint("", "revolute", angle, 0.0, 0.0, 0.0, 0.0, 0.0).transform(0.0)[:3, :3]
         pose = ECM.forward(LOOK) @ turn
         if refused:
             with pytest.raises(
-                MotionError, match=r"orientation 20.0 degrees away at this position, allowed are 20"
+                MotionError, match=r"orientation 45.001 degrees away at this position, allowed are 45;"
             ):
                 inverse(ECM, pose, LOOK)
         else:
             assert np.allclose(inverse(ECM, pose, LOOK), LOOK, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("endoscope", ["straight", "up", "down"])
+@pytest.mark.parametrize("tip_frame", ["kinematic", "view"])
+def test_the_endoscope_makes_the_moves_of_the_arm_test_of_dvrk_python(endoscope, tip_frame):
+    """dvrk_arm_test.py -a ECM: goals along x and y, with the orientation of the pose where it starts."""
+    chain = ecm.chain(endoscope, tip_frame)
+    start = np.array(ecm.HOME)
+    servo = 0.02 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 500)))
+    ways = [(x, x) for x in servo] + [(-0.05, 0.0), (0.05, 0.0), (0.0, -0.05), (0.0, 0.05)]
+    goals = np.tile(chain.forward(start), (len(ways), 1, 1))
+    goals[:, :2, 3] += ways
+    reached = chain.forward(inverse(chain, goals, start))
+    assert np.allclose(reached[:, :3, 3], goals[:, :3, 3], rtol=0.0, atol=1e-12)
+
+
+def test_the_endoscope_accepts_30_degrees_and_refuses_axes_in_another_order():
+    away = np.eye(4)
+    away[:3, :3] = Joint("", "revolute", radians(30.0), 0.0, 0.0, 0.0, 0.0, 0.0).transform(0.0)[:3, :3]
+    assert np.allclose(inverse(ECM, ECM.forward(LOOK) @ away, LOOK), LOOK, rtol=0.0, atol=1e-9)
+    swapped = ECM.forward(LOOK)
+    swapped[:3, :3] = swapped[:3, [1, 2, 0]]
+    with pytest.raises(MotionError, match="degrees away at this position, allowed are 45;"):
+        inverse(ECM, swapped, LOOK)
+
+
+def test_a_pose_at_a_limit_that_was_computed_from_degrees_is_reached():
+    """The wrist's limit is 1.39626 rad, 80 degrees are 3 urad more."""
+    q = np.array([0.0, 0.0, 0.12, 0.0, radians(80.0), radians(-80.0)])
+    assert np.abs(inverse(PSM, PSM.forward(q), q) - q).max() < 1e-5
+    beyond = q + [0.0, 0.0, 0.0, 0.0, 1e-4, 0.0]
+    with pytest.raises(MotionError, match=r"wrist_pitch at 1.39636 rad, allowed are -1.39626 .. 1.39626"):
+        inverse(PSM, PSM.forward(beyond), beyond)

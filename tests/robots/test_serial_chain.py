@@ -1,3 +1,4 @@
+import re
 from math import pi
 
 import numpy as np
@@ -128,10 +129,27 @@ def test_positions_that_cannot_be_are_refused_with_what_can(q, reason):
         CHAINS["PSM1"].check(np.array(q, float))
 
 
-def test_positions_at_the_limits_can_be():
+def test_positions_at_the_limits_can_be_and_just_beyond_are_clamped():
     chain = CHAINS["PSM1"]
-    chain.check(chain.lower)
-    chain.check(chain.upper)
+    for limit, side in ((chain.lower, -1.0), (chain.upper, 1.0)):
+        assert (chain.within(limit) == limit).all()
+        assert (chain.within(limit + side * 0.99 * chain.tolerance) == limit).all()
+
+
+@pytest.mark.parametrize("i", range(6))
+@pytest.mark.parametrize("beyond", [1.01, 1.5, 10.0])
+def test_a_refused_position_is_never_written_as_the_limit(i, beyond):
+    chain = CHAINS["PSM1"]
+    for limit, side in ((chain.lower, -1.0), (chain.upper, 1.0)):
+        q = np.zeros(6)
+        q[i] = limit[i] + side * beyond * chain.tolerance[i]
+        with pytest.raises(MotionError) as refused:
+            chain.within(q)
+        at, lower, upper = re.search(
+            r"at (\S+) \S+, allowed are (\S+) \.\. (\S+)$", str(refused.value)
+        ).groups()
+        assert at not in (lower, upper)
+        assert not float(lower) <= float(at) <= float(upper)
 
 
 @pytest.mark.parametrize("call", [CHAINS["PSM1"].forward, CHAINS["PSM1"].frames])

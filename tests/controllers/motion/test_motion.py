@@ -1,4 +1,5 @@
 import json
+from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -447,6 +448,58 @@ def test_bad_input_is_refused_with_the_reason_and_changes_nothing(command, bad, 
         rig.motion._arms["PSM1"]._drives.state, twin.motion._arms["PSM1"]._drives.state, strict=True
     ):
         assert (mine.values == others.values).all()
+
+
+@pytest.mark.parametrize("command", ["jaw__move_jp", "jaw__servo_jp"])
+def test_a_jaw_opens_by_80_degrees_as_a_client_converts_them(command):
+    """The table has 1.39626 rad, less than 80 degrees."""
+    rig = Rig().step().step(1, **{command: jp(radians(80.0))})
+    assert not rig.said("error")
+    rig.until_idle()
+    if "servo" in command:
+        rig.step(500)
+    assert rig.motion._arms["PSM1"]._drives.gripper.setpoint.position == [1.39626]
+
+
+@pytest.mark.parametrize("command", ["move_jp", "servo_jp"])
+def test_a_wrist_bends_by_80_degrees_as_a_client_converts_them(command):
+    rig = Rig().step().step(1, **{command: jp(0.0, 0.0, 0.12, 0.0, radians(80.0), radians(-80.0))})
+    assert not rig.said("error")
+    rig.until_idle()
+    if "servo" in command:
+        rig.step(2000)
+    assert rig.setpoint[4:].tolist() == [1.39626, -1.39626]
+
+
+@pytest.mark.parametrize(
+    ("command", "bad", "reason"),
+    [
+        ("jaw__move_jp", jp(1.39628), "joint jaw at 1.39628 rad, allowed are -0.698132 .. 1.39626"),
+        ("jaw__move_jp", jp(1.3962701), "joint jaw at 1.39627 rad, allowed are -0.698132 .. 1.39626"),
+        (
+            "move_jp",
+            jp(0, 0, 0.2400011, 0, 0, 0),
+            "joint insertion at 0.240001 m, allowed are 0 .. 0.24",
+        ),
+        (
+            "servo_jf",
+            jf(3.316103, *[0.0] * 5),
+            "joint yaw at 3.316103 N m, allowed are -3.316101 .. 3.316101",
+        ),
+        ("trajectory_j__set_ratio", ratio(1.0000011), "ratio 1.000001, allowed is above 0 and up to 1"),
+    ],
+)
+def test_a_refusal_just_beyond_a_limit_is_written_with_digits_that_differ(command, bad, reason):
+    rig = Rig().step().step(1, **{command: bad})
+    assert rig.said("error")[0].endswith(reason)
+
+
+def test_efforts_and_ratios_beyond_the_limit_by_rounding_are_clamped():
+    rig = Rig().step().step(1, servo_jf=jf(3.3161015, *[0.0] * 5), trajectory_j__set_ratio=ratio(1.0 + 1e-9))
+    assert not rig.said("error")
+    arm = rig.motion._arms["PSM1"]
+    assert arm._drives.joints.effort[0] == 3.316101
+    assert (arm._commands.settings.ratio == 1.0).all()
 
 
 def test_a_bad_goal_does_not_disturb_a_move_under_way():
