@@ -195,7 +195,7 @@ def test_whoever_waits_is_told_every_two_seconds_what_to_do():
     tilt(session, np.radians(-30.0))
     session.step(count=2_000)
     turned = (
-        "PSM1 waits: the master is turned 30.0 deg away from the instrument, allowed are 5; turn it as the"
+        "PSM1 waits: the master is turned 30 deg away from the instrument, allowed are 5; turn it as the"
         " instrument is"
     )
     unseen = "PSM1 waits: no hand seems to hold the master; roll it by 4 deg, or move its gripper by 40"
