@@ -41,8 +41,6 @@ class Discovery:
     def __init__(self, participant: DomainParticipant, waitset: ReaderWaitSet) -> None:
         """Start, with readers of `participant` in `waitset`."""
         self._graph = Graph(participant.guid.bytes)
-        self._participants: dict[int, bytes] = {}
-        """GUIDs of participants by instance handle of a remote writer or reader."""
         for topic in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription):
             waitset.add(BuiltinDataReader(participant, topic), self._on_endpoint)
         info = payload_type(INFO_TYPE)
@@ -51,12 +49,10 @@ class Discovery:
         )
 
     def _on_endpoint(self, endpoint: DcpsEndpoint) -> None:
-        handle, guid = endpoint.sample_info.instance_handle, endpoint.key.bytes
+        guid = endpoint.key.bytes
         if endpoint.sample_info.instance_state == InstanceState.Alive:
-            self._participants[handle] = endpoint.participant_key.bytes
             self._graph.add_endpoint(guid, endpoint.participant_key.bytes, endpoint.topic_name)
         else:
-            self._participants.pop(handle, None)
             self._graph.remove_endpoint(guid)
 
     def _on_info(self, sample: Payload | InvalidSample) -> None:
@@ -66,10 +62,9 @@ class Discovery:
             except MessageError as error:
                 log.warning("the node names of a program are ignored: %s", error)
 
-    def sender(self, publication: int) -> str:
-        """Return the name of the program whose writer has this instance handle."""
-        participant = self._participants.get(publication)
-        return f"writer {publication:x}" if participant is None else self._graph.sender(participant)
+    def sender(self, participant: bytes) -> str:
+        """Return the name of the program whose participant has this GUID (16 bytes)."""
+        return self._graph.sender(participant)
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs that read or write any of `topics`, which are names of DDS topics."""

@@ -16,6 +16,7 @@ from schemas.errors import MessageError
 __all__ = [
     "LEASE_S",
     "MULTICAST_GROUP",
+    "PARTICIPANT",
     "PUBLICATIONS_READER",
     "PUBLICATIONS_WRITER",
     "READER_NO_KEY",
@@ -36,11 +37,11 @@ __all__ = [
     "unicast_ports",
 ]
 
-_PARTICIPANT = b"\x00\x00\x01\xc1"
+PARTICIPANT = b"\x00\x00\x01\xc1"
 SPDP_WRITER, SPDP_READER = b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7"
 PUBLICATIONS_WRITER, PUBLICATIONS_READER = b"\x00\x00\x03\xc2", b"\x00\x00\x03\xc7"
 SUBSCRIPTIONS_WRITER, SUBSCRIPTIONS_READER = b"\x00\x00\x04\xc2", b"\x00\x00\x04\xc7"
-"""EntityIds of built-in endpoints: of SPDP, and of SEDP for publications and subscriptions."""
+"""EntityIds: of a participant; of built-in endpoints of SPDP, and of SEDP (publications, subscriptions)."""
 WRITER_NO_KEY, READER_NO_KEY = b"\x03", b"\x04"
 """Entity kinds, the last byte of the EntityId, of user-defined endpoints whose topics have no key."""
 
@@ -64,6 +65,7 @@ class Pid(IntEnum):
     VENDORID = 0x16
     RELIABILITY = 0x1A
     DURABILITY = 0x1D
+    USER_DATA = 0x2C
     DEFAULT_UNICAST_LOCATOR = 0x31
     METATRAFFIC_UNICAST_LOCATOR = 0x32
     PARTICIPANT_GUID = 0x50
@@ -102,7 +104,7 @@ def participant_data(guid_prefix: bytes, domain: int, host: str, port: int) -> b
         {
             Pid.PROTOCOL_VERSION: b"\x02\x03",
             Pid.VENDORID: guid_prefix[:2],
-            Pid.PARTICIPANT_GUID: guid_prefix + _PARTICIPANT,
+            Pid.PARTICIPANT_GUID: guid_prefix + PARTICIPANT,
             Pid.DOMAIN_ID: struct.pack("<I", domain),
             Pid.BUILTIN_ENDPOINT_SET: _SPDP_AND_SEDP,
             Pid.METATRAFFIC_UNICAST_LOCATOR: locator,
@@ -114,19 +116,22 @@ def participant_data(guid_prefix: bytes, domain: int, host: str, port: int) -> b
 
 def participant_disposal(guid_prefix: bytes) -> dict[int, bytes]:
     """Return the inline QoS of a DATA that announces the end of a participant."""
-    return {Pid.KEY_HASH: guid_prefix + _PARTICIPANT, Pid.STATUS_INFO: _DISPOSED_UNREGISTERED}
+    return {Pid.KEY_HASH: guid_prefix + PARTICIPANT, Pid.STATUS_INFO: _DISPOSED_UNREGISTERED}
 
 
-def endpoint_data(guid_prefix: bytes, entity_id: bytes, topic: str, type_: str) -> bytes:
+def endpoint_data(
+    guid_prefix: bytes, entity_id: bytes, topic: str, type_: str, user_data: bytes = b""
+) -> bytes:
     """Return the DiscoveredWriterData or DiscoveredReaderData of a reliable, volatile endpoint."""
     return PL_CDR_LE + encode_parameters(
         {
             Pid.ENDPOINT_GUID: guid_prefix + entity_id,
-            Pid.PARTICIPANT_GUID: guid_prefix + _PARTICIPANT,
+            Pid.PARTICIPANT_GUID: guid_prefix + PARTICIPANT,
             Pid.TOPIC_NAME: encode_string(topic),
             Pid.TYPE_NAME: encode_string(type_),
             Pid.RELIABILITY: _RELIABLE,
             Pid.DURABILITY: _VOLATILE,
+            Pid.USER_DATA: struct.pack("<I", len(user_data)) + user_data,
         }
     )
 

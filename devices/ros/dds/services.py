@@ -1,8 +1,10 @@
-"""Services over DDS: an RTPS participant of our own, with a reader and a writer per service.
+"""Services and subscriptions over DDS: an RTPS participant of our own, with its readers and writers.
 
 Programs with rmw_fastrtps tell requests apart by inline QoS, which Cyclone DDS gives no access to; so
 services need a participant of their own, of which programs see the servers and nothing else. It answers
-programs with rmw_cyclonedds, too: of two servers they would use the first that they discover. Sources of
+programs with rmw_cyclonedds, too: of two servers they would use the first that they discover.
+Subscriptions are here because a reader of Cyclone DDS loses what a writer sends before Cyclone DDS has
+matched the two, and a program publishes as soon as its own side is matched (docs/decisions/0030). Sources of
 the identity of a request: ros2/rmw_fastrtps, rmw_fastrtps_shared_cpp/src/rmw_request.cpp and
 rmw_response.cpp; ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
 """
@@ -14,6 +16,7 @@ import os
 import socket
 import struct
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -34,6 +37,7 @@ from devices.ros.dds.rtps import (
 from devices.ros.dds.rtps_discovery import (
     LEASE_S,
     MULTICAST_GROUP,
+    PARTICIPANT,
     PUBLICATIONS_READER,
     PUBLICATIONS_WRITER,
     READER_NO_KEY,
@@ -60,6 +64,9 @@ from schemas.errors import MessageError
 __all__ = ["ServiceParticipant"]
 
 log = logging.getLogger(__name__)
+
+ReceiveSample = Callable[[bytes, bytes], None]
+"""Receives a message (CDR) and the GUID of the participant that has published it."""
 
 _FAST_DDS, _CYCLONE_DDS, _NO_VENDOR = b"\x01\x0f", b"\x01\x10", b"\x00\x00"
 """Vendors of participants, the first two bytes of the GUID prefix."""
@@ -88,6 +95,16 @@ class _Service:
     handle: ServiceHandler
 
 
+@dataclass(frozen=True, slots=True)
+class _Subscription:
+    topic: str
+    type: str
+    """`crtk_msgs::msg::dds_::StringStamped_`."""
+    reader_id: bytes
+    user_data: str
+    receive: ReceiveSample
+
+
 @dataclass(slots=True)
 class _ParticipantProxy:
     """A remote participant, and our endpoints that are matched with its own."""
@@ -104,12 +121,20 @@ class _ParticipantProxy:
         default_factory=dict[tuple[bytes, bytes], StatefulWriter]
     )
     """By EntityIds of our writer and the remote reader."""
+    publications: dict[bytes, bytes] = field(default_factory=dict[bytes, bytes])
+    """Topics, as parameters have them, by EntityId of the remote writer."""
+    gone: set[bytes] = field(default_factory=set[bytes])
+    """EntityIds of writers that have announced their end."""
+    unmatched: deque[Data | Heartbeat | Gap] = field(
+        default_factory=lambda: deque["Data | Heartbeat | Gap"](maxlen=_MOST_EARLY)
+    )
+    """What writers have sent that are not discovered yet: they may not send it again."""
     early: list[tuple[_Service, Data]] = field(default_factory=list["tuple[_Service, Data]"])
     """Requests of clients whose readers of responses are not discovered yet."""
 
 
 class ServiceParticipant:
-    """The services of one domain, with a socket and a thread of their own."""
+    """The services and subscriptions of one domain, with a socket and a thread of their own."""
 
     def __init__(self, domain: int, *, multicast: bool, hosts: Sequence[str]) -> None:
         """Start discovery of a domain.
@@ -131,6 +156,7 @@ class ServiceParticipant:
         self._socket.bind(("127.0.0.1" if is_local else "", 0))
         self._host = "127.0.0.1" if is_local else _own_address(domain)
         self._services: list[_Service] = []
+        self._subscriptions: list[_Subscription] = []
         self._proxies: dict[bytes, _ParticipantProxy] = {}
         """By GUID prefix."""
         self._changing = threading.Lock()
@@ -156,7 +182,7 @@ class ServiceParticipant:
             GUIDs (16 bytes) of the reader of requests and of the writer of responses.
         """
         package, group, name = ros_type.split("/")
-        key = struct.pack(">I", len(self._services) + 1)[1:]
+        key = self._next_key()
         service = _Service(
             f"rq{topic}Request",
             f"rr{topic}Reply",
@@ -169,7 +195,55 @@ class ServiceParticipant:
             self._services.append(service)
             for proxy in self._proxies.values():
                 self._announce_endpoints(proxy, service)
+            self._match_publications()
         return self._guid_prefix + service.reader_id, self._guid_prefix + service.writer_id
+
+    def subscribe(self, topic: str, ros_type: str, user_data: str, receive: ReceiveSample) -> bytes:
+        """Subscribe to a topic, reliable and volatile.
+
+        Every message of a writer that counts itself matched is received, once and in order, however early it
+        is sent, as far as the writer's history reaches. Messages in fragments are not received: those above
+        64 kB of rmw_fastrtps and above 1.3 kB of rmw_cyclonedds.
+
+        Args:
+            topic: name of the ROS topic: `/PSM1/state_command`.
+            ros_type: `crtk_msgs/msg/StringStamped`.
+            user_data: is announced with the reader.
+            receive: is called with every message, in the thread of this participant.
+
+        Returns:
+            GUID (16 bytes) of the reader.
+        """
+        package, group, name = ros_type.split("/")
+        subscription = _Subscription(
+            f"rt{topic}",
+            f"{package}::{group}::dds_::{name}_",
+            self._next_key() + READER_NO_KEY,
+            user_data,
+            receive,
+        )
+        with self._changing:
+            self._subscriptions.append(subscription)
+            for proxy in self._proxies.values():
+                self._announce_subscription(proxy, subscription)
+            self._match_publications()
+        return self._guid_prefix + subscription.reader_id
+
+    def matched_topics(self) -> set[str]:
+        """Return the DDS topics of which a writer is matched with one of our readers."""
+        with self._changing:
+            ids = {reader.reader_id for proxy in self._proxies.values() for reader in proxy.readers.values()}
+            return {
+                subscription.topic for subscription in self._subscriptions if subscription.reader_id in ids
+            }
+
+    def _next_key(self) -> bytes:
+        return struct.pack(">I", len(self._services) + len(self._subscriptions) + 1)[1:]
+
+    def _match_publications(self) -> None:
+        for prefix, proxy in self._proxies.items():
+            for writer_id in proxy.publications:
+                self._match_publication(prefix, writer_id)
 
     def _run(self) -> None:
         due = monotonic()
@@ -221,6 +295,8 @@ class ServiceParticipant:
                         writer.on_acknack(part)
                 elif (reader := proxy.readers.get(part.writer_id)) is not None:
                     _dispatch(reader, part)
+                else:
+                    self._on_unmatched(prefix, proxy, part)
 
     def _on_participant(self, prefix: bytes, announcement: Data, host: str) -> None:
         """SPDP: a participant announces itself, or its end."""
@@ -248,23 +324,67 @@ class ServiceParticipant:
         self._announce_participant([metatraffic])
         for service in self._services:
             self._announce_endpoints(proxy, service)
+        for subscription in self._subscriptions:
+            self._announce_subscription(proxy, subscription)
 
     def _on_publication(self, prefix: bytes, announcement: Data) -> None:
-        """SEDP: match a client's writer of requests with a reader, or remove that."""
+        """SEDP: match a client's writer with a reader, or remove that."""
         proxy = self._proxies[prefix]
         if is_disposed(announcement):
-            proxy.readers.pop(disposed_endpoint_id(announcement), None)
+            gone = disposed_endpoint_id(announcement)
+            proxy.readers.pop(gone, None)
+            proxy.publications.pop(gone, None)
+            proxy.gone.add(gone)
             return
         topic, writer_id = announced_endpoint(announcement)
+        proxy.publications[writer_id] = topic
+        self._match_publication(prefix, writer_id)
+
+    def _match_publication(self, prefix: bytes, writer_id: bytes) -> None:
+        """Match a writer with our reader of its topic, if there is one.
+
+        A writer that is announced again keeps its reader, which knows what has been received.
+        """
+        proxy = self._proxies[prefix]
+        found = self._reader_of(proxy.publications[writer_id], prefix)
+        if found is not None and writer_id not in proxy.readers:
+            self._match(prefix, proxy, writer_id, *found)
+
+    def _on_unmatched(self, prefix: bytes, proxy: _ParticipantProxy, part: Data | Heartbeat | Gap) -> None:
+        """Match a writer that is not discovered yet with the reader that it addresses, or discover it now."""
+        if part.writer_id in proxy.gone:
+            return
+        proxy.unmatched.append(part)
+        for subscription in self._subscriptions:
+            if subscription.reader_id == part.reader_id:
+                deliver = partial(_on_message, subscription, prefix)
+                self._match(prefix, proxy, part.writer_id, part.reader_id, deliver)
+                return
+        if prefix.startswith(_FAST_DDS):
+            proxy.readers[PUBLICATIONS_WRITER].request_heartbeat()
+
+    def _match(
+        self,
+        prefix: bytes,
+        proxy: _ParticipantProxy,
+        writer_id: bytes,
+        reader_id: bytes,
+        deliver: Callable[[Data], None],
+    ) -> None:
+        send = self._sender(prefix, proxy.default)
+        reader = proxy.readers[writer_id] = _matched_reader(send, prefix, reader_id, writer_id, deliver)
+        for part in [part for part in proxy.unmatched if part.writer_id == writer_id]:
+            _dispatch(reader, part)
+
+    def _reader_of(self, topic: bytes, prefix: bytes) -> tuple[bytes, Callable[[Data], None]] | None:
+        """Return EntityId and handler of our reader of a topic, which is as a parameter has it."""
         for service in self._services:
             if topic.startswith(encode_string(service.request_topic)):
-                proxy.readers[writer_id] = _matched_reader(
-                    self._sender(prefix, proxy.default),
-                    prefix,
-                    service.reader_id,
-                    writer_id,
-                    partial(self._on_request, service, prefix),
-                )
+                return service.reader_id, partial(self._on_request, service, prefix)
+        for subscription in self._subscriptions:
+            if topic.startswith(encode_string(subscription.topic)):
+                return subscription.reader_id, partial(_on_message, subscription, prefix)
+        return None
 
     def _on_subscription(self, prefix: bytes, announcement: Data) -> None:
         """SEDP: match a client's reader of responses with a writer, or remove that."""
@@ -347,6 +467,17 @@ class ServiceParticipant:
         ):
             proxy.writers[ids].write(endpoint_data(self._guid_prefix, entity_id, topic, type_), {})
 
+    def _announce_subscription(self, proxy: _ParticipantProxy, subscription: _Subscription) -> None:
+        """SEDP: announce the reader of a topic."""
+        announcement = endpoint_data(
+            self._guid_prefix,
+            subscription.reader_id,
+            subscription.topic,
+            subscription.type,
+            subscription.user_data.encode(),
+        )
+        proxy.writers[SUBSCRIPTIONS_WRITER, SUBSCRIPTIONS_READER].write(announcement, {})
+
     def _sender(self, prefix: bytes, address: tuple[str, int]) -> SendSubmessages:
         return lambda submessages: self._send(
             encode_message(self._guid_prefix, prefix, submessages), [address]
@@ -387,6 +518,11 @@ def _matched_reader(
     if prefix.startswith(_FAST_DDS):
         reader.request_heartbeat()
     return reader
+
+
+def _on_message(subscription: _Subscription, prefix: bytes, sample: Data) -> None:
+    if sample.payload and not is_disposed(sample):
+        subscription.receive(sample.payload, prefix + PARTICIPANT)
 
 
 def _dispatch(reader: StatefulReader, part: Data | Heartbeat | Gap) -> None:

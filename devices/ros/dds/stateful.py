@@ -81,7 +81,7 @@ class StatefulReader:
         deliver: Callable[[Data], None],
     ) -> None:
         """`reader_id` and `writer_id`: EntityIds, 4 bytes."""
-        self._send, self._reader_id, self._writer_id, self._deliver = send, reader_id, writer_id, deliver
+        self._send, self.reader_id, self._writer_id, self._deliver = send, reader_id, writer_id, deliver
         self._expected, self._acknacks = 1, 0
         self._early: dict[int, Data | None] = {}
         """Samples that arrived before their turn, by sequence number; None: irrelevant by a GAP."""
@@ -96,7 +96,7 @@ class StatefulReader:
 
     def _acknack(self, base: int, missing: Sequence[int]) -> None:
         self._acknacks += 1
-        self._send([encode_acknack(self._writer_id, self._reader_id, base, missing, self._acknacks)])
+        self._send([encode_acknack(self._writer_id, self.reader_id, base, missing, self._acknacks)])
 
     def on_data(self, sample: Data) -> None:
         """Deliver a sample in its turn."""

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
-from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from devices.ros.dds.discovery import Discovery
@@ -39,15 +37,13 @@ keeps the rest while a busy machine loses packets.
 """
 _LAST = Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1)
 LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), _LAST)
-_SUBSCRIBED = Qos(*_ALWAYS, Policy.Durability.Volatile, Policy.History.KeepLast(150))
-"""As many as a gateway accepts at once."""
 
 
 class DdsTransport(Transport):
     """Publishes, subscribes and serves as one node on one participant.
 
-    Publishing never waits for a reader: each writer keeps its last messages for slow ones. Messages are
-    taken in a thread of their own.
+    Publishing never waits for a reader: each writer keeps its last messages for slow ones. Subscriptions are
+    those of `ServiceParticipant`, in its thread.
     """
 
     def __init__(self, domain: Domain, number: int, services: ServiceParticipant) -> None:
@@ -57,10 +53,10 @@ class DdsTransport(Transport):
         self._guid = self._participant.guid.bytes
         services.ignore(self._guid)
         self._waitset = ReaderWaitSet(self._participant, "DDS messages")
-        # added first: no message is handled before its sender is discovered
         self._discovery = Discovery(self._participant, self._waitset)
         self._topics: set[str] = set()
-        self._readers: list[DataReader[Payload]] = []
+        self._readers: list[bytes] = []
+        """GUIDs of the readers of subscriptions."""
         self._writers: list[DataWriter[Payload]] = []
         self._served: list[tuple[bytes, bytes]] = []
         """GUIDs of the reader and the writer of each service."""
@@ -81,11 +77,12 @@ class DdsTransport(Transport):
         return publish
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
-        def on_sample(sample: Payload | InvalidSample) -> None:
-            if isinstance(sample, Payload):
-                receive(sample.cdr, self._discovery.sender(sample.sample_info.publication_handle))
+        def on_message(payload: bytes, participant: bytes) -> None:
+            receive(payload, self._discovery.sender(participant))
 
-        self._waitset.add(self._reader(f"rt{row.topic}", payload_type(row.type), row.type), on_sample)
+        self._topics.add(f"rt{row.topic}")
+        self._readers.append(self._services.subscribe(row.topic, row.type, _typehash(row.type), on_message))
+        self._announce()
 
     def serve(self, row: Row, handle: ServiceHandler) -> None:  # noqa: D102
         self._topics |= {f"rq{row.topic}Request", f"rr{row.topic}Reply"}
@@ -112,22 +109,17 @@ class DdsTransport(Transport):
             self._participant, Topic(self._participant, topic, type_), quality + _hashed(ros_type)
         )
 
-    def _reader(self, topic: str, type_: type[Payload], ros_type: str = "") -> DataReader[Payload]:
-        self._topics.add(topic)
-        reader = DataReader(
-            self._participant, Topic(self._participant, topic, type_), _SUBSCRIBED + _hashed(ros_type)
-        )
-        self._readers.append(reader)
-        self._announce()
-        return reader
-
     def _announce(self) -> None:
         """Publish to which node our readers and writers belong."""
-        readers = [*(reader.guid.bytes for reader in self._readers), *(reader for reader, _ in self._served)]
+        readers = [*self._readers, *(reader for reader, _ in self._served)]
         writers = [*(writer.guid.bytes for writer in self._writers), *(writer for _, writer in self._served)]
         self._info.write(self._info.data_type(entities_info(self._guid, NODE, readers, writers)))
 
 
 def _hashed(ros_type: str) -> Qos:
+    return Qos(Policy.Userdata(_typehash(ros_type).encode())) if ros_type else Qos()
+
+
+def _typehash(ros_type: str) -> str:
     """Return the user data with the hash (REP-2016) of a topic's type."""
-    return Qos(Policy.Userdata(f"typehash={rihs01(ros_type)};".encode())) if ros_type else Qos()
+    return f"typehash={rihs01(ros_type)};"

@@ -46,8 +46,9 @@ class Console(RclpyPeer):
         super().join(rows)
         topics, transport = {f"rt{row.topic}" for row in rows if row.way != "serve"}, self.gateway._transport
         found = [it.get_publication_matched_status for it in transport._writers if it.topic.name in topics]
-        found += [it.get_subscription_matched_status for it in transport._readers if it.topic.name in topics]
         assert until(lambda: all(status().current_count for status in found))
+        commands = {f"rt{row.topic}" for row in rows if row.way == "subscribe"}
+        assert until(lambda: commands <= transport._services.matched_topics())
         assert until(lambda: any(client.name == f"/{self.name}" for client in transport.clients())), (
             "the gateway does not know its name"
         )
