@@ -52,7 +52,7 @@ class DdsTransport(Transport):
         self._participant = DomainParticipant(number, Qos(Policy.Userdata(b"enclave=/;")))
         self._guid = self._participant.guid.bytes
         services.ignore(self._guid)
-        self._waitset = ReaderWaitSet(self._participant, "DDS messages")
+        self._waitset = ReaderWaitSet(self._participant, "DDS discovery")
         self._discovery = Discovery(self._participant, self._waitset)
         self._topics: set[str] = set()
         self._readers: list[bytes] = []

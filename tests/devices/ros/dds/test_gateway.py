@@ -1,8 +1,10 @@
 """The gateway to ROS 2 over DDS, as real rclpy sees it."""
 
 import signal
+import subprocess
 import time
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +15,14 @@ from schemas.ros import Header, JointState, StringMessage, Time
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
 from tests.devices.ros.helpers import received, until
 from tests.devices.ros.rclpy_environment import rclpy_python
-from tests.devices.ros.rclpy_peer import RclpyPeer, free_domain
+from tests.devices.ros.rclpy_peer import RclpyPeer, environment, free_domain
 
 __all__ = ["rclpy_python"]
 
 STATE, COMMAND, EVENT, STATUS, WARNING = (
     f"/PSM1/{name}" for name in ("measured_js", "servo_jp", "operating_state", "status", "warning")
 )
+FIRST_COMMAND = Path(__file__).parent / "rclpy_first_command.py"
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
 
 
@@ -151,6 +154,19 @@ def test_a_flood_costs_no_other_console_its_states(rclpy_python, psm):
         psm.write(STATE[1:], np.zeros(18))
         assert program.do("count", topic=STATE, seconds=0.5) > 20
         assert 0 < len(received(psm, COMMAND)) < 20_000
+
+
+@pytest.mark.parametrize("kind", ["latched", "once"])
+def test_the_first_command_of_a_program_is_received_once(rclpy_python, psm, kind):
+    count = 8
+    command = [rclpy_python, FIRST_COMMAND, "/PSM1/state_command", kind, str(count)]
+    with subprocess.Popen(command, env=environment(psm.params.domain)) as programs:
+        try:
+            programs.wait(timeout=60.0)
+        finally:
+            programs.kill()
+    heard = [sample.message.header.frame_id for sample in received(psm, "/PSM1/state_command")]
+    assert heard == [f"{kind}{number}" for number in range(count)]
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(rclpy_python, domain, tmp_path):
