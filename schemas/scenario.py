@@ -18,7 +18,13 @@ __all__ = ["Bond", "Connection", "Measure", "ParticipantSpec", "PortReference", 
 Algorithm = Literal["impulse", "impulse-linearised", "gauss-seidel", "jacobi"]
 
 
+_MAX_NAME = 64
+"""Characters: names become parts of keys, of ROS topics and of the names of files."""
+
+
 def _name(value: str) -> str:
+    if len(value) > _MAX_NAME:
+        raise ValueError(f"a name of {len(value)} characters; at most {_MAX_NAME} are allowed")
     if not valid_name(value):
         raise ValueError(f"'{value}' is no name: a letter, then letters, digits and underscores")
     return value
