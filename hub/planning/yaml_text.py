@@ -9,7 +9,13 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import ConstructorError, SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError
-from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, NodeEvent, ScalarEvent
+from ruamel.yaml.events import (
+    CollectionEndEvent,
+    CollectionStartEvent,
+    MappingStartEvent,
+    NodeEvent,
+    ScalarEvent,
+)
 from ruamel.yaml.parser import Parser
 
 from hub.planning.limits import MAX_BYTES, MAX_DEPTH, MAX_ITEMS, MAX_NUMBER, MAX_TEXT, MAX_VALUES
@@ -66,36 +72,36 @@ class _BoundedParser(Parser):
         parent: Any = super()
         parent.__init__(loader)
         self._values = 0
-        self._items: list[int] = []
-        """Of each open list or mapping: how many nodes it has so far."""
+        self._left: list[int] = []
+        """Of each open list or mapping: how many more nodes it may have."""
 
     def get_event(self) -> Any:
         """Return the next event. Raises LimitError if it is one too many, too deep or too long."""
         parent: Any = super()
         event: Any = parent.get_event()
-        start: Any = event.start_mark
         if isinstance(event, NodeEvent):
             self._count(event)
         if isinstance(event, ScalarEvent):
             _check_text(event)
         elif isinstance(event, CollectionStartEvent):
-            self._items.append(0)
-            if len(self._items) > MAX_DEPTH:
-                raise LimitError(
-                    f"nested too deeply: at most {MAX_DEPTH} levels are allowed", event.start_mark
-                )
+            # a mapping has two nodes for each item
+            self._left.append(MAX_ITEMS * (2 if isinstance(event, MappingStartEvent) else 1))
+            self._check_depth(event)
         elif isinstance(event, CollectionEndEvent):
-            self._items.pop()
+            self._left.pop()
         return event
+
+    def _check_depth(self, event: Any) -> None:
+        if len(self._left) > MAX_DEPTH:
+            raise LimitError(f"nested too deeply: at most {MAX_DEPTH} levels are allowed", event.start_mark)
 
     def _count(self, event: Any) -> None:
         self._values += 1
         if self._values > MAX_VALUES:
             raise LimitError(f"more than {MAX_VALUES} keys and values are not allowed", event.start_mark)
-        if self._items:
-            self._items[-1] += 1
-            # a mapping has two nodes for each item
-            if self._items[-1] > 2 * MAX_ITEMS:
+        if self._left:
+            self._left[-1] -= 1
+            if self._left[-1] < 0:
                 raise LimitError(
                     f"a list or mapping of more than {MAX_ITEMS} items is not allowed", event.start_mark
                 )

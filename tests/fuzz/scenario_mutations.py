@@ -14,12 +14,14 @@ HOSTILE = [
     "x/" * 100 + "file.csv", "a" * 300, "a" * 300 + ".csv", '"\\ud800"', '"\\0"', '"\\x1b[31m"', "'${HOME}'",
     "../../../../etc/passwd", "/dev/zero", "/dev/stdin", "/proc/self/mem", "hub.participant:Stepped",
     "hub.participant:Device", "hub.command_line.__main__:x", "this:x", "json:loads", ":", "a:", "::", ".:x",
-    "..a:b", "mujoco", "fmu", "scripted", "endoscope", "!!int x", "!!binary '*'", "!!set {a, b}", "!!omap [a: 1]",
+    "..a:b", "mujoco", "fmu", "scripted", "endoscope", "!!int x", "!!binary '*'", "!!set {a, b}",
+    "!!omap [a: 1]",
     "!!timestamp x", "2001-99-99", "2001-01-01", "!!python/object:os.system x", "!!float abc", "!!bool maybe",
     "!!null x", "!x y", "{? [a, b] : c}", "{[a]: b}", "{{a: b}: c}", "{1: 2}", "{null: 1}", "{1.5: 1}",
     "[" * 20_000, "[" * 200 + "]" * 200, "{a: " * 500 + "1" + "}" * 500, "&a [*a]", "&a {b: *a}", "*none",
     "[" + "1, " * 3_000 + "1]", "[" + "1, " * 400_000 + "1]", "'" + "b" * 1_000_000 + "'", "10000000000",
-    "4294967296", "-9223372036854775808", "18446744073709551616", "1e-300", "1e300", "99999999 km", "300 years",
+    "4294967296", "-9223372036854775808", "18446744073709551616", "1e-300", "1e300", "99999999 km",
+    "300 years",
     "0.1 ns", "a.b", "a.*", "*.*", "'a.b -> c.d'", "'* -> *'", "\u202e", "\ufeff", "\u2028", "'\U0001f600'",
 ]  # fmt: skip
 

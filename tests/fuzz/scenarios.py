@@ -1,18 +1,19 @@
 """Mutated scenarios through `trocar check`: each is valid, or rejected with exit code 2 and a sentence.
 
-`python -m tests.fuzz.scenarios --hours 1 --seed 7` searches for longer than CI does; `--case 7:123` repeats one.
+`python -m tests.fuzz.scenarios --hours 1 --seed 7` searches for longer than CI does; with `--case 7:123` it
+repeats one scenario.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import faulthandler
 import os
 import random
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -113,16 +114,15 @@ def _check(path: Path, overrides: list[str], writer: int) -> None:
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 1
-    except BaseException:
-        sys.excepthook(*sys.exc_info())
     finally:
-        with contextlib.suppress(Exception):
-            sys.stderr.flush()
+        if code == 1 and sys.exception():
+            traceback.print_exc()
+        sys.stderr.flush()
         os._exit(code)
 
 
 def _warm() -> None:
-    """Check every installed scenario, so that what the mutated ones import is there before they are forked."""
+    """Plan every installed scenario, to import what the mutated ones need before they are forked."""
     for name in installed_scenarios():
         file = load(name)
         plan_of(file.scenario, file.params)
