@@ -27,7 +27,7 @@ from tests.fuzz.scenario_mutations import mutated
 LONGEST_S = 10.0
 """Of CPU time, for one scenario."""
 LARGEST_MB = 100.0
-"""Of memory, in addition to that of the program with all kinds imported."""
+"""Of memory, in addition to that of the check of a shipped scenario."""
 
 
 @dataclass
@@ -37,6 +37,8 @@ class Tally:
     outcomes: Counter[str] = field(default_factory=Counter[str])
     slowest: tuple[float, str] = (0.0, "")
     largest: tuple[float, str] = (0.0, "")
+    usual_kib: int = 0
+    """Resident memory of the check of a scenario that is not mutated."""
     failed: list[str] = field(default_factory=list[str])
 
     def __str__(self) -> str:
@@ -54,28 +56,27 @@ def attempt(case: str, directory: Path, tally: Tally) -> None:
     label, data, overrides = mutated(file.read_text(encoding="utf-8"), random_source)
     path = directory / "mutated.yaml"
     path.write_bytes(data)
-    reader, writer = os.pipe()
-    before_kib = _resident_kib()
-    child = os.fork()
-    if child == 0:
-        _check(path, overrides, writer)
-    os.close(writer)
-    output = _read(reader, child)
-    _, status, used = os.wait4(child, 0)
-    seconds, megabytes = used.ru_utime + used.ru_stime, (used.ru_maxrss - before_kib) / 1024
+    code, output, seconds, kib = _forked_check(path, overrides)
+    megabytes = (kib - tally.usual_kib) / 1024
     what = f"{case}, {name}: {label}"
     tally.slowest = max(tally.slowest, (seconds, what))
     tally.largest = max(tally.largest, (megabytes, what))
-    code = os.waitstatus_to_exitcode(status)
     tally.outcomes[{0: "valid", 2: "rejected"}.get(code, "failed")] += 1
     problem = _problem(code, output, seconds, megabytes)
     if problem:
         tally.failed.append(f"{what}: {problem}\n{output[-3000:]}")
 
 
-def _resident_kib() -> int:
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") // 1024
+def _forked_check(path: Path, overrides: list[str]) -> tuple[int, str, float, int]:
+    """Return exit code, errors, CPU time (s) and largest resident memory (KiB) of a check in a new process."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        _check(path, overrides, writer)
+    os.close(writer)
+    output = _read(reader, child)
+    _, status, used = os.wait4(child, 0)
+    return os.waitstatus_to_exitcode(status), output, used.ru_utime + used.ru_stime, used.ru_maxrss
 
 
 def _problem(code: int, output: str, seconds: float, megabytes: float) -> str:
@@ -137,10 +138,10 @@ def main() -> int:
     parser.add_argument("--case", help="SEED:NUMBER of one scenario")
     options = parser.parse_args()
     faulthandler.enable()
-    tally = Tally()
+    _warm()
+    tally = Tally(usual_kib=_forked_check(installed_scenarios()["palpation"], [])[3])
     with tempfile.TemporaryDirectory() as folder:
         directory = Path(folder)
-        _warm()
         end = time.monotonic() + 3600 * options.hours
         for number in range(options.number):
             if time.monotonic() > end:
