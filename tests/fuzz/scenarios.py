@@ -68,7 +68,7 @@ def attempt(case: str, directory: Path, tally: Tally) -> None:
 
 
 def _forked_check(path: Path, overrides: list[str]) -> tuple[int, str, float, int]:
-    """Return exit code, errors, CPU time (s) and largest resident memory (KiB) of a check in a new process."""
+    """Return exit code, errors, CPU time (s) and peak memory (KiB) of a check in a new process."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
