@@ -16,6 +16,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 __all__ = [
+    "MAX_LENGTH",
     "Acceleration",
     "Angle",
     "Damping",
@@ -35,6 +36,10 @@ __all__ = [
 _FACTOR = r"(?:1|%|°?[^\W\d]\w*)(?:(?:\^|\*\*)-?\d)?"
 _UNIT = re.compile(rf"\(*{_FACTOR}\)*(?:(?:\s*[*/]\s*|\s+)\(*{_FACTOR}\)*)*")
 """What is passed to pint, which evaluates more than units: `9**9**9` would keep it busy for ever."""
+MAX_LENGTH = 100
+"""Characters of a quantity, and of a unit: pint recurses at each parenthesis, and tries every prefix
+and suffix of a name that it does not know.
+"""
 _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.ASCII)
 
 
@@ -49,6 +54,8 @@ def _converted(number: float, unit: str, target: str) -> float:
     """Return `number` in unit `target`. Raises ValueError if `unit` cannot be converted to it."""
     from pint.errors import PintError
 
+    if max(len(unit), len(target)) > MAX_LENGTH:
+        raise ValueError(f"a unit of more than {MAX_LENGTH} characters is not allowed")
     if not _UNIT.fullmatch(unit) or not _UNIT.fullmatch(target):
         raise ValueError(f"'{unit}' is not a unit")
     try:
@@ -64,6 +71,13 @@ def to_si(value: Any, unit: str) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit}, such as '1 {unit}'")
+    if isinstance(value, str) and len(value) > MAX_LENGTH:
+        raise ValueError(
+            f"'{value[:20]}...' is not a quantity in {unit} (it has {len(value)} characters; at most"
+            f" {MAX_LENGTH} are allowed)"
+        )
+    if isinstance(value, int) and abs(value) > sys.float_info.max:  # its digits may be too many to write
+        raise ValueError(f"an integer of {value.bit_length()} bits is not a quantity in {unit} (too large)")
     try:
         match = _QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
         if isinstance(value, str) and not match:

@@ -13,12 +13,18 @@ from schemas.keys import valid_name
 from schemas.network_link import NetworkLinkSpec
 from schemas.quantity import Duration
 
-__all__ = ["Bond", "Connection", "Measure", "ParticipantSpec", "PortReference", "Scenario"]
+__all__ = ["MAX_NAME", "Bond", "Connection", "Measure", "ParticipantSpec", "PortReference", "Scenario"]
 
 Algorithm = Literal["impulse", "impulse-linearised", "gauss-seidel", "jacobi"]
 
 
+MAX_NAME = 64
+"""Characters: names become parts of keys, of ROS topics and of the names of files."""
+
+
 def _name(value: str) -> str:
+    if len(value) > MAX_NAME:
+        raise ValueError(f"a name of {len(value)} characters; at most {MAX_NAME} are allowed")
     if not valid_name(value):
         raise ValueError(f"'{value}' is no name: a letter, then letters, digits and underscores")
     return value

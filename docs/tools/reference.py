@@ -21,12 +21,12 @@ from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 import trocar
 from hub.command_line.app import app
 from hub.participant import Stepped
-from hub.planning import registry
+from hub.planning import limits, registry
 from hub.planning.scenario_file import installed_scenarios, load
-from schemas import crtk, ros, trocar_msgs
+from schemas import crtk, quantity, ros, trocar_msgs
 from schemas.message import Message, msg_text
 from schemas.ports import Port, bond_ports
-from schemas.scenario import Scenario
+from schemas.scenario import MAX_NAME, Scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -159,10 +159,40 @@ def scenario() -> str:
             "YAML merge keys (`<<: *scene`) are allowed. Every value can be overridden on the command line:"
             ' `--set participants.tissue.organs.block.young_modulus="25 kPa"`.',
             "",
+            *_limits(),
             *_model("Top level", schema),
             *_definitions(schema),
         ]
     )
+
+
+def _limits() -> list[str]:
+    """Return the section on what a scenario may contain at most."""
+    rows = (
+        (f"{limits.MAX_BYTES // 1024} KiB", "the file with its comments, and the text of a `--set`"),
+        (limits.MAX_VALUES, "keys and values, with aliases (`*name`) and merge keys written out"),
+        (limits.MAX_ITEMS, "items of one list or mapping"),
+        (limits.MAX_DEPTH, "levels of lists and mappings in one another"),
+        (limits.MAX_TEXT, "characters of one text"),
+        (limits.MAX_NUMBER, "characters of one number"),
+        (quantity.MAX_LENGTH, "characters of a quantity with its unit"),
+        (MAX_NAME, "characters of the name of a session, participant, host or measure"),
+        (limits.MAX_KIND, "characters of a kind that is named `module:Class`"),
+        (limits.MAX_PARTICIPANTS, "participants"),
+        (limits.MAX_SCENE_VALUES, "values that all participants get from `scene` together"),
+    )
+    return [
+        "## Limits",
+        "",
+        "A file beyond these limits is rejected with exit code 2 and a message that names the place. A text"
+        " contains no control characters but tab and line end, and a key is a text. Long data, such as"
+        " trajectories and recordings, belong in files of their own.",
+        "",
+        "| at most | of |",
+        "|---|---|",
+        *(f"| {most} | {what} |" for most, what in rows),
+        "",
+    ]
 
 
 def _definitions(schema: Mapping[str, Any]) -> list[str]:

@@ -30,6 +30,11 @@ class Connections:
     def __init__(self, scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
         self._scenario = scenario
         self._participants = participants
+        self._rank: dict[str, int] = {}
+        """The place of each participant in the scenario's `order`."""
+        for index, name in enumerate(scenario.order or ()):
+            self._rank.setdefault(name, index)
+        self._ports = {name: {port.name: port for port in one.ports} for name, one in participants.items()}
         self._sources: dict[tuple[str, str], list[str]] = {}
         """By participant and input port: what feeds it."""
         self.stepped: list[PlannedConnection] = []
@@ -59,7 +64,7 @@ class Connections:
         elif receiver.role == "device":
             self.to_devices.append(ConnectionToDevice(**ends))
         else:
-            fresh = reads_this_step(self._scenario, one.participant, other.participant)
+            fresh = reads_this_step(self._scenario, self._rank, one.participant, other.participant)
             linear = connection.extrapolation == "linear"
             self.stepped.append(PlannedConnection(**ends, fresh=fresh, linear=linear))
 
@@ -93,7 +98,7 @@ class Connections:
         if planned is None:
             hint = did_you_mean(end.participant, self._participants)
             raise ScenarioError(f"unknown participant '{end.participant}'.{hint}", path=path)
-        ports = {port.name: port for port in planned.ports}
+        ports = self._ports[end.participant]
         if end.port not in ports:
             hint = did_you_mean(end.port, [name for name, p in ports.items() if p.causality == causality])
             problem = f"participant '{end.participant}' has no {causality} '{end.port}'.{hint}"

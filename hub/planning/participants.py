@@ -21,7 +21,7 @@ _LEAST_READ_NS = 100_000
 def plan_participant(
     scenario: Scenario, participant: Stepped | Device, role: Role, bonds: Sequence[PlannedBond]
 ) -> PlannedParticipant:
-    """Return the plan of a participant; `bonds` are those of the session.
+    """Return the plan of a participant; `bonds` are its own.
 
     Raises ScenarioError if what the scenario says of it does not fit what it declares.
     """

@@ -10,13 +10,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, PackageNotFoundError, distribution, entry_points
+from inspect import isabstract
 from pathlib import Path
 from typing import Any, Literal
 
 from packaging.requirements import Requirement
 from pydantic import ValidationError
 
-from hub.participant import Device, Stepped
+from hub.participant import Device, Params, Stepped
+from hub.planning.limits import MAX_KIND, shown
 from schemas.errors import MissingExtraError, ScenarioError, did_you_mean
 
 __all__ = [
@@ -84,11 +86,19 @@ def find(name: str) -> Kind:
     if name in kinds():
         return kinds()[name]
     if ":" in name:
+        module = name.partition(":")[0]
+        if len(name) > MAX_KIND:
+            raise ScenarioError(f"a kind of {len(name)} characters; at most {MAX_KIND} are allowed")
+        if "__main__" in module.split("."):
+            raise ScenarioError(
+                f"kind '{name}': '{module}' is a program, which runs when it is imported; name the module"
+                " that defines the class"
+            )
         kind = Kind(name, "engine", UNPACKAGED, EntryPoint(name, name, "trocar.engines"))
         loaded = _import(kind)  # without an entry point, only the class says which role it has
         is_device = isinstance(loaded, type) and issubclass(loaded, Device)
         return replace(kind, role="device") if is_device else kind
-    raise ScenarioError(f"unknown kind '{name}'.{did_you_mean(name, kinds())}")
+    raise ScenarioError(f"unknown kind '{shown(name)}'.{did_you_mean(name, kinds())}")
 
 
 @cache
@@ -105,13 +115,20 @@ def load(name: str) -> Participant:
             f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is no subclass of"
             f" {base.__name__}"
         )
+    model: object = getattr(loaded, "params_model", None)
+    if isabstract(loaded) or not (isinstance(model, type) and issubclass(model, Params)):
+        missing = ", ".join(sorted(getattr(loaded, "__abstractmethods__", ()))) or "params_model"
+        raise ScenarioError(
+            f"{kind.role} '{name}' of '{kind.distribution}': {kind.entry.value} is an abstract class: it"
+            f" does not define {missing}"
+        )
     return loaded
 
 
 def _import(kind: Kind) -> Any:
     try:
         return kind.entry.load()
-    except Exception as error:  # a plugin's module may raise anything on import
+    except (Exception, SystemExit) as error:  # a module may raise anything on import
         raise ScenarioError(
             f"{kind.role} '{kind.name}' of '{kind.distribution}' cannot be loaded from {kind.entry.value}:"
             f" {type(error).__name__}: {error}"

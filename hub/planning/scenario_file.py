@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,6 +15,7 @@ from pydantic import ValidationError
 
 from hub.participant import Params
 from hub.planning import registry
+from hub.planning.limits import MAX_PARTICIPANTS, MAX_PROBLEMS, shown
 from hub.planning.renamed import SCENARIOS, replace_old_names
 from hub.planning.scenario_source import Location, Source, read
 from hub.planning.scene import spread_scene
@@ -48,8 +50,13 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
     source = read(_find(name_or_path))
     for override in overrides:
         source.override(override)
+    _check_number(source)
     replace_old_names(source)
-    found = [str(located(error, source)) for error in spread_scene(source, _models(source))]
+    found = [
+        str(located(error, source)) for error in islice(spread_scene(source, _models(source)), MAX_PROBLEMS)
+    ]
+    if len(found) == MAX_PROBLEMS:  # the scene is not spread to its end: what would be said of it is wrong
+        raise ScenarioError("\n".join(found))
     params = _all_params(source, found)
     try:
         scenario = Scenario.model_validate(source.tree)
@@ -68,8 +75,12 @@ def located(error: ScenarioError, source: Source) -> ScenarioError:
 def _find(name_or_path: str) -> Path:
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
-        if not path.is_file():
-            raise ScenarioError(f"there is no scenario file '{path}' (looked in {Path.cwd()})")
+        try:
+            is_file = path.is_file()
+        except (OSError, ValueError) as error:  # too long, or with a character that no path has
+            raise ScenarioError(f"'{shown(str(path))}' is not a path: {shown(str(error))}") from error
+        if not is_file:
+            raise ScenarioError(f"there is no scenario file '{shown(str(path))}' (looked in {Path.cwd()})")
         return path
     known = installed_scenarios()
     if name_or_path in SCENARIOS:
@@ -78,10 +89,19 @@ def _find(name_or_path: str) -> Path:
         return known[new]
     if name_or_path not in known:
         raise ScenarioError(
-            f"there is no scenario '{name_or_path}'.{did_you_mean(name_or_path, known)} For a file of your"
-            " own, give its path with .yaml."
+            f"there is no scenario '{shown(name_or_path)}'.{did_you_mean(name_or_path, known)} For a file of"
+            " your own, give its path with .yaml."
         )
     return known[name_or_path]
+
+
+def _check_number(source: Source) -> None:
+    """Raise ScenarioError if there are more participants than a session may have."""
+    participants = source.tree.get("participants")
+    number = len(cast("dict[str, Any]", participants)) if isinstance(participants, dict) else 0
+    if number > MAX_PARTICIPANTS:
+        problem = f"a session of {number} participants; at most {MAX_PARTICIPANTS} are allowed"
+        raise located(ScenarioError(problem, path=("participants",)), source)
 
 
 def _specs(source: Source) -> dict[str, dict[str, Any]]:
@@ -104,24 +124,29 @@ def _models(source: Source) -> dict[str, type[Params]]:
 def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
     """Return the parameters of every participant, and append what is wrong with them to `found`."""
     params: dict[str, Params] = {}
+    present: set[str] = set()
     for name, spec in _specs(source).items():
         try:
-            params[name] = _params(("participants", name), spec, source)
+            params[name] = _params(("participants", name), spec, source, present)
         except ScenarioError as error:
             found.append(str(located(error, source)))
+            if len(found) >= MAX_PROBLEMS:
+                break
     return params
 
 
-def _params(at: Location, spec: dict[str, Any], source: Source) -> Params:
+def _params(at: Location, spec: dict[str, Any], source: Source, present: set[str]) -> Params:
     """Return the validated parameters of one participant.
 
+    `present` collects the kinds whose packages are installed, which takes 10 ms to find out.
     Raises ScenarioError if they are invalid, or if it runs here and a package that it needs is not installed.
     """
     kind = spec["kind"]
     try:
         model = registry.load(kind).params_model
-        if spec.get("host") != "remote":
+        if spec.get("host") != "remote" and kind not in present:
             registry.require_extra(kind)
+            present.add(kind)
     except ScenarioError as error:
         raise ScenarioError(str(error), path=(*at, "kind")) from error
     given = {key: value for key, value in spec.items() if key not in ParticipantSpec.RESERVED}
@@ -130,3 +155,5 @@ def _params(at: Location, spec: dict[str, Any], source: Source) -> Params:
     except ValidationError as error:
         found = problems(error, model, at, source, other_keys=ParticipantSpec.RESERVED)
         raise ScenarioError("\n".join(found)) from error
+    except OSError as error:  # a path that is too long or that leads through a loop of links
+        raise ScenarioError(f"a file cannot be read: {shown(str(error))}", path=at) from error

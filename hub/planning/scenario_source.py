@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from hub.planning.limits import MAX_BYTES, MAX_DEPTH, MAX_TEXT, shown
+from hub.planning.yaml_text import MERGE, LimitError, compose, construct
 from schemas.errors import ScenarioError
 
 __all__ = ["Location", "Source", "merged", "read"]
@@ -18,7 +19,6 @@ Location = tuple[str | int, ...]
 """Keys and list indices from the root of the scenario."""
 
 _Mark = tuple[int, int]
-_MERGE = "tag:yaml.org,2002:merge"
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class Source:
     """Line and column, counted from 1, of each key (for a list item: of the item) and of its value."""
     overrides: dict[Location, str] = field(default_factory=dict[Location, str])
     """The values set on the command line, each with the text that sets it."""
+    _written: dict[Location, Location] = field(default_factory=dict[Location, Location])
+    """Of values that are copied from another part of the scenario: where that part stands."""
 
     @property
     def directory(self) -> Path:
@@ -39,7 +41,8 @@ class Source:
 
     def line(self, path: Location, message: str, *, key: bool = False) -> str:
         """Return `FILE:LINE:COL: path: message` about the value at `path`, or about its key."""
-        return f"{self.place(path, key=key)}: {'.'.join(map(str, path)) or 'scenario'}: {message}"
+        where = shown(".".join(map(str, path))) or "scenario"
+        return f"{self.place(path, key=key)}: {where}: {shown(message, 2000)}"
 
     def place(self, path: Location, *, key: bool = False) -> str:
         """Return `FILE:LINE:COL`, or the override, that writes the value at `path`, or its key.
@@ -47,13 +50,20 @@ class Source:
         The place of a missing value is that of the mapping or list in which it is missing.
         """
         for length in range(len(path), -1, -1):
-            known = path[:length]
-            if known in self.overrides:
-                return f"--set {self.overrides[known]}"
-            if known in self.marks:
-                line, column = self.marks[known][0 if key and length == len(path) else 1]
-                return f"{self.file}:{line}:{column}"
+            for known in self._copies(path[:length]):
+                if known in self.overrides:
+                    return f"--set {shown(self.overrides[known])}"
+                if known in self.marks:
+                    line, column = self.marks[known][0 if key and length == len(path) else 1]
+                    return f"{self.file}:{line}:{column}"
         return str(self.file)
+
+    def _copies(self, path: Location) -> Iterator[Location]:
+        """Yield `path`, then the places from which a value there may be copied."""
+        yield path
+        for length in range(len(path), 0, -1):
+            if (written := self._written.get(path[:length])) is not None:
+                yield from self._copies((*written, *path[length:]))
 
     def override(self, text: str) -> None:
         """Apply `a.b.c=value`. Missing mappings on the way are created; the validation judges them later.
@@ -61,18 +71,28 @@ class Source:
         Raises ScenarioError if the text has another form, or names a part of something that has no parts.
         """
         dotted, equals, value_text = text.partition("=")
+        if len(dotted) > MAX_TEXT or dotted.count(".") >= MAX_DEPTH:
+            raise ScenarioError(
+                f"--set {shown(text)}: at most {MAX_TEXT} characters and {MAX_DEPTH} parts are allowed"
+                " before the '='"
+            )
         if not equals or not all(dotted.split(".")):
-            raise ScenarioError(f"--set {text}: expected a.b.c=value")
+            raise ScenarioError(f"--set {shown(text)}: expected a.b.c=value")
+        if not dotted.isprintable():
+            raise ScenarioError(f"--set {shown(text)}: only printable characters are allowed before the '='")
         try:
-            value = _yaml().load(value_text)
+            value = construct(compose(value_text))
+        except LimitError as error:
+            detail: Any = error
+            raise ScenarioError(f"--set {shown(text)}: {detail.problem}") from error
         except YAMLError as error:
-            raise ScenarioError(f"--set {text}: the value is not valid YAML") from error
-        path: Location = tuple(int(part) if part.isdecimal() else part for part in dotted.split("."))
+            raise ScenarioError(f"--set {shown(text)}: the value is not valid YAML") from error
+        path: Location = tuple(_key_or_index(part) for part in dotted.split("."))
         parent: Any = self.tree
         for depth, part in enumerate(path):
             if problem := _no_such_part(parent, part):
                 raise ScenarioError(
-                    f"--set {text}: {'.'.join(map(str, path[:depth])) or 'the scenario'} {problem}"
+                    f"--set {shown(text)}: {'.'.join(map(str, path[:depth])) or 'the scenario'} {problem}"
                 )
             last = depth == len(path) - 1
             if last or (isinstance(parent, dict) and part not in parent):
@@ -82,15 +102,7 @@ class Source:
 
     def stands_also_at(self, written: Location, path: Location) -> None:
         """Give the values below `path` the places of those below `written` if they have none of their own."""
-        own = self.marks.keys() | self.overrides.keys()
-        for places in (self.marks, self.overrides):
-            copied = {
-                (*path, *at[len(written) :]): place
-                for at, place in places.items()
-                if at[: len(written)] == written
-            }
-            new = {at: place for at, place in copied.items() if at not in own}
-            cast("dict[Location, Any]", places).update(new)
+        self._written[path] = written
 
 
 def read(file: Path) -> Source:
@@ -99,24 +111,18 @@ def read(file: Path) -> Source:
     Raises ScenarioError if it cannot be read or is not one YAML mapping.
     """
     try:
-        text = file.read_text(encoding="utf-8")
-        tree: Any = _copied(_yaml().load(text))
-        root: Any = _yaml().compose(text)
+        root = compose(_text(file))
         marks = {} if root is None else dict(_marks(root, root, ()))
+        tree: Any = _copied(construct(root))
     except MarkedYAMLError as error:
         detail: Any = error
         mark = detail.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
-        raise ScenarioError(
-            f"{file}{where}: not valid YAML:"
-            f" {detail.problem}{f' ({detail.context})' if detail.context else ''}"
-        ) from error
+        invalid = "" if isinstance(error, LimitError) else "not valid YAML: "
+        context = f" ({detail.context})" if detail.context else ""
+        raise ScenarioError(f"{file}{where}: {invalid}{shown(f'{detail.problem}{context}', 500)}") from error
     except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise ScenarioError(f"{file}: cannot be read: {error}") from error
-    except RecursionError:
-        raise ScenarioError(
-            f"{file}: nested too deeply: is an alias (*name) used inside its own anchor (&name)?"
-        ) from None
+        raise ScenarioError(f"{file}: cannot be read: {shown(str(error), 500)}") from error
     if not isinstance(tree, dict):
         raise ScenarioError(
             f"{file}:1:1: a scenario is a mapping with at least the keys name, step and participants"
@@ -124,8 +130,18 @@ def read(file: Path) -> Source:
     return Source(file, cast("dict[str, Any]", tree), marks)
 
 
-def _yaml() -> Any:
-    return YAML(typ="safe", pure=True)
+def _text(file: Path) -> str:
+    """Return the text of a file, of which no more is read than a scenario may have."""
+    with file.open("rb") as opened:
+        data = opened.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise LimitError(f"the file is larger than {MAX_BYTES} bytes, which a scenario may have", None)
+    return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _key_or_index(part: str) -> str | int:
+    """Return a part of the path of an override; a longer number cannot be an index."""
+    return int(part) if part.isdecimal() and len(part) < 10 else part
 
 
 def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tuple[_Mark, _Mark]]]:
@@ -138,7 +154,7 @@ def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tup
     yield path, (_mark(key), _mark(key if empty else value))
     if value.id == "mapping":
         for name, child in value.value:
-            if name.tag != _MERGE:
+            if name.tag != MERGE:
                 yield from _marks(name, child, (*path, name.value))
     elif value.id == "sequence":
         for index, child in enumerate(value.value):
@@ -148,7 +164,7 @@ def _marks(key: Any, value: Any, path: Location) -> Iterator[tuple[Location, tup
 def _merged_nodes(mapping: Any) -> Iterator[Any]:
     """Yield the nodes that `<<` merges into a mapping, the one with the highest priority last."""
     for name, child in mapping.value:
-        if name.tag == _MERGE:
+        if name.tag == MERGE:
             # YAML gives the first of several mappings priority
             yield from reversed(child.value) if child.id == "sequence" else (child,)
 
@@ -177,4 +193,4 @@ def _no_such_part(parent: Any, part: str | int) -> str:
         length = len(cast("list[Any]", parent))
         known = isinstance(part, int) and part < length
         return "" if known else f"is a list of {length}, counted from 0; there is no '{part}' in it"
-    return "" if isinstance(parent, dict) else f"is '{parent}', which has no parts"
+    return "" if isinstance(parent, dict) else f"is '{shown(str(parent))}', which has no parts"

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from hub.participant import Params
+from hub.planning.limits import MAX_SCENE_VALUES, shown
 from hub.planning.scenario_source import Source, merged
 from schemas.errors import ScenarioError, did_you_mean
 
@@ -26,10 +27,11 @@ def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator
     if scene is None:
         return
     if not isinstance(scene, dict):
-        yield ScenarioError(f"expected a mapping of parameters, got {scene!r}", path=("scene",))
+        yield ScenarioError(f"expected a mapping of parameters, got {shown(repr(scene))}", path=("scene",))
         return
     given = source.tree.get("participants")
     participants = cast("dict[str, dict[str, Any]]", given if isinstance(given, dict) else {})
+    spread = 0
     for part, value in cast("dict[str, Any]", scene).items():
         takers = [name for name, model in models.items() if part in model.model_fields]
         # a participant of an unknown kind, which is reported elsewhere, may have the parameter
@@ -37,6 +39,14 @@ def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator
             known = {field for model in models.values() for field in model.model_fields}
             problem = f"no participant has a parameter '{part}'.{did_you_mean(str(part), known)}"
             yield ScenarioError(problem, path=("scene", part))
+        spread += len(takers) * _values(value)
+        if spread > MAX_SCENE_VALUES:
+            problem = (
+                f"{len(takers)} participants take this part of the scene, which makes {spread} values with"
+                f" the parts before it; at most {MAX_SCENE_VALUES} are allowed"
+            )
+            yield ScenarioError(problem, path=("scene", part))
+            return
         for name in takers:
             own = participants[name]
             if part in own and own[part] is None:
@@ -44,3 +54,10 @@ def spread_scene(source: Source, models: Mapping[str, type[Params]]) -> Iterator
             else:
                 own[part] = merged(value, own[part]) if part in own else value
                 source.stands_also_at(("scene", part), ("participants", name, part))
+
+
+def _values(value: Any) -> int:
+    """Return the number of keys and values in a value, itself included."""
+    if isinstance(value, dict):
+        return 1 + sum(1 + _values(part) for part in cast("dict[Any, Any]", value).values())
+    return 1 + sum(_values(part) for part in cast("list[Any]", value)) if isinstance(value, list) else 1

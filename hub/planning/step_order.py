@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from heapq import heappop, heappush
 
 from hub.planning.plan import PlannedConnection, PlannedParticipant
 from schemas.errors import ScenarioError, did_you_mean
@@ -13,20 +14,22 @@ __all__ = ["check_order", "reads_this_step", "step_order"]
 
 def check_order(scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
     """Raise ScenarioError if the scenario's `order` names something that does not step."""
-    stepped = [name for name, planned in participants.items() if planned.role != "device"]
+    stepped = {name: None for name, planned in participants.items() if planned.role != "device"}
     for index, name in enumerate(scenario.order or ()):
         if name not in stepped:
             problem = f"unknown stepped participant '{name}'.{did_you_mean(name, stepped)}"
             raise ScenarioError(problem, path=("order", index))
 
 
-def reads_this_step(scenario: Scenario, source: str, target: str) -> bool:
-    """Return whether `target` reads the output of `source` of the same step, not of the step before."""
+def reads_this_step(scenario: Scenario, rank: Mapping[str, int], source: str, target: str) -> bool:
+    """Return whether `target` reads the output of `source` of the same step, not of the step before.
+
+    `rank` is the place of each participant in the scenario's `order`.
+    """
     if scenario.algorithm == "jacobi" or source == target:
         return False
-    order = scenario.order or []
-    if source in order and target in order:
-        return order.index(source) < order.index(target)
+    if source in rank and target in rank:
+        return rank[source] < rank[target]
     return True
 
 
@@ -45,17 +48,27 @@ def step_order(
         (name for name, planned in participants.items() if planned.role != "device"),
         key=lambda name: rank.get(name, len(rank)),
     )
-    waiting = {name: {c.source for c in connections if c.fresh and c.target == name} for name in stepped}
+    place = {name: index for index, name in enumerate(stepped)}
+    sources: dict[str, set[str]] = {name: set() for name in stepped}
+    targets: dict[str, set[str]] = {name: set() for name in stepped}
+    for connection in connections:
+        if connection.fresh and connection.source in place and connection.target in place:
+            sources[connection.target].add(connection.source)
+            targets[connection.source].add(connection.target)
+    free = [place[name] for name in stepped if not sources[name]]  # in order, so a heap
     order: list[str] = []
-    while waiting:
-        free = next((name for name in waiting if not waiting[name] & waiting.keys()), None)
-        if free is None:
-            cycle = ", ".join(waiting)
-            raise ScenarioError(
-                f"connections form a cycle among {cycle}: state the order in which they step, such as 'order:"
-                f" [{cycle}]', or use 'algorithm: jacobi'",
-                path=("order",) if scenario.order else ("connections",),
-            )
-        order.append(free)
-        del waiting[free]
+    while free:
+        name = stepped[heappop(free)]
+        order.append(name)
+        for target in targets[name]:
+            sources[target].remove(name)
+            if not sources[target]:
+                heappush(free, place[target])
+    if len(order) < len(stepped):
+        cycle = ", ".join(name for name in stepped if sources[name])
+        raise ScenarioError(
+            f"connections form a cycle among {cycle}: state the order in which they step, such as 'order:"
+            f" [{cycle}]', or use 'algorithm: jacobi'",
+            path=("order",) if scenario.order else ("connections",),
+        )
     return tuple(order)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from itertools import islice
 from typing import Any, cast
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from hub.planning.limits import MAX_PROBLEMS, shown
 from hub.planning.scenario_source import Location, Source
 from schemas.errors import did_you_mean
 
@@ -22,14 +25,16 @@ def problems(
     *,
     other_keys: Iterable[str] = (),
 ) -> Iterator[str]:
-    """Yield one line for each error that `model`, which stands at `prefix` in the scenario, has found.
+    """Yield one line for each of the first errors that `model`, at `prefix` in the scenario, has found.
 
     `other_keys` are allowed at `prefix` beside the fields of the model.
     """
-    for detail in error.errors(include_url=False):
+    for detail in islice(error.errors(include_url=False), MAX_PROBLEMS):
         about_key = detail["type"] == "extra_forbidden" or detail["loc"][-1:] == ("[key]",)
         path = (*prefix, *(part for part in detail["loc"] if part != "[key]"))
         yield source.line(path, _message(detail, model, other_keys), key=about_key)
+    if error.error_count() > MAX_PROBLEMS:
+        yield source.line(prefix, f"has {error.error_count() - MAX_PROBLEMS} more problems")
 
 
 def _message(detail: ErrorDetails, model: type[BaseModel], other_keys: Iterable[str]) -> str:
@@ -38,18 +43,24 @@ def _message(detail: ErrorDetails, model: type[BaseModel], other_keys: Iterable[
         case "extra_forbidden":
             *parents, name = detail["loc"]
             known = [*_known_keys(model, parents), *(() if parents else other_keys)]
-            return f"there is no '{name}' here.{did_you_mean(str(name), known)}"
+            return f"there is no '{shown(str(name))}' here.{did_you_mean(shown(str(name)), known)}"
         case "literal_error":
             expected = str(detail.get("ctx", {}).get("expected", "")).replace(" or ", ", ")
             allowed = (word.strip("'") for word in expected.split(", "))
-            return f"'{given}' is not allowed.{did_you_mean(str(given), allowed)}"
+            text = shown(str(cast("object", given)))
+            return f"'{text}' is not allowed.{did_you_mean(text, allowed)}"
         case "missing":
             return "is required but not given"
         case "model_type" | "dict_type":
-            return f"expected a mapping, got {given!r}"
+            return f"expected a mapping, got {shown(repr(given))}"
         case _:
-            message, shown = detail["msg"].removeprefix("Value error, "), repr(given)
-            return message if shown in message or len(shown) > 60 else f"{message} (got {shown})"
+            message, value = detail["msg"].removeprefix("Value error, "), repr(given)
+            return message if value in message or len(value) > 60 else f"{message} (got {value})"
+
+
+@lru_cache(maxsize=64)
+def _json_schema(model: type[BaseModel]) -> dict[str, Any]:
+    return model.model_json_schema()
 
 
 def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
@@ -57,7 +68,7 @@ def _known_keys(model: type[BaseModel], loc: Iterable[str | int]) -> set[str]:
 
     They are read from its JSON schema, where unions and nested models look alike.
     """
-    root = model.model_json_schema()
+    root = _json_schema(model)
     here = list(_branches(root, root))
     for part in loc:
         children = [child for branch in here for child in _children(branch, part)]

@@ -28,6 +28,7 @@ def expand(
     inputs = [port.name for port in ports[other.participant] if port.causality == "input"]
     prefix, other_prefix = one.port.removesuffix("*"), other.port.removesuffix("*")
     pairs = [(name, other_prefix + name.removeprefix(prefix)) for name in outputs if name.startswith(prefix)]
+    known = set(inputs)
     connections = [
         connection.model_copy(
             update={
@@ -36,7 +37,7 @@ def expand(
             }
         )
         for source, target in pairs
-        if target in inputs
+        if target in known
     ]
     if not connections:
         names = f"outputs of '{one.participant}': {', '.join(outputs) or 'none'}"

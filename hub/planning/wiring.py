@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 
 from hub.participant import Device, Stepped
@@ -9,7 +10,7 @@ from hub.planning.bonds import plan_bond
 from hub.planning.connections import Connections
 from hub.planning.measured import check_measures
 from hub.planning.participants import plan_participant
-from hub.planning.plan import Plan
+from hub.planning.plan import Plan, PlannedBond
 from hub.planning.registry import Role
 from hub.planning.step_order import check_order, step_order
 from hub.planning.wildcard import expand
@@ -26,8 +27,12 @@ def make_plan(
     Raises ScenarioError, with the place in the scenario, about the first thing that does not fit.
     """
     bonds = [plan_bond(scenario, participants, index) for index in range(len(scenario.bonds))]
+    own: defaultdict[str, list[PlannedBond]] = defaultdict(list)
+    for one in bonds:
+        for name in dict.fromkeys((one.bond.motion.participant, one.bond.force.participant)):
+            own[name].append(one)
     planned = {
-        name: plan_participant(scenario, participants[name], roles[name], bonds)
+        name: plan_participant(scenario, participants[name], roles[name], own[name])
         for name in scenario.participants
     }
     check_order(scenario, planned)

@@ -97,6 +97,29 @@ def test_what_is_no_length_is_a_value_error(value: object) -> None:
         to_si(value, "m")
 
 
+@pytest.mark.parametrize(
+    "value",
+    [
+        "1 " + "(" * 10_000 + "m" + ")" * 10_000,
+        "1 " + "(" * 45 + "m" + ")" * 45 + "x",
+        "1 " + "a" * 100_000,
+        "1 " + "m*" * 10_000 + "m",
+        "1" * 100_000 + " m",
+        int("f" * 100_000, 16),
+    ],
+    ids=range(6),
+)
+def test_what_is_too_long_is_a_short_value_error(value: object) -> None:
+    with pytest.raises(ValueError, match=r"not a quantity in m") as caught:
+        to_si(value, "m")
+    assert len(str(caught.value)) < 300
+
+
+def test_a_unit_of_a_port_is_not_too_long() -> None:
+    assert not same_unit("(" * 10_000 + "m" + ")" * 10_000, "m")
+    assert not same_unit("a" * 100_000, "m")
+
+
 @settings(max_examples=500)
 @given(nonsense, nonsense)
 def test_nonsense_raises_nothing_but_value_error(text: str, unit: str) -> None:

@@ -217,7 +217,7 @@ def test_an_override_changes_what_it_names_and_no_other_that_merges_it(merged):
         (
             "springs: {a:",
             "springs: &s {b: *s, a:",
-            ["nested too deeply: is an alias (*name) used inside its own anchor (&name)?"],
+            ["8:16: nested too deeply: an alias (*name) is used inside its own anchor (&name)"],
         ),
     ],
 )
