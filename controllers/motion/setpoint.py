@@ -245,9 +245,9 @@ class Setpoint:
         faster = self._bend(wait, h) if state.stated else away / wait
         target = self._arrival + _clip(faster, -most, most)
         if not state.stated:
-            # while it catches up: from here it comes to rest no further past the newest goal, from which the
-            # next one may turn back, than from a velocity of arrival at the goal
-            most = np.hypot(most_to_goal, self._arrival)
+            # while it catches up: the next goal may be late or turn back, so it must be able to come to rest as
+            # near to this one as from the velocity of arrival there, and what a step adds to that
+            most = np.hypot(most_to_goal, self._arrival) + h * self._most
             target = _clip(target, -most, most)
         self._steer(target, most_down, most_up, h)
         state.waiting = max(wait - h, 0.0)

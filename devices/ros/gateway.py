@@ -19,6 +19,7 @@ from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.kinematics import kinematics_handler
 from devices.ros.topics.publications import EventTopic, PeriodicTopic, Publications, State
 from devices.ros.topics.refusal_reports import RefusalReports
+from devices.ros.topics.refused_moves import RefusedMoves
 from devices.ros.topics.row import Row
 from devices.ros.topics.subscriptions import SubscribedTopic
 from devices.ros.topics.vrep_table import vrep_table
@@ -77,6 +78,7 @@ class Gateway(Device):
         self._events: dict[str, EventTopic] = {}
         self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(CommandArbiter)
         self._refusals = RefusalReports(self.name, self._publish_text)
+        self._refused_moves = RefusedMoves(self._publish)
         self._received: deque[Sample] = deque()
         self._has_received = threading.Event()
         self._status_due_ns = 0
@@ -107,14 +109,13 @@ class Gateway(Device):
             self.name, self._advertise_all(transport), self.params.publish_period
         )
         for port, value in self._early.items():
+            self._note(self._inputs[port], value)
             self._events[port].write(value)
         self._early = {}
         for row in self.rows:
             if row.way == "subscribe":
                 arbiter = self._arbiters[row.owner] if row.moves else None
-                topic = SubscribedTopic(
-                    row, arbiter, self._counters[row], self._accept, self._refusals.report
-                )
+                topic = SubscribedTopic(row, arbiter, self._counters[row], self._accept, self._refuse)
                 transport.subscribe(row, topic.receive)
             elif row.way == "serve":
                 transport.serve(row, self._service_handler(row))
@@ -144,8 +145,13 @@ class Gateway(Device):
 
     def _accept(self, row: Row, message: Message) -> None:
         if row.port is not None:
+            self._refused_moves.accepted(row)
             self._received.append(Sample(row.port.name, message))
             self._has_received.set()
+
+    def _refuse(self, row: Row, level: str, reason: str) -> None:
+        self._refusals.report(row, level, reason)
+        self._refused_moves.refused(row)
 
     def _service_handler(self, row: Row) -> ServiceHandler:
         """Return the handler of an arm's service, which counts its calls."""
@@ -180,14 +186,23 @@ class Gateway(Device):
             raise MessageError(
                 f"device '{self.name}' has no input '{port}'.{did_you_mean(port, self._inputs)}"
             )
-        if row.name == "operating_state" and isinstance(value, OperatingState):
-            self._arbiters[row.owner].busy = value.is_busy
+        self._note(row, value)
         if port in self._states:
             self._states[port].write(cast("Vector", value))
         elif port in self._events:
             self._events[port].write(value)
         elif row.latched:
             self._early[port] = value
+
+    def _note(self, row: Row, value: Value) -> None:
+        """Note the operating state of a simulated arm, before it is published."""
+        if row.name == "operating_state" and isinstance(value, OperatingState):
+            self._arbiters[row.owner].busy = value.is_busy
+            self._refused_moves.update(row.owner, value)
+
+    def _publish(self, port: str, message: Message) -> None:
+        if (event := self._events.get(port)) is not None:
+            event.write(message)
 
     def _publish_text(self, port: str, text: StringMessage) -> None:
         """Publish a text of the gateway itself, if it has a topic: the console has warnings only."""

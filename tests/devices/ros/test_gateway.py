@@ -19,12 +19,15 @@ from schemas.crtk import ForwardKinematicsRequest, OperatingState, StringStamped
 from schemas.errors import DeviceError, MessageError
 from schemas.message import Message
 from schemas.ros import (
+    BoolMessage,
     EmptyMessage,
     Float64MultiArray,
     Header,
     Image,
     JointState,
+    Pose,
     PoseStamped,
+    Quaternion,
     StringMessage,
     TFMessage,
     Time,
@@ -408,6 +411,65 @@ def test_the_same_mistake_is_told_again_later_with_how_often_it_came(
     once, again = words(gateway, "/PSM1/error")
     assert "times" not in once
     assert again.endswith("(5 times)")
+
+
+class CrtkMove:
+    """How a CRTK client waits for its move: for a newer operating state that is not busy."""
+
+    def __init__(self, gateway: MemoryGateway) -> None:
+        self._gateway, self._begun_ns = gateway, time_ns()
+
+    @property
+    def is_busy(self) -> bool:
+        (*_, newest) = self._gateway.transport.heard("/PSM1/operating_state")
+        assert isinstance(newest, OperatingState)
+        return newest.header.stamp.ns <= self._begun_ns or newest.is_busy
+
+    @property
+    def reached(self) -> list[Message]:
+        return self._gateway.transport.heard("/PSM1/goal_reached")
+
+
+INVALID_MOVES = {
+    "/PSM1/move_jp": (_cdr([np.nan, 0.0, 0.1, 0.0, 0.0, 0.0], []), joints(0.0), b"?"),
+    "/PSM1/move_cp": (PoseStamped(pose=Pose(orientation=Quaternion(w=2.0))),),
+    "/PSM1/jaw/move_jp": (joints(0.1, 0.2),),
+}
+
+
+@pytest.mark.parametrize(
+    ("topic", "message"), [(topic, each) for topic, those in INVALID_MOVES.items() for each in those]
+)
+def test_a_client_stops_waiting_for_a_move_that_the_gateway_refuses(
+    gateway: MemoryGateway, topic: str, message: Message | bytes
+) -> None:
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    move = CrtkMove(gateway)
+    assert move.is_busy
+    gateway.transport.send(topic, message)
+    assert not move.is_busy
+    assert [told.data for told in move.reached if isinstance(told, BoolMessage)] == [False]
+
+
+def test_a_refused_move_ends_no_wait_for_one_that_is_under_way(gateway: MemoryGateway) -> None:
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    move = CrtkMove(gateway)
+    gateway.transport.send("/PSM1/move_jp", joints(*[0.1] * 6))
+    gateway.transport.send("/PSM1/move_jp", joints(0.0))  # before the controller has begun the first
+    assert move.is_busy
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True, is_busy=True))
+    gateway.transport.send("/PSM1/move_jp", joints(0.0))
+    assert move.is_busy
+    assert move.reached == []
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    assert not move.is_busy
+
+
+def test_a_flood_of_refused_moves_is_not_passed_on(gateway: MemoryGateway) -> None:
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    for _ in range(1000):
+        gateway.transport.send("/PSM1/move_jp", joints(0.0))
+    assert len(gateway.transport.heard("/PSM1/operating_state")) < 400
 
 
 def test_what_a_real_arm_says_comes_in_as_the_signals_are(gateway: MemoryGateway) -> None:
