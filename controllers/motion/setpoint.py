@@ -118,7 +118,8 @@ class Setpoint:
 
         Of a stream the setpoint reaches each goal when the next is due, in a straight line from the last one,
         so it neither lags by more than that nor stops in between. Where the sender states the velocity at the
-        goal, it gets there in a cubic.
+        goal, it gets there in a cubic. A goal that arrives early, before the last one was due, takes the last
+        one's time and gives no higher velocity: a busy machine delivers held messages together.
 
         Args:
             goal: positions, shape (n,).
@@ -245,9 +246,9 @@ class Setpoint:
         faster = self._bend(wait, h) if state.stated else away / wait
         target = self._arrival + _clip(faster, -most, most)
         if not state.stated:
-            # while it catches up: the next goal may be late or turn back, so it must be able to come to rest as
-            # near to this one as from the velocity of arrival there, and what a step adds to that
-            most = np.hypot(most_to_goal, self._arrival) + h * self._most
+            # while it catches up: the next goal may be late or turn back, so it must be able to come to rest
+            # as near to this one as from the velocity of arrival there, and what a step adds to that
+            most = np.hypot(most_to_goal, np.abs(self._arrival) + h * self._most)
             target = _clip(target, -most, most)
         self._steer(target, most_down, most_up, h)
         state.waiting = max(wait - h, 0.0)

@@ -15,6 +15,7 @@ from typing import ClassVar, cast
 from devices.ros.params import GatewayParams
 from devices.ros.status import StatusCounters
 from devices.ros.topics.arbitration import CommandArbiter
+from devices.ros.topics.diagnostics import DIAGNOSTICS_PERIOD_NS, DIAGNOSTICS_ROW, Diagnostics
 from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.kinematics import kinematics_handler
 from devices.ros.topics.publications import EventTopic, PeriodicTopic, Publications, State
@@ -25,6 +26,7 @@ from devices.ros.topics.subscriptions import SubscribedTopic
 from devices.ros.topics.vrep_table import vrep_table
 from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
 from devices.ros.transport import ServiceHandler, Transport
+from devices.samples import stamp_of
 from hub.participant import Device, Sample, Value
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState
@@ -83,6 +85,7 @@ class Gateway(Device):
         self._has_received = threading.Event()
         self._status_due_ns = 0
         self._publications: Publications | None = None
+        self._diagnostics: Diagnostics | None = None
 
     def table(self) -> tuple[Row, ...]:
         """Return the rows for the parameters."""
@@ -128,6 +131,9 @@ class Gateway(Device):
         self._states = {
             row.port.name: State(row.port) for row, _, _ in rows if row.port is not None and row.periodic
         }
+        self._diagnostics = Diagnostics(
+            self.name, self._states, ((row, count) for row, _, count in rows if row.port is not None)
+        )
         whole_robot = whole_robot_sources(self.params, self._states)
         periodic: list[PeriodicTopic] = []
         for row, publish, count in rows:
@@ -135,6 +141,9 @@ class Gateway(Device):
                 periodic.append(PeriodicTopic(self._states[row.port.name], publish, count))
             elif row.port is not None:
                 self._events[row.port.name] = EventTopic(publish, count)
+            elif row == DIAGNOSTICS_ROW:
+                every = max(1, round(DIAGNOSTICS_PERIOD_NS / self.params.publish_period))
+                periodic.append(PeriodicTopic(self._diagnostics, publish, count, every))
             elif row.name in whole_robot:
                 every = periods_between(row.name, self.params.publish_period)
                 periodic.append(PeriodicTopic(whole_robot[row.name], publish, count, every))
@@ -195,10 +204,12 @@ class Gateway(Device):
             self._early[port] = value
 
     def _note(self, row: Row, value: Value) -> None:
-        """Note the operating state of a simulated arm, before it is published."""
+        """Note the operating state of a simulated arm, and the simulated time, before they are published."""
         if row.name == "operating_state" and isinstance(value, OperatingState):
             self._arbiters[row.owner].busy = value.is_busy
             self._refused_moves.update(row.owner, value)
+        if self._diagnostics is not None and isinstance(value, Message) and (stamp_ns := stamp_of(value)):
+            self._diagnostics.note_stamp(stamp_ns)
 
     def _publish(self, port: str, message: Message) -> None:
         if (event := self._events.get(port)) is not None:

@@ -266,7 +266,7 @@ class Subscriptions:
 
 
 def _has_ended(error: Exception) -> bool:
-    """Return whether a program was reached and has ended, or is about to: it accepts no connection or closes it.
+    """Return whether a program has ended, or is about to: it accepts no connection, or closes it.
 
     It may do so without unregistering at the master.
     """

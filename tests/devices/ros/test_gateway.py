@@ -20,6 +20,8 @@ from schemas.errors import DeviceError, MessageError
 from schemas.message import Message
 from schemas.ros import (
     BoolMessage,
+    CameraInfo,
+    DiagnosticArray,
     EmptyMessage,
     Float64MultiArray,
     Header,
@@ -508,6 +510,37 @@ def test_the_status_tells_clients_and_rates(gateway: MemoryGateway) -> None:
     assert (topics["/PSM1/servo_jp"].messages, topics["/PSM1/servo_jp"].refused) == (1, 1)
     assert "expected 6" in topics["/PSM1/servo_jp"].reason
     encode(second)
+
+
+def test_diagnostics_report_rates_and_the_age_of_the_snapshot(gateway: MemoryGateway) -> None:
+    for k in range(250):  # 2.5 s of wall time or more, of which the simulation makes half at most
+        gateway.write("PSM1/measured_js", np.arange(18.0))
+        if k % 4 == 0:
+            header = Header(stamp=Time.from_ns(10**9 + k * 5_000_000))
+            gateway.write("endoscope/left/camera_info", CameraInfo(header=header))
+            gateway.write("endoscope/left/image_raw", Image(header=header))
+        sleep(0.01)
+    _, first, second, *_ = gateway.transport.heard("/diagnostics")
+    assert isinstance(first, DiagnosticArray)
+    assert isinstance(second, DiagnosticArray)
+    assert 0.7e9 < second.header.stamp.ns - first.header.stamp.ns < 1.5e9
+    assert abs(second.header.stamp.ns - time_ns()) < 10e9
+    found = {status.name: status for status in second.status}
+    assert list(found) == ["ros: simulation", "ros: states", "ros: camera endoscope"]
+    assert {status.level for status in second.status} == {0}
+    values = {pair.key: float(pair.value) for status in second.status for pair in status.values}
+    assert 20 < values["snapshots per second"] < 110
+    assert 10 < values["slowest (Hz)"] < 110
+    assert 5 < values["left/image_raw (Hz)"] < 30
+    assert values["age of the snapshot (s)"] < 0.5
+    assert 0.1 < values["real-time factor"] < 0.6
+
+
+def test_diagnostics_without_a_simulation_are_stale(gateway: MemoryGateway) -> None:
+    sleep(0.2)
+    (told,) = gateway.transport.heard("/diagnostics")
+    assert isinstance(told, DiagnosticArray)
+    assert {status.level for status in told.status} == {3}
 
 
 def test_a_transport_that_fails_is_told_where_the_device_is_read(
