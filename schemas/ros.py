@@ -34,6 +34,7 @@ __all__ = [
     "BoolMessage",
     "CameraInfo",
     "CompressedImage",
+    "DiagnosticArray",
     "DiagnosticStatus",
     "EmptyMessage",
     "Float64Message",
@@ -369,3 +370,11 @@ class DiagnosticStatus(Message):
     message: String
     hardware_id: String = ""
     values: list[KeyValue] = Field(default_factory=list[KeyValue])
+
+
+class DiagnosticArray(Message):
+    """The conditions of several pieces of hardware or software."""
+
+    ros_type: ClassVar[str] = "diagnostic_msgs/msg/DiagnosticArray"
+    header: Header = Header()
+    status: list[DiagnosticStatus] = Field(default_factory=list[DiagnosticStatus])

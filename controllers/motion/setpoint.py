@@ -28,6 +28,11 @@ rad/s^2 (docs/decisions/0011).
 """
 STREAM_GAP = 0.1
 """s; `servo_*` commands further apart than this are no stream: ten periods of the dVRK's own 100 Hz."""
+_EARLY = 1.5
+"""Steps: a goal of a stream that arrives when the last one is due in more than these is early.
+
+One step is what rounding to steps makes of a regular stream.
+"""
 _LOOKS = 200
 """Points at which a trajectory is compared with the ranges.
 
@@ -113,7 +118,8 @@ class Setpoint:
 
         Of a stream the setpoint reaches each goal when the next is due, in a straight line from the last one,
         so it neither lags by more than that nor stops in between. Where the sender states the velocity at the
-        goal, it gets there in a cubic.
+        goal, it gets there in a cubic. A goal that arrives early, before the last one was due, takes the last
+        one's time and gives no higher velocity: a busy machine delivers held messages together.
 
         Args:
             goal: positions, shape (n,).
@@ -122,10 +128,13 @@ class Setpoint:
         """
         state = self.state
         streaming = state.activity is Activity.FOLLOW and state.since <= STREAM_GAP
-        interval = max(state.since, h) if streaming else h
+        early = streaming and (state.waiting > _EARLY * h or state.since < 0.5 * h)
+        interval = state.waiting if early else max(state.since, h) if streaming else h
         state.stated = velocity is not None
         if velocity is None and streaming:
-            velocity = (goal - self.goal) / interval
+            velocity = (goal - self.goal) / max(state.since, h)
+            if early:
+                velocity = _clip(velocity, -np.abs(self._arrival), np.abs(self._arrival))
         self._arrival[:] = 0.0 if velocity is None else _clip(velocity, -self._velocity, self._velocity)
         self.goal[:] = goal
         state.waiting, state.since, state.pending = interval, 0.0, False
@@ -230,11 +239,18 @@ class Setpoint:
         wait = max(state.waiting, h)
         # from where a setpoint that is in time would be now
         away = self.goal - self.position - wait * self._arrival
-        most, most_down, most_up = self._fastest(
-            np.array([np.abs(away), self.position - self._lower, self._upper - self.position]), h
+        way = np.abs(self.goal - self.position)
+        most, most_to_goal, most_down, most_up = self._fastest(
+            np.array([np.abs(away), way, self.position - self._lower, self._upper - self.position]), h
         )
         faster = self._bend(wait, h) if state.stated else away / wait
-        self._steer(self._arrival + _clip(faster, -most, most), most_down, most_up, h)
+        target = self._arrival + _clip(faster, -most, most)
+        if not state.stated:
+            # while it catches up: the next goal may be late or turn back, so it must be able to come to rest
+            # as near to this one as from the velocity of arrival there, and what a step adds to that
+            most = np.hypot(most_to_goal, np.abs(self._arrival) + h * self._most)
+            target = _clip(target, -most, most)
+        self._steer(target, most_down, most_up, h)
         state.waiting = max(wait - h, 0.0)
         if not state.waiting:
             self._arrival[:] = 0.0

@@ -15,15 +15,18 @@ from typing import ClassVar, cast
 from devices.ros.params import GatewayParams
 from devices.ros.status import StatusCounters
 from devices.ros.topics.arbitration import CommandArbiter
+from devices.ros.topics.diagnostics import DIAGNOSTICS_PERIOD_NS, DIAGNOSTICS_ROW, Diagnostics
 from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.kinematics import kinematics_handler
 from devices.ros.topics.publications import EventTopic, PeriodicTopic, Publications, State
 from devices.ros.topics.refusal_reports import RefusalReports
+from devices.ros.topics.refused_moves import RefusedMoves
 from devices.ros.topics.row import Row
 from devices.ros.topics.subscriptions import SubscribedTopic
 from devices.ros.topics.vrep_table import vrep_table
 from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
 from devices.ros.transport import ServiceHandler, Transport
+from devices.samples import stamp_of
 from hub.participant import Device, Sample, Value
 from robots.dvrk.setup_joints import CartArm
 from schemas.crtk import OperatingState
@@ -77,10 +80,12 @@ class Gateway(Device):
         self._events: dict[str, EventTopic] = {}
         self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(CommandArbiter)
         self._refusals = RefusalReports(self.name, self._publish_text)
+        self._refused_moves = RefusedMoves(self._publish)
         self._received: deque[Sample] = deque()
         self._has_received = threading.Event()
         self._status_due_ns = 0
         self._publications: Publications | None = None
+        self._diagnostics: Diagnostics | None = None
 
     def table(self) -> tuple[Row, ...]:
         """Return the rows for the parameters."""
@@ -107,14 +112,13 @@ class Gateway(Device):
             self.name, self._advertise_all(transport), self.params.publish_period
         )
         for port, value in self._early.items():
+            self._note(self._inputs[port], value)
             self._events[port].write(value)
         self._early = {}
         for row in self.rows:
             if row.way == "subscribe":
                 arbiter = self._arbiters[row.owner] if row.moves else None
-                topic = SubscribedTopic(
-                    row, arbiter, self._counters[row], self._accept, self._refusals.report
-                )
+                topic = SubscribedTopic(row, arbiter, self._counters[row], self._accept, self._refuse)
                 transport.subscribe(row, topic.receive)
             elif row.way == "serve":
                 transport.serve(row, self._service_handler(row))
@@ -127,6 +131,9 @@ class Gateway(Device):
         self._states = {
             row.port.name: State(row.port) for row, _, _ in rows if row.port is not None and row.periodic
         }
+        self._diagnostics = Diagnostics(
+            self.name, self._states, ((row, count) for row, _, count in rows if row.port is not None)
+        )
         whole_robot = whole_robot_sources(self.params, self._states)
         periodic: list[PeriodicTopic] = []
         for row, publish, count in rows:
@@ -134,6 +141,9 @@ class Gateway(Device):
                 periodic.append(PeriodicTopic(self._states[row.port.name], publish, count))
             elif row.port is not None:
                 self._events[row.port.name] = EventTopic(publish, count)
+            elif row == DIAGNOSTICS_ROW:
+                every = max(1, round(DIAGNOSTICS_PERIOD_NS / self.params.publish_period))
+                periodic.append(PeriodicTopic(self._diagnostics, publish, count, every))
             elif row.name in whole_robot:
                 every = periods_between(row.name, self.params.publish_period)
                 periodic.append(PeriodicTopic(whole_robot[row.name], publish, count, every))
@@ -144,8 +154,13 @@ class Gateway(Device):
 
     def _accept(self, row: Row, message: Message) -> None:
         if row.port is not None:
+            self._refused_moves.accepted(row)
             self._received.append(Sample(row.port.name, message))
             self._has_received.set()
+
+    def _refuse(self, row: Row, level: str, reason: str) -> None:
+        self._refusals.report(row, level, reason)
+        self._refused_moves.refused(row)
 
     def _service_handler(self, row: Row) -> ServiceHandler:
         """Return the handler of an arm's service, which counts its calls."""
@@ -180,14 +195,25 @@ class Gateway(Device):
             raise MessageError(
                 f"device '{self.name}' has no input '{port}'.{did_you_mean(port, self._inputs)}"
             )
-        if row.name == "operating_state" and isinstance(value, OperatingState):
-            self._arbiters[row.owner].busy = value.is_busy
+        self._note(row, value)
         if port in self._states:
             self._states[port].write(cast("Vector", value))
         elif port in self._events:
             self._events[port].write(value)
         elif row.latched:
             self._early[port] = value
+
+    def _note(self, row: Row, value: Value) -> None:
+        """Note the operating state of a simulated arm, and the simulated time, before they are published."""
+        if row.name == "operating_state" and isinstance(value, OperatingState):
+            self._arbiters[row.owner].busy = value.is_busy
+            self._refused_moves.update(row.owner, value)
+        if self._diagnostics is not None and isinstance(value, Message) and (stamp_ns := stamp_of(value)):
+            self._diagnostics.note_stamp(stamp_ns)
+
+    def _publish(self, port: str, message: Message) -> None:
+        if (event := self._events.get(port)) is not None:
+            event.write(message)
 
     def _publish_text(self, port: str, text: StringMessage) -> None:
         """Publish a text of the gateway itself, if it has a topic: the console has warnings only."""

@@ -24,6 +24,7 @@ _BASES: dict[str, Any] = {
     **{
         name: getattr(types, name)
         for name in (
+            "byte",
             "int8",
             "uint8",
             "int16",

@@ -7,6 +7,7 @@ import socket
 import threading
 from collections.abc import Iterable
 from functools import partial
+from http.client import HTTPException
 from time import monotonic, time_ns
 
 from devices.ros.ros1.connection import Connection, Fields, FrameHandler, header_frame
@@ -28,10 +29,8 @@ _LATCHED_S = 0.5
 """A latched message follows the publisher's header at once: within a few milliseconds, or some tens on a busy
 machine. A message that arrives later than this was published now.
 """
-_UNREACHED = (
-    "ROS 1: the program at %s, which publishes %s, cannot be reached: %s. Its ROS_IP or ROS_HOSTNAME must be"
-    " an address that this machine can resolve"
-)
+_UNREACHED = "ROS 1: the program at %s, which publishes %s, cannot be reached: %s%s"
+_ADDRESS_HINT = ". Its ROS_IP or ROS_HOSTNAME must be an address that this machine can resolve"
 _INVALID = b"\xff\xff"
 """Prefix of bytes that could not be converted to CDR, which cannot begin so."""
 
@@ -183,25 +182,24 @@ class Subscriptions:
             self._changing.notify_all()
 
     def _connect_all(self, uri: str) -> None:
-        """Keep the links to one program connected, as long as it has any."""
+        """Keep the links to one program connected, as long as it has any.
+
+        A failure is logged when it lasts: a program that ends is unknown to the master a moment later.
+        """
         client, links, has_warned = ApiClient(uri, self._node), self._links[uri], False
         try:
             while (link := self._due(uri, links)) is not None:
                 try:
                     self._connect(client, link)
                 except (OSError, DeviceError, ValueError) as error:
-                    # refused: the program has ended without unregistering
-                    is_gone = isinstance(error.__cause__ or error, ConnectionRefusedError)
-                    log.log(
-                        logging.DEBUG if is_gone or has_warned else logging.WARNING,
-                        _UNREACHED,
-                        uri,
-                        link.subscription.topic,
-                        error,
-                    )
-                    has_warned = has_warned or not is_gone
                     with self._changing:
+                        may_be_ending = not link.wanted or not link.delay
                         link.retry()
+                    if has_warned or may_be_ending or _has_ended(error):
+                        log.debug(_UNREACHED, uri, link.subscription.topic, error, "")
+                    else:
+                        has_warned = True
+                        log.warning(_UNREACHED, uri, link.subscription.topic, error, _hint(error))
         finally:
             client.close()
 
@@ -232,6 +230,10 @@ class Subscriptions:
         match result:
             case (1, _, [_, str(host), int(port)]) if 0 < port < 1 << 16:
                 sock = socket.create_connection((host, port), _CONNECT_S)
+            case (0 | -1, reason, _):
+                raise ConnectionRefusedError(
+                    f"it does not publish {link.subscription.topic} any more: {reason}"
+                )
             case _:
                 raise DeviceError(f"it returns no address to connect to: {result}")
         try:
@@ -261,3 +263,16 @@ class Subscriptions:
         with self._changing:
             self._closed = True
             self._changing.notify_all()
+
+
+def _has_ended(error: Exception) -> bool:
+    """Return whether a program has ended, or is about to: it accepts no connection, or closes it.
+
+    It may do so without unregistering at the master.
+    """
+    return isinstance(error.__cause__ or error, ConnectionError | HTTPException)
+
+
+def _hint(error: Exception) -> str:
+    """Return what to do where an address leads nowhere; empty if the program answers, but wrongly."""
+    return _ADDRESS_HINT if isinstance(error.__cause__ or error, OSError | ValueError) else ""

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import get_args
 
 from devices.ros.params import GatewayParams, Real
+from devices.ros.topics.diagnostics import DIAGNOSTICS_ROW
 from devices.ros.topics.row import Row
 from robots.dvrk import arms as dvrk
 from robots.dvrk import crtk
@@ -77,8 +78,10 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
         Row("/robot_description", StringMessage.ros_type, "publish", latched=True),
     )
     prefix = f"/{params.namespace}" if params.namespace else ""
-    return tuple(replace(row, topic=prefix + row.topic) for row in rows) + tuple(
-        replace(row, is_real=True) for name in params.listen for row in _real_arm(name)
+    return (
+        *(replace(row, topic=prefix + row.topic) for row in rows),
+        DIAGNOSTICS_ROW,
+        *(replace(row, is_real=True) for name in params.listen for row in _real_arm(name)),
     )
 
 

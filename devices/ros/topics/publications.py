@@ -41,10 +41,18 @@ class State:
         self.port = port
         self._codec = VectorCodec(port)
         self._newest: tuple[Vector, int] | None = None
+        self.writes = 0
+        """Number of values so far."""
 
     def write(self, value: Vector) -> None:
         """Set the newest value."""
         self._newest = value, monotonic_ns()
+        self.writes += 1
+
+    @property
+    def written_ns(self) -> int:
+        """When the newest value was written, by the monotonic clock; 0 if none was."""
+        return 0 if self._newest is None else self._newest[1]
 
     @property
     def value(self) -> Vector | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from devices.ros.params import GatewayParams
+from devices.ros.topics.diagnostics import DIAGNOSTICS_ROW
 from devices.ros.topics.row import Row
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
@@ -41,6 +42,7 @@ def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
         *(row for eye in ("left", "right") for row in _camera(eye)),
         Row("/release_needle", _BOOL, "subscribe", _output("release_needle", _BOOL)),
         *(_command("suture_planner", name, type_) for name, type_ in _STITCHES.items()),
+        DIAGNOSTICS_ROW,
     )
 
 

@@ -122,6 +122,25 @@ def test_a_stream_that_ends_ends_at_its_last_goal():
     assert np.abs(made.velocity).max() < 1e-6
 
 
+@pytest.mark.parametrize("period", [2, 10])
+def test_a_stream_that_comes_in_bursts_stays_in_the_range_of_its_goals(period):
+    """A busy machine holds messages back for up to 80 ms and delivers them together."""
+    made, draw, range_, held_until = setpoint(), np.random.default_rng(5), 0.2, 0
+    waiting, positions = [], []
+    for k in range(6000):
+        if k % period == 0:
+            waiting.append(START + range_ * np.sin(np.pi * k * H) * np.eye(6)[0])
+        if draw.random() < 0.01:
+            held_until = k + draw.integers(20, 80)
+        if k >= held_until:
+            for goal in waiting:
+                made.follow(goal, H)
+            waiting = []
+        made.step(H)
+        positions.append(made.position[0])
+    assert np.abs(positions).max() < range_ + 1e-4
+
+
 def test_a_move_from_full_speed_towards_a_limit_brakes_first():
     made = setpoint()
     made.follow(START + np.array([1.588, 0, 0, 0, 0, 0]), H)

@@ -126,6 +126,8 @@ def flat(value):
         return {name: flat(getattr(value, name)) for name in value.get_fields_and_field_types()}
     if hasattr(value, "tolist"):
         return value.tolist()
+    if isinstance(value, bytes):  # a `byte`
+        return value[0]
     return [flat(one) for one in value] if isinstance(value, list | tuple) else value
 
 

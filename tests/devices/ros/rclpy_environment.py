@@ -1,5 +1,5 @@
 """An environment with real rclpy, from PyPI's wheels of ROS 2 Jazzy, and with messages that have no wheels
-(crtk_msgs, tf2_msgs), generated from our models.
+(crtk_msgs, diagnostic_msgs, tf2_msgs), generated from our models.
 
 It is made once, in XDG's cache folder, by `python -m tests.devices.ros.rclpy_environment`, which prints its
 Python, or by the first test that asks for the fixture `rclpy_python`. A program by hand:
@@ -35,7 +35,7 @@ WHEELS += [
     f"ros-jazzy-rosidl-typesupport-{name}"
     for name in ("c", "cpp", "fastrtps-c", "fastrtps-cpp", "introspection-c")
 ]
-GENERATED = ("crtk_msgs", "tf2_msgs")
+GENERATED = ("crtk_msgs", "diagnostic_msgs", "tf2_msgs")
 BUILDER = Path(__file__).parent / "rclpy_messages.py"
 
 

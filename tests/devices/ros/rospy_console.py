@@ -38,6 +38,12 @@ TEXTS = {
         " position_negative\ncrtk_msgs/CartesianImpedanceHalfPlaneGains"
         " orientation_positive\ncrtk_msgs/CartesianImpedanceHalfPlaneGains orientation_negative"
     ),
+    "diagnostic_msgs/KeyValue": "string key\nstring value",
+    "diagnostic_msgs/DiagnosticStatus": (
+        "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\nstring name\nstring message\nstring"
+        " hardware_id\nKeyValue[] values"
+    ),
+    "diagnostic_msgs/DiagnosticArray": "Header header\nDiagnosticStatus[] status",
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
     "crtk_msgs/QueryForwardKinematics": (
         "float64[] jp\ngeometry_msgs/Pose cp\n---\ngeometry_msgs/Pose cp\nbool result\nstring message"

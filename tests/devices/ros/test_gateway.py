@@ -19,12 +19,17 @@ from schemas.crtk import ForwardKinematicsRequest, OperatingState, StringStamped
 from schemas.errors import DeviceError, MessageError
 from schemas.message import Message
 from schemas.ros import (
+    BoolMessage,
+    CameraInfo,
+    DiagnosticArray,
     EmptyMessage,
     Float64MultiArray,
     Header,
     Image,
     JointState,
+    Pose,
     PoseStamped,
+    Quaternion,
     StringMessage,
     TFMessage,
     Time,
@@ -410,6 +415,65 @@ def test_the_same_mistake_is_told_again_later_with_how_often_it_came(
     assert again.endswith("(5 times)")
 
 
+class CrtkMove:
+    """How a CRTK client waits for its move: for a newer operating state that is not busy."""
+
+    def __init__(self, gateway: MemoryGateway) -> None:
+        self._gateway, self._begun_ns = gateway, time_ns()
+
+    @property
+    def is_busy(self) -> bool:
+        (*_, newest) = self._gateway.transport.heard("/PSM1/operating_state")
+        assert isinstance(newest, OperatingState)
+        return newest.header.stamp.ns <= self._begun_ns or newest.is_busy
+
+    @property
+    def reached(self) -> list[Message]:
+        return self._gateway.transport.heard("/PSM1/goal_reached")
+
+
+INVALID_MOVES = {
+    "/PSM1/move_jp": (_cdr([np.nan, 0.0, 0.1, 0.0, 0.0, 0.0], []), joints(0.0), b"?"),
+    "/PSM1/move_cp": (PoseStamped(pose=Pose(orientation=Quaternion(w=2.0))),),
+    "/PSM1/jaw/move_jp": (joints(0.1, 0.2),),
+}
+
+
+@pytest.mark.parametrize(
+    ("topic", "message"), [(topic, each) for topic, those in INVALID_MOVES.items() for each in those]
+)
+def test_a_client_stops_waiting_for_a_move_that_the_gateway_refuses(
+    gateway: MemoryGateway, topic: str, message: Message | bytes
+) -> None:
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    move = CrtkMove(gateway)
+    assert move.is_busy
+    gateway.transport.send(topic, message)
+    assert not move.is_busy
+    assert [told.data for told in move.reached if isinstance(told, BoolMessage)] == [False]
+
+
+def test_a_refused_move_ends_no_wait_for_one_that_is_under_way(gateway: MemoryGateway) -> None:
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    move = CrtkMove(gateway)
+    gateway.transport.send("/PSM1/move_jp", joints(*[0.1] * 6))
+    gateway.transport.send("/PSM1/move_jp", joints(0.0))  # before the controller has begun the first
+    assert move.is_busy
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True, is_busy=True))
+    gateway.transport.send("/PSM1/move_jp", joints(0.0))
+    assert move.is_busy
+    assert move.reached == []
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    assert not move.is_busy
+
+
+def test_a_flood_of_refused_moves_is_not_passed_on(gateway: MemoryGateway) -> None:
+    gateway.write("PSM1/operating_state", OperatingState(state="ENABLED", is_homed=True))
+    for _ in range(1000):
+        gateway.transport.send("/PSM1/move_jp", joints(0.0))
+    assert len(gateway.transport.heard("/PSM1/operating_state")) < 400
+
+
 def test_what_a_real_arm_says_comes_in_as_the_signals_are(gateway: MemoryGateway) -> None:
     stamp = Header(stamp=Time.from_ns(time_ns()))
     gateway.transport.send("/MTML/gripper/measured_js", JointState(header=stamp, position=np.array([0.3])))
@@ -446,6 +510,37 @@ def test_the_status_tells_clients_and_rates(gateway: MemoryGateway) -> None:
     assert (topics["/PSM1/servo_jp"].messages, topics["/PSM1/servo_jp"].refused) == (1, 1)
     assert "expected 6" in topics["/PSM1/servo_jp"].reason
     encode(second)
+
+
+def test_diagnostics_report_rates_and_the_age_of_the_snapshot(gateway: MemoryGateway) -> None:
+    for k in range(250):  # 2.5 s of wall time or more, of which the simulation makes half at most
+        gateway.write("PSM1/measured_js", np.arange(18.0))
+        if k % 4 == 0:
+            header = Header(stamp=Time.from_ns(10**9 + k * 5_000_000))
+            gateway.write("endoscope/left/camera_info", CameraInfo(header=header))
+            gateway.write("endoscope/left/image_raw", Image(header=header))
+        sleep(0.01)
+    _, first, second, *_ = gateway.transport.heard("/diagnostics")
+    assert isinstance(first, DiagnosticArray)
+    assert isinstance(second, DiagnosticArray)
+    assert 0.7e9 < second.header.stamp.ns - first.header.stamp.ns < 1.5e9
+    assert abs(second.header.stamp.ns - time_ns()) < 10e9
+    found = {status.name: status for status in second.status}
+    assert list(found) == ["ros: simulation", "ros: states", "ros: camera endoscope"]
+    assert {status.level for status in second.status} == {0}
+    values = {pair.key: float(pair.value) for status in second.status for pair in status.values}
+    assert 20 < values["snapshots per second"] < 110
+    assert 10 < values["slowest (Hz)"] < 110
+    assert 5 < values["left/image_raw (Hz)"] < 30
+    assert values["age of the snapshot (s)"] < 0.5
+    assert 0.1 < values["real-time factor"] < 0.6
+
+
+def test_diagnostics_without_a_simulation_are_stale(gateway: MemoryGateway) -> None:
+    sleep(0.2)
+    (told,) = gateway.transport.heard("/diagnostics")
+    assert isinstance(told, DiagnosticArray)
+    assert {status.level for status in told.status} == {3}
 
 
 def test_a_transport_that_fails_is_told_where_the_device_is_read(

@@ -126,6 +126,39 @@ def test_an_address_that_is_none_leaves_no_thread(listening, uri):
     assert until(lambda: not any(thread.name == f"ROS 1 {uri}" for thread in threading.enumerate()))
 
 
+@pytest.mark.parametrize("answer", ["nothing", ApiResult(0, "shutting down", 0)], ids=repr)
+def test_a_program_that_ends_while_we_connect_is_no_wrong_address(listening, caplog, answer):
+    """It closes the connection without an answer, or answers that it publishes the topic no more."""
+    listener, _ = listening
+    attempts = []
+    if answer == "nothing":
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            is_told_of(listener, f"http://127.0.0.1:{server.getsockname()[1]}/")
+            server.settimeout(5.0)
+            for _ in range(4):  # each attempt connects a second time where the first is closed
+                server.accept()[0].close()
+    else:
+        program = ApiServer("127.0.0.1", {"requestTopic": lambda *_: attempts.append(1) or answer})
+        is_told_of(listener, program.uri)
+        try:
+            assert until(lambda: len(attempts) >= 3)
+        finally:
+            program.close()
+    assert "cannot be reached" not in caplog.text
+
+
+def test_an_address_that_leads_nowhere_is_logged_once_it_lasts(listening, caplog):
+    listener, _ = listening
+    is_told_of(listener, "http://nowhere.invalid:1/")
+    assert until(lambda: "Its ROS_IP or ROS_HOSTNAME must be an address" in caplog.text)
+    assert until(
+        lambda: all(
+            link.delay > 0.1 for links in listener._subscriptions._links.values() for link in links.values()
+        )
+    )
+    assert caplog.text.count("cannot be reached") == 1
+
+
 def test_a_failure_nobody_thought_of_is_not_made_again_with_the_same_bytes(listening, publisher, caplog):
     listener, _ = listening
     taken = []

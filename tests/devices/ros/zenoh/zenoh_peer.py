@@ -227,7 +227,7 @@ def flat(message):
     return {
         field.name: flat(getattr(message, field.name))
         for field in fields_of(message)
-        if not field.name.startswith("__")
+        if not field.name.startswith("__") and not str(field.type).startswith("ClassVar")
     }
 
 
