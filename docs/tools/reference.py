@@ -159,14 +159,14 @@ def scenario() -> str:
             "YAML merge keys (`<<: *scene`) are allowed. Every value can be overridden on the command line:"
             ' `--set participants.tissue.organs.block.young_modulus="25 kPa"`.',
             "",
-            *_limits(),
+            *_scenario_limits(),
             *_model("Top level", schema),
             *_definitions(schema),
         ]
     )
 
 
-def _limits() -> list[str]:
+def _scenario_limits() -> list[str]:
     """Return the section on what a scenario may contain at most."""
     rows = (
         (f"{limits.MAX_BYTES // 1024} KiB", "the file with its comments, and the text of a `--set`"),

@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import pytest
 
@@ -10,7 +11,10 @@ from engines.mujoco.pictures import opengl
 
 
 @pytest.fixture(autouse=True)
-def fresh() -> None:
+def fresh() -> Iterator[None]:
+    """What is found in these tests is neither that of others nor left to others."""
+    opengl.find.cache_clear()
+    yield
     opengl.find.cache_clear()
 
 
