@@ -16,6 +16,8 @@ from hub.remote.live_sessions import live_sessions
 from hub.session.launch import launch
 from tests.hub.authorities import Authority, free_port
 
+pytestmark = pytest.mark.xdist_group("network")  # its hosts have fixed addresses
+
 SCENARIO = """\
 name: hand
 step: 2 ms
@@ -208,7 +210,7 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
     def try_all():
         try:
             hosts = [site.device("player"), site.device("pad")]
-            until = monotonic() + 30
+            until = monotonic() + 120
             while monotonic() < until and not [
                 s for s in live_sessions([site.session.endpoint]) if s.step > 50
             ]:
@@ -216,7 +218,7 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
             for way, (endpoint, file, bare) in ways.items():
                 done = site.start(
                     "-c", STRANGER, json.dumps([endpoint, str(file), bare, keys, asked])
-                ).communicate(timeout=30)[0]
+                ).communicate(timeout=120)[0]
                 found[way] = json.loads(done.splitlines()[-1])
             for host in hosts:
                 host.terminate()
