@@ -6,7 +6,9 @@ simulated arm's ranges. An arm whose real one is silent holds. Two figures measu
     distance   from the simulated tip to the real one, both by the simulated arm's kinematics, m
     lag        the time by which the simulated arm is behind, s: over the last second it was where the real
                one is now, less `lag` times its velocity; lag = sum v.(q - q_sim) / sum v.v, joints weighted
-               by their speed limits; it does not change while nothing moves.
+               by their speed limits.
+
+An arm that does not follow has neither, and one that follows without moving has no lag: nothing is published.
 
 The age of the sample, by its way from the real arm to the hub, is not in it and adds to the lag.
 """
@@ -101,11 +103,8 @@ class _Arm:
         self.state = _ArmState(n=n, jaw=m)
         self._forget()
         self.outputs: dict[str, Value] = {
-            f"{name}/{out}": () for out in ("servo_jp", "hold", "warning", *(("jaw/servo_jp",) if m else ()))
-        }
-        self.outputs |= {
-            f"{name}/distance": self.state.part("distance"),
-            f"{name}/lag": self.state.part("lag"),
+            f"{name}/{out}": ()
+            for out in ("servo_jp", "hold", "warning", "distance", "lag", *(("jaw/servo_jp",) if m else ()))
         }
 
     @property
@@ -164,15 +163,17 @@ class _Arm:
                 "name": f"{name}/distance",
                 "causality": "output",
                 "type": Float64Message.ros_type,
+                "variability": "event",
                 "unit": "m",
-                "description": "between the tips",
+                "description": "between the tips, at every step at which the simulated arm follows",
             },
             {
                 "name": f"{name}/lag",
                 "causality": "output",
                 "type": Float64Message.ros_type,
+                "variability": "event",
                 "unit": "s",
-                "description": "by which the simulated arm is behind",
+                "description": "by which the simulated arm is behind, at every step at which both move",
             },
         ]
         if self._jaw:
@@ -192,9 +193,7 @@ class _Arm:
     def step(self, t: int, h: int, inputs: Inputs) -> dict[str, Value]:
         """Command the simulated arm to the newest sample, and compare the two."""
         name = self._name
-        self.outputs.update({f"{name}/servo_jp": (), f"{name}/hold": (), f"{name}/warning": ()})
-        if self._jaw:
-            self.outputs[f"{name}/jaw/servo_jp"] = ()
+        self.outputs.update(dict.fromkeys(self.outputs, ()))
         for state in cast("tuple[OperatingState, ...]", inputs.events(f"{name}/operating_state")):
             self.state.ready = crtk.is_ready(state)
         n, real = len(self._chain.joints), inputs[f"real/{name}/measured_js"]
@@ -244,6 +243,7 @@ class _Arm:
     def _compare(self, real: Vector, velocity: Vector, simulated: Vector, h: float) -> None:
         tips = [self._chain.forward(positions)[:3, 3] for positions in (real, simulated)]
         self.state.distance = float(np.linalg.norm(tips[0] - tips[1]))
+        self.outputs[f"{self._name}/distance"] = (Float64Message(data=self.state.distance),)
         speed = velocity / self._chain.velocity
         sums = self.state.sums
         sums *= exp(-h / _WINDOW)
@@ -251,3 +251,4 @@ class _Arm:
         error, square = sums.tolist()
         if square > _LEAST:
             self.state.lag = error / square
+            self.outputs[f"{self._name}/lag"] = (Float64Message(data=self.state.lag),)

@@ -46,7 +46,7 @@ class Port(BaseModel):
     start: tuple[float, ...] | None = None
     """Value of an input while nothing is connected (FMI's word); None: the input must be connected."""
     max_age_ns: int = Field(default=0, ge=0)
-    """A stream inlet older than this is marked stale in the grant; 0: never."""
+    """A stream inlet is marked stale when its last sample is older, and before the first; 0: never older."""
     clock: Literal["simulated", "wall"] = "simulated"
     """The clock of the stamps."""
     description: str = ""

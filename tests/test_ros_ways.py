@@ -47,6 +47,12 @@ def test_simulated_arms_follow_real_ones_and_say_how_far_behind_they_are():
         assert found[f"{arm}_largest_distance_m"] < 3e-3
 
 
+def test_an_arm_that_no_real_one_leads_has_no_lag():
+    found = run("ros-mirror", "duration=0.4 s", "participants.real.listen=[PSM1]")
+    assert found["psm1_largest_distance_m"] is not None
+    assert (found["ecm_lag_s"], found["ecm_largest_distance_m"]) == (None, None)
+
+
 def test_a_gateway_fits_where_the_recording_of_masters_is():
     gateway = (
         "participants.masters={kind: ros2-zenoh, listen: [MTML, MTMR, footpedals], namespace: simulation,"

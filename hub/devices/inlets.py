@@ -94,7 +94,9 @@ class Inlets:
             and (planned.name, port.name) not in connected
         }
         for (name, port_name), port in self._settable.items():
-            self._inlets[name, port_name] = _Inlet(name, port_name, PortCodec(port), stale=False)
+            self._inlets[name, port_name] = _Inlet(
+                name, port_name, PortCodec(port), stale=port.max_age_ns > 0
+            )
 
     def settable(self, participant: str, port: str) -> Port:
         """Return the input that `set` may write; raises MessageError if it is connected or does not exist."""

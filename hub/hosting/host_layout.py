@@ -212,4 +212,6 @@ class HostLayout:
             for port in one.planned.ports:
                 if port.causality == "input" and (one.name, port.name) not in connected:
                     inlets[one.name, port.name] = [(one, port.name, PortCodec(port))]
+                    if port.max_age_ns:  # no sample yet, as from a device that is silent
+                        one.stale.add(port.name)
         return inlets

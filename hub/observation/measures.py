@@ -11,6 +11,7 @@ import numpy as np
 
 from hub.planning.measured import measured_port
 from hub.planning.plan import Plan
+from schemas.ros import Float64Message
 from schemas.scenario import Measure, Scenario
 from schemas.vectors import Vector
 
@@ -23,7 +24,7 @@ class _Meter:
     def __init__(self, measure: Measure, part: slice, period: float) -> None:
         self.live = measure.live
         self.unit = measure.unit
-        self.now = 0.0
+        self.now: float | None = None
         self._kind = measure.kind
         self._part = part
         self._after = measure.after
@@ -40,21 +41,20 @@ class _Meter:
 
     def take(self, value: Vector, time_ns: int) -> None:
         part = value[self._part]
-        self.now = (
-            float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
-        )
+        now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
+        self.now = now
         if time_ns < self._after:
             return
-        self._least = min(self._least, self.now)
+        self._least = min(self._least, now)
         if self._kind == "swing":
             self._low, self._high = np.minimum(self._low, part), np.maximum(self._high, part)
-        if self._peak is None or self.now > self._peak:
-            self._peak, self._drop = self.now, 0.0
-        self._drop = max(self._drop, self._peak - self.now)
+        if self._peak is None or now > self._peak:
+            self._peak, self._drop = now, 0.0
+        self._drop = max(self._drop, self._peak - now)
         if self._level is not None:
-            self._above = self._above + 1 if self.now >= self._level else 0
+            self._above = self._above + 1 if now >= self._level else 0
             self._longest = max(self._longest, self._above)
-        self._sum += self.now
+        self._sum += now
         self._count += 1
 
     @property
@@ -94,14 +94,20 @@ class Measures:
         return list(self.by_port)
 
     def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
-        """Add the value of an output port at a time."""
+        """Add the value of a signal port, or one message of an event port, at a time."""
+        if isinstance(value, Float64Message):
+            value = np.array([value.data])
         for meter in self.by_port.get((participant, port), ()):
             with self._lock:
                 meter.take(value, time_ns)
 
     def live(self) -> Mapping[str, tuple[float, str]]:
-        """Return the current value and unit of each measure in the progress line."""
-        return {name: (meter.now, meter.unit) for name, meter in self._meters.items() if meter.live}
+        """Return the current value and unit of each measure in the progress line that has a value yet."""
+        return {
+            name: (meter.now, meter.unit)
+            for name, meter in self._meters.items()
+            if meter.live and meter.now is not None
+        }
 
     def results(self) -> dict[str, float | None]:
         """Return the result of every measure; None if its port had no value."""

@@ -106,11 +106,13 @@ class Observers:
 
     def value(self, planned: PlannedParticipant, port: Port, step: int, time_ns: int, value: Any) -> None:
         """Receive an output value of a participant in this process, or one from a lane."""
+        items = value if port.variability == "event" else (value,)
         if (planned.name, port.name) in self.measures.by_port and step > INITIAL:
-            self.measures.take(planned.name, port.name, value, time_ns)
+            for item in items:
+                self.measures.take(planned.name, port.name, item, time_ns)
         if self._recorder is not None:
             watched = self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
-            for item in value if watched.codec.is_event else (value,):
+            for item in items:
                 self._recorder.write(watched.channel, time_ns, watched.codec.encode(item, time_ns))
 
     def sample(self, sample: zenoh.Sample) -> None:
@@ -131,7 +133,7 @@ class Observers:
             self.refusals.refuse_sample(sample, error)
             return
         watched.newest = (tag.step, tag.index)
-        if tag.step > INITIAL and not watched.codec.is_event:
+        if tag.step > INITIAL:
             self.measures.take(watched.planned.name, watched.port.name, value, tag.time_ns)
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)

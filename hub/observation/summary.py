@@ -20,7 +20,7 @@ class Progress:
     real_time_factor: float
     late_steps: int
     live: Mapping[str, tuple[float, str]]
-    """Current value and unit of each measure that is shown live."""
+    """Current value and unit of each measure that is shown live and has a value yet."""
 
 
 @dataclass(frozen=True)

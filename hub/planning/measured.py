@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from hub.planning.plan import PlannedParticipant
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.ports import Port
+from schemas.ros import Float64Message
 from schemas.scenario import Scenario
 from schemas.vectors import VectorCodec, has_vector
 
@@ -20,7 +21,10 @@ def check_measures(scenario: Scenario, participants: Mapping[str, PlannedPartici
         if of.participant not in participants:
             hint = did_you_mean(of.participant, participants)
             raise ScenarioError(f"unknown participant '{of.participant}'.{hint}", path=path)
-        measured_port(participants[of.participant], of.port, path)
+        port, _ = measured_port(participants[of.participant], of.port, path)
+        if measure.kind == "time-above" and port.variability == "event":
+            problem = f"'{of}' has no value between its events: time-above is measured of a signal"
+            raise ScenarioError(problem, path=path)
 
 
 def measured_port(
@@ -28,12 +32,14 @@ def measured_port(
 ) -> tuple[Port, slice]:
     """Return the output port and the part of its vector that `port` or `port.field` means.
 
-    Raises ScenarioError, about `path`, if there is no such output with a vector form, or no such field.
+    Raises ScenarioError, about `path`, if there is no such output with a vector form, or no such field. An
+    event port is measured if each message is one number; the sizes of others may change.
     """
     outputs = {
         port.name: port
         for port in planned.ports
-        if port.causality == "output" and port.variability == "signal" and has_vector(port.type)
+        if port.causality == "output"
+        and (has_vector(port.type) if port.variability == "signal" else port.type == Float64Message.ros_type)
     }
     name, _, field = text.partition(".")
     if name not in outputs:

@@ -19,6 +19,8 @@ _KINDS = {"console": "dvrk-console", "paper": "vrep"}
 _PARTICIPANT_KEYS = {"link": "network_link"}
 _PARAMETER_VALUES = {"profile": {"paper": "vrep"}}
 """By parameter: the old value and the new one, for every kind that accepts only the new one."""
+_EVENT_PORTS = {"mirror": ("distance", "lag")}
+"""By kind: the last parts of the names of ports that were signals, and whose values are events now."""
 
 
 def replace_old_names(source: Source) -> None:
@@ -80,7 +82,9 @@ def current_plan(plan: dict[str, Any]) -> dict[str, Any]:
     if "members" not in plan:
         return plan
     old = dict(plan)
-    participants = {name: _current_participant(spec) for name, spec in old.pop("members").items()}
+    participants = {
+        name: _with_event_ports(_current_participant(spec)) for name, spec in old.pop("members").items()
+    }
     connections = old.pop("links")
     from_devices = [_current_connection(inlet, "source") for inlet in old.pop("inlets")]
     to_devices = [_current_connection(outlet, "target") for outlet in old.pop("outlets")]
@@ -96,6 +100,15 @@ def _current_participant(spec: dict[str, Any]) -> dict[str, Any]:
     current = {_PARTICIPANT_KEYS.get(key, key): value for key, value in spec.items()}
     current["kind"] = _KINDS.get(spec["kind"], spec["kind"])
     return current | _new_values(current)
+
+
+def _with_event_ports(planned: dict[str, Any]) -> dict[str, Any]:
+    events = _EVENT_PORTS.get(planned["kind"], ())
+    ports = [
+        port | {"variability": "event"} if port["name"].rpartition("/")[2] in events else port
+        for port in planned["ports"]
+    ]
+    return planned | {"ports": ports}
 
 
 def _current_connection(connection: dict[str, Any], end: str) -> dict[str, Any]:

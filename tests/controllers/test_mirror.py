@@ -65,8 +65,19 @@ def test_the_simulated_arm_follows_and_the_lag_is_that_of_one_sample_and_its_lin
         pair.step(t_ms)
     now, then = real_arm(2.5)[:6], real_arm(2.5 - 2e-3 * SAMPLE_MS)[:6]
     assert (np.abs(pair.motion.setpoint - now) <= 1.2 * np.abs(then - now)).all()
-    assert 0.5e-3 * SAMPLE_MS < pair.outputs["PSM1/lag"][0] < 1.6e-3 * SAMPLE_MS
-    assert 0.0 < pair.outputs["PSM1/distance"][0] < 0.004
+    (lag,), (distance,) = pair.outputs["PSM1/lag"], pair.outputs["PSM1/distance"]
+    assert 0.5e-3 * SAMPLE_MS < lag.data < 1.6e-3 * SAMPLE_MS
+    assert 0.0 < distance.data < 0.004
+
+
+def test_an_arm_that_does_not_follow_has_neither_lag_nor_distance():
+    pair = Pair()
+    pair.step(0, silent=True)
+    assert (pair.outputs["PSM1/lag"], pair.outputs["PSM1/distance"]) == ((), ())
+    pair.values["real/PSM1/measured_js"] = np.concatenate([CENTRE, np.zeros(12)])  # follows, but stands
+    pair.step(1)
+    assert pair.outputs["PSM1/lag"] == ()
+    assert len(pair.outputs["PSM1/distance"]) == 1
 
 
 def test_a_silent_arm_holds_and_follows_again():

@@ -33,7 +33,8 @@ def until(session, enough):
     """Return a progress callback that shuts `session` down after enough steps, fresh ones and presses."""
 
     def look(progress):
-        if enough(progress.step, *(progress.live[name][0] for name in ("fresh_steps", "pressed"))):
+        live = (progress.live.get(name, (0.0, ""))[0] for name in ("fresh_steps", "pressed"))
+        if enough(progress.step, *live):
             session.state.shutdown()
 
     return look
@@ -105,7 +106,7 @@ def test_a_remote_device_may_leave_and_join_again(prepare):
 
     console = threading.Thread(target=go_and_come_back)
     console.start()
-    summary = session.run(lambda progress: fresh_steps.append(progress.live["fresh_steps"][0]))
+    summary = session.run(lambda progress: fresh_steps.append(progress.live.get("fresh_steps", (0.0, ""))[0]))
     console.join()
     with pytest.raises(subprocess.TimeoutExpired):  # it waits for the next session of this name
         hosts[1].wait(0.5)

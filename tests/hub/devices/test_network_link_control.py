@@ -116,7 +116,7 @@ def test_the_arm_holds_in_an_outage_and_continues_after_it(prepare):
     latest = []
 
     def count():
-        return latest[-1].live["fresh_steps"][0]
+        return latest[-1].live.get("fresh_steps", (0.0, ""))[0]
 
     def act():
         relink(session, outage="500 ms")

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from hub.observation.measures import Measures
+from schemas.ros import Float64Message
 from schemas.scenario import Measure, Scenario
 from tests.hub.parts import Part, out, plan_of
 from tests.strategies import vectors
@@ -97,3 +98,13 @@ def test_a_level_belongs_to_time_above(measure):
 
 def test_a_port_that_never_spoke_has_no_measure():
     assert set(measures("a.out", Part("a", out())).results().values()) == {None}
+
+
+def test_the_events_of_a_port_are_measured_one_by_one():
+    found = measures("a.out", Part("a", out(type=Float64Message.ros_type, variability="event")))
+    assert (found.live(), found.results()["final"]) == ({}, None)
+    for number in (3.0, -1.0, 2.0):
+        found.take("a", "out", Float64Message(data=number), 0)
+    results = found.results()
+    assert [results[kind] for kind in ("peak", "least", "final", "swing")] == [3.0, -1.0, 2.0, 4.0]
+    assert found.live() == {"final": (2.0, "N")}

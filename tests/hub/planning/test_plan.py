@@ -332,6 +332,13 @@ def test_measures_are_of_outputs(of, message):
     assert raised.value.path == ("measure", "top", "of")
 
 
+def test_only_of_a_signal_is_measured_how_long_it_is_above_a_level():
+    part = Part("a", out(type="std_msgs/msg/Float64", variability="event"))
+    assert plan_of(part, measure={"top": {"kind": "peak", "of": "a.out"}})
+    with pytest.raises(ScenarioError, match=r"'a.out' has no value between its events"):
+        plan_of(part, measure={"top": {"kind": "time-above", "of": "a.out", "level": 1.0}})
+
+
 def test_a_plan_survives_json():
     plan = plan_of(
         motion(),

@@ -50,7 +50,7 @@ class Running:
     def _run(self):
         try:
             self.summary = self.session.run(
-                lambda progress: setattr(self, "fresh", progress.live["fresh_steps"][0])
+                lambda progress: setattr(self, "fresh", progress.live.get("fresh_steps", (0.0, ""))[0])
             )
         except Exception as error:  # noqa: BLE001
             self.failure = error
