@@ -170,6 +170,7 @@ def test_a_second_process_for_the_same_device_is_refused(prepare, tmp_path):
 
 
 def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
+    forces = "loud.out -> player.noise"
     running = Running(prepare(SCENARIO))
     until(lambda: running.status)
     with (
@@ -186,12 +187,13 @@ def test_an_arm_holds_while_the_network_is_choked_for_3_s(prepare, tmp_path):
         proxy.go_on()
         until(lambda: running.is_followed())
         assert running.status.participants[0].pid == process.pid
+        until(lambda: any(one.count > 100 for one in running.status.latencies if one.stream == forces), 60.0)
         process.terminate()
         process.wait(10)
         until(lambda: running.status.participants[0].pid == 0)
         running.end()
     # though the device is gone
-    assert running.summary.latency["state to force"]["loud.out -> player.noise"]["count"] > 0
+    assert running.summary.latency["state to force"][forces]["count"] > 100
     assert (tmp_path / "player.log").read_text().count("takes part") == 1
 
 
