@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from time import monotonic_ns, sleep
 
 from hub.planning.plan import Plan
 
 __all__ = ["Clock"]
+
+log = logging.getLogger(__name__)
 
 _WINDOW_NS = 10_000_000
 """Simulated time that a grant covers where nothing enters and the scenario sets no window.
@@ -19,6 +22,14 @@ _CAUGHT_UP_NS = 50_000_000
 """How late a step may be before simulated time slips (docs/decisions/0034).
 
 Two pictures of the endoscope drawn without a GPU take 22 ms.
+"""
+_OBSERVED_NS = 5_000_000_000
+"""Wall time over which the speed of simulated time is judged."""
+_REPORT_NS = 60_000_000_000
+"""Wall time between two reports that it is slow."""
+_SLOW = 0.8
+"""Of real time. An arm has its limits in simulated time: at 0.18, a PSM that a ROS program leads at 0.1 m/s
+was up to 50 mm behind.
 """
 
 
@@ -49,7 +60,9 @@ class Clock:
             {plan.participants[inlet.target].period for inlet in plan.from_devices}
             | {device.period for device in plan.meetings()}
         )
-        self._wall_zero_ns = monotonic_ns()
+        self._follows = bool(plan.from_devices)
+        self._wall_zero_ns = self._observed_from_ns = monotonic_ns()
+        self._slipped_ns = self._next_report_ns = 0
 
     @property
     def time_ns(self) -> int:
@@ -76,7 +89,8 @@ class Clock:
 
     def start(self) -> None:
         """Let wall time run from now, at the start and after a pause."""
-        self._wall_zero_ns = monotonic_ns() - self.time_ns
+        self._observe_from(monotonic_ns())
+        self._wall_zero_ns = self._observed_from_ns - self.time_ns
 
     def advance(self, count: int) -> None:
         """Advance by `count` steps; in real time wait for the wall clock.
@@ -86,9 +100,30 @@ class Clock:
         self.step += count
         if not self.realtime:
             return
-        ahead_ns = self._wall_zero_ns + self.time_ns - monotonic_ns()
+        now_ns = monotonic_ns()
+        ahead_ns = self._wall_zero_ns + self.time_ns - now_ns
         if ahead_ns >= 0:
             sleep(ahead_ns / 1e9)
         else:
             self.late_steps += count
-            self._wall_zero_ns += max(-ahead_ns - _CAUGHT_UP_NS, 0)
+            self._slip(max(-ahead_ns - _CAUGHT_UP_NS, 0), now_ns)
+
+    def _slip(self, slip_ns: int, now_ns: int) -> None:
+        """Let simulated time slip; report it where devices lead."""
+        self._wall_zero_ns += slip_ns
+        self._slipped_ns += slip_ns
+        observed_ns = now_ns - self._observed_from_ns
+        if observed_ns < _OBSERVED_NS:
+            return
+        factor = 1.0 - self._slipped_ns / observed_ns
+        if factor < _SLOW and self._follows and now_ns >= self._next_report_ns:
+            self._next_report_ns = now_ns + _REPORT_NS
+            log.warning(
+                "simulated time runs at %.2f of real time: what devices and ROS programs lead follows them"
+                " late (docs/how-to/real-time.md)",
+                factor,
+            )
+        self._observe_from(now_ns)
+
+    def _observe_from(self, now_ns: int) -> None:
+        self._observed_from_ns, self._slipped_ns = now_ns, 0

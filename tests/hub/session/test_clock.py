@@ -109,6 +109,29 @@ def test_time_slips_where_there_is_too_much_to_catch_up(wall):
     assert clock.late_steps == 50
 
 
+def test_slow_simulated_time_is_reported_where_a_device_leads(wall, caplog):
+    for led, reports in ((plan(1), 2), (plan(), 0)):
+        clock = Clock(led, window=1, realtime=True, steps=None)
+        clock.start()
+        for _ in range(20_000):
+            wall["ns"] += 5 * MS  # what a step of 1 ms takes here
+            clock.advance(1)
+        found = [record.getMessage() for record in caplog.records]
+        assert len(found) == reports
+        assert all("simulated time runs at 0.2" in one for one in found)
+        caplog.clear()
+
+
+def test_simulated_time_that_slips_once_is_not_slow(wall, caplog):
+    clock = Clock(plan(1), window=1, realtime=True, steps=None)
+    clock.start()
+    for step in range(20_000):
+        wall["ns"] += 600 * MS if step % 6000 == 3000 else 0
+        clock.advance(1)
+    assert clock.late_steps
+    assert not caplog.records
+
+
 def test_a_pause_is_not_late(wall):
     clock = Clock(plan(), window=1, realtime=True, steps=None)
     clock.start()
