@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from zlib import crc32
 
 import numpy as np
 
 from controllers.motion.operating_state import State
 from robots.dvrk import crtk
+from robots.dvrk.repeats import refusals_to_report
 from schemas.crtk import OperatingState
 from schemas.message import Message
 from schemas.ros import BoolMessage, Header, StringMessage, Time
@@ -79,7 +79,9 @@ class Messages:
 
         For a stream the same refusal is reported once in two seconds, with the number of commands.
         """
-        count = self._repeats(command, reason) if command in _STREAMS else 1
+        count = 1
+        if command in _STREAMS:
+            count = refusals_to_report(self.state[_STREAMS.index(command)], reason, self._now_ns)
         if count:
             text = f"{command} refused: {reason}" + (f" ({count} times)" if count > 1 else "")
             (self.error if ready else self.warning)(text)
@@ -88,20 +90,6 @@ class Messages:
         """Note that a command was executed, so that its next refusal is reported at once."""
         if command in _STREAMS:
             self.state[_STREAMS.index(command)] = 0.0
-
-    def _repeats(self, command: str, reason: str) -> int:
-        """Return how often the same refusal occurred since its last report; 0 while that is too recent."""
-        row, words, now = (
-            self.state[_STREAMS.index(command)],
-            float(crc32(reason.encode())),
-            self._now_ns * 1e-9,
-        )
-        if row[0] == words and now - row[1] < crtk.REPEAT_NS * 1e-9:
-            row[2] += 1.0
-            return 0
-        count = int(row[2]) + 1 if row[0] == words else 1
-        row[:] = words, now, 0.0
-        return count
 
     def _put(self, name: str, message: Message) -> None:
         self.outputs[self._ports[name]] += (message,)

@@ -8,11 +8,8 @@ it: DISABLED accepts `home`, which then powers the arm first.
 from __future__ import annotations
 
 from enum import IntEnum
-from zlib import crc32
 
-import numpy as np
-
-from robots.dvrk.crtk import REMEMBERED_COMMANDS
+from robots.dvrk.repeats import RememberedCommands
 from schemas.crtk import StringStamped
 from schemas.errors import did_you_mean
 
@@ -57,30 +54,15 @@ def refusal(state: State, command: str) -> str | None:
     return None
 
 
-class Repeats:
-    """Finds state commands that are delivered twice.
-
-    They are latched, so a client that connects again delivers its last one again.
-    """
-
-    def __init__(self) -> None:
-        self.state = np.zeros((REMEMBERED_COMMANDS, 3))
-        """Stamps (s, ns) and checksums of the last commands that were executed, the newest first."""
+class Repeats(RememberedCommands):
+    """Refuses state commands that were executed before."""
 
     def refusal(self, message: StringStamped) -> str | None:
-        """Return why a command is refused that was executed before; otherwise remember it and return None.
-
-        A command without a stamp is always new.
-        """
+        """Return why a command is refused that was executed before; otherwise remember it and return None."""
         stamp = message.header.stamp
-        if not (stamp.sec or stamp.nanosec):
+        if not self.is_repeated(stamp.sec, stamp.nanosec, message.string):
             return None
-        mark = np.array([stamp.sec, stamp.nanosec, crc32(message.string.encode())], np.float64)
-        if (self.state == mark).all(axis=1).any():
-            return (
-                f"state_command '{message.string}' of time {stamp.sec}.{stamp.nanosec:09d} s is refused: it"
-                " was executed before; a new one has a new stamp"
-            )
-        self.state[1:] = self.state[:-1].copy()
-        self.state[0] = mark
-        return None
+        return (
+            f"state_command '{message.string}' of time {stamp.sec}.{stamp.nanosec:09d} s is refused: it"
+            " was executed before; a new one has a new stamp"
+        )

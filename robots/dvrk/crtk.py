@@ -43,8 +43,6 @@ __all__ = [
     "MTM_EVENTS",
     "PSM_COMMANDS",
     "PSM_EVENTS",
-    "REMEMBERED_COMMANDS",
-    "REPEAT_NS",
     "SETTINGS",
     "SETUP_JOINT_COMMANDS",
     "SETUP_JOINT_EVENTS",
@@ -187,11 +185,6 @@ Mounting = Literal["free", "cart"]
 """How arms stand: each by itself, or on the setup joints of the cart, whose frame is then the world."""
 Reference = Literal["camera", "base", "world"]
 """What the Cartesian states and commands of an arm refer to."""
-
-REMEMBERED_COMMANDS = 8
-"""State commands that an arm remembers, to refuse a second delivery; no more clients command one arm."""
-REPEAT_NS = 2_000_000_000
-"""ns before a refusal in the same words is reported again (mtsIntuitiveResearchKitArm.cpp, ArmIsReady)."""
 
 
 def base_frame(arm: str) -> str:

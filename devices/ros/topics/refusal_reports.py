@@ -7,16 +7,19 @@ import threading
 from collections.abc import Callable
 from time import monotonic_ns
 
+import numpy as np
+
 from devices.ros.topics.row import Row
-from robots.dvrk.crtk import REPEAT_NS
+from robots.dvrk.repeats import is_recent, refusals_to_report
 from schemas.ros import StringMessage
+from schemas.vectors import Vector
 
 __all__ = ["RefusalReports"]
 
 log = logging.getLogger(__name__)
 
 _MOST = 8
-"""Different texts reported of one topic within that time: a client may have a new error each time."""
+"""Different words reported of one topic within that time: a client may have a new error each time."""
 
 
 class RefusalReports:
@@ -25,8 +28,8 @@ class RefusalReports:
     def __init__(self, name: str, publish: Callable[[str, StringMessage], None]) -> None:
         """`name`: the gateway's; `publish`: publishes a text on a port (`PSM1/warning`), if it exists."""
         self._name, self._publish = name, publish
-        self._recent: dict[str, dict[str, tuple[int, int]]] = {}
-        """By topic and text: when it was reported last (ns), and how often it was suppressed since."""
+        self._recent: dict[str, dict[str, Vector]] = {}
+        """By topic and words: the last report of a refusal, as `refusals_to_report` has it."""
         self._counting = threading.Lock()
 
     def report(self, row: Row, level: str, reason: str) -> None:
@@ -35,24 +38,20 @@ class RefusalReports:
         `level`: `error` if the message is invalid, `warning` if it is not allowed now.
         """
         with self._counting:
-            suppressed = self._suppressed(row, f"{level} {reason}")
-        if suppressed is None:
+            count = self._to_report(row, f"{level} {reason}")
+        if not count:
             return
-        text = f"{row.name} refused: {reason}" + (f" ({suppressed + 1} times)" if suppressed else "")
+        text = f"{row.name} refused: {reason}" + (f" ({count} times)" if count > 1 else "")
         log.warning("device '%s': %s: %s", self._name, row.owner, text)
         self._publish(f"{row.owner}/{level}", StringMessage(data=f"{row.owner}: {text}"))
 
-    def _suppressed(self, row: Row, text: str) -> int | None:
-        """Return how often the same text was suppressed since its last report; None to suppress it now."""
+    def _to_report(self, row: Row, words: str) -> int:
+        """Return how often the same refusal occurred since its last report; 0 while it is not reported."""
         now_ns, recent = monotonic_ns(), self._recent.setdefault(row.topic, {})
-        reported_ns, count = recent.get(text, (now_ns - REPEAT_NS, 0))
-        if now_ns - reported_ns < REPEAT_NS:
-            recent[text] = reported_ns, count + 1
-            return None
-        if text not in recent:
-            for old in [t for t, (ns, _) in recent.items() if now_ns - ns >= REPEAT_NS]:
+        if words not in recent:
+            for old in [one for one, last in recent.items() if not is_recent(last, now_ns)]:
                 del recent[old]
             if len(recent) >= _MOST:
-                return None
-        recent[text] = now_ns, 0
-        return count
+                return 0
+            recent[words] = np.zeros(3)
+        return refusals_to_report(recent[words], words, now_ns)
