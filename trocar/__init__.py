@@ -46,8 +46,8 @@ if TYPE_CHECKING:
         restore_arrays,
         state_hash,
     )
-    from hub.recording.bag_output import write_bag
     from hub.recording.recording import Recording
+    from hub.recording.ros_bag_writer import write_bag
     from hub.recording.series import Series
     from hub.testing import check_device, check_engine, run_in_process
     from hub.verify import VerifySummary
@@ -108,7 +108,7 @@ _MODULES = {
         "restore_arrays",
         "state_hash",
     ),
-    "hub.recording.bag_output": ("write_bag",),
+    "hub.recording.ros_bag_writer": ("write_bag",),
     "hub.recording.recording": ("Recording",),
     "hub.recording.series": ("Series",),
     "hub.testing": ("check_device", "check_engine", "run_in_process"),

@@ -1,1 +1,1 @@
-"""Everything that reads or writes recordings."""
+"""Everything that reads or writes recordings and ROS bags."""

@@ -1,7 +1,8 @@
-"""Writes a rosbag2 directory (MCAP, profile ros2), as `ros2 bag play` reads it."""
+"""Writes rosbag2 directories (MCAP, profile ros2), as `ros2 bag play` reads them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from shutil import rmtree
 from types import TracebackType
@@ -18,10 +19,11 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer, WriterError
 
-from schemas.codec import typestore
+from schemas.codec import encode, typestore
 from schemas.errors import RecordingError
+from schemas.message import Message
 
-__all__ = ["BagWriter"]
+__all__ = ["BagWriter", "write_bag"]
 
 _METADATA_VERSION = 9
 """As ROS 2 Jazzy writes it."""
@@ -37,8 +39,7 @@ class BagWriter:
         self.directory, self.messages = directory, 0
         self._connections: dict[str, Connection] = {}
         try:
-            self._writer = Writer(directory, version=_METADATA_VERSION, storage_plugin=StoragePlugin.MCAP)
-            self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+            self._writer = _new_writer(directory)
             self._writer.open()
         except WriterError as error:
             raise RecordingError(
@@ -89,6 +90,38 @@ class BagWriter:
         else:
             self._writer.abort()
             rmtree(self.directory, ignore_errors=True)  # without its metadata no program can read it
+
+
+def write_bag(directory: str | Path, rows: Iterable[tuple[str, int, Message]]) -> None:
+    """Write messages as a new rosbag2 directory (MCAP), which `scripted`, `ros-bag` and ROS tools play.
+
+        trocar.write_bag("hand", [("/pose", 0, PoseStamped()), ("/pose", 4_000_000, PoseStamped())])
+
+    Args:
+        directory: It must not exist.
+        rows: Topic, time (ns) and message, oldest first. Topics keep one type.
+
+    Raises:
+        RecordingError: The directory exists or cannot be written.
+    """
+    connections: dict[str, Connection] = {}
+    try:
+        with _new_writer(Path(directory)) as writer:
+            for topic, time_ns, message in rows:
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, message.ros_type, typestore=typestore())
+                writer.write(connections[topic], time_ns, encode(message))
+    except WriterError as error:
+        raise RecordingError(f"cannot write the bag '{directory}': {error}; name a new directory") from error
+    except OSError as error:
+        raise RecordingError(f"cannot write the bag '{directory}': {error.strerror}") from error
+
+
+def _new_writer(directory: Path) -> Writer:
+    """Return the writer of a new directory. Raises WriterError if it exists."""
+    writer = Writer(directory, version=_METADATA_VERSION, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    return writer
 
 
 def _quality(*, latched: bool) -> Qos:

@@ -8,11 +8,11 @@ from typing import Any, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from devices.ros.bags.bag import BagTopic, RosBag
 from devices.ros.params import GatewayParams, TopicParams
 from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.row import Row
 from devices.ros.topics.vrep_table import vrep_table
+from hub.recording.ros_bag_reader import BagTopic, RosBag
 from schemas.errors import RecordingError, did_you_mean
 from schemas.quantity import Duration
 

@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
-from devices.ros.bags.bag import RosBag
 from devices.ros.bags.params import BagParams, listed
 from devices.ros.topics.row import Row
 from devices.ros.topics.state_commands import RepeatedStateCommands
 from devices.ros.topics.validation import as_signal, validate
 from devices.samples import Playback, clock_of, stamp_of, stamped
 from hub.participant import Device, Sample
+from hub.recording.ros_bag_reader import RosBag
 from hub.transport.refusals import Refusals
 from schemas.codec import message_type, validated
 from schemas.errors import MessageError
