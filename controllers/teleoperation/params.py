@@ -6,11 +6,12 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from controllers.motion.params import Arms
 from controllers.teleoperation.contact_model import ForceParams, PlanesParams
 from hub.participant import Params
 from robots.dvrk import ecm, psm
-from robots.dvrk.mounted import PsmTool
-from robots.dvrk.parameters import ArmName, MountedPositions, UnitQuaternion, home
+from robots.dvrk.mounted import DEFAULT_INSTRUMENT, PsmTool
+from robots.dvrk.parameters import ArmName, InstrumentName, MountedPositions, UnitQuaternion, home
 from schemas.quantity import Angle, Duration
 
 __all__ = ["Buttons", "TeleoperationParams"]
@@ -18,6 +19,13 @@ __all__ = ["Buttons", "TeleoperationParams"]
 
 def _orientation(data: dict[str, Any]) -> str:
     return "follow" if data.get("law") == "velocity" else "hold"
+
+
+def _held(data: dict[str, Any]) -> str:
+    """Return what the led arm holds by `arms`, where they name it."""
+    arms: Arms | None = data["arms"]
+    led = None if arms is None else arms.driven.get(data["arm"])
+    return led.instrument if isinstance(led, PsmTool) else DEFAULT_INSTRUMENT
 
 
 class Buttons(Params):
@@ -36,10 +44,25 @@ class Buttons(Params):
     )
 
 
-class TeleoperationParams(PsmTool, Params):
+class _LedArm(Params):
+    """Which arm is led; a base, so that the arms are validated before what is taken from them."""
+
+    arms: Arms | None = Field(
+        default=None, description="as in the motion controller; they say what the led arm holds"
+    )
+    arm: ArmName = "PSM1"
+
+
+class TeleoperationParams(PsmTool, _LedArm):
     """How a hand leads an arm; the fingers of a hand that it may hold stay folded."""
 
-    arm: ArmName = "PSM1"
+    instrument: InstrumentName = Field(
+        default_factory=_held,
+        description=(
+            "what the arm holds: name or number, such as 400006; default: as in `arms`, without them"
+            f" {DEFAULT_INSTRUMENT}"
+        ),
+    )
     start: MountedPositions = Field(
         default_factory=home,
         description=f"the command until measured_js is there: {', '.join(psm.JOINT_NAMES)}",
@@ -110,6 +133,23 @@ class TeleoperationParams(PsmTool, Params):
     max_age: Duration = Field(
         default=100_000_000, gt=0, description="the arm holds when the master has been silent for longer"
     )
+
+    @model_validator(mode="after")
+    def _holds_what_the_arms_say(self) -> Self:
+        if self.arms is None:
+            return self
+        led = self.arms.driven.get(self.arm)
+        if isinstance(led, PsmTool) and led.instrument != self.instrument:
+            raise ValueError(
+                f"instrument '{self.instrument}', but in `arms` {self.arm} holds '{led.instrument}'; state it"
+                " once, in `arms`"
+            )
+        if led is None and "instrument" not in self.model_fields_set:
+            raise ValueError(
+                f"`arms` has {', '.join(self.arms.driven)} and not {self.arm}, which the hand leads; add it"
+                " there, or set `arm`"
+            )
+        return self
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -17,7 +17,7 @@ from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
 from schemas.keys import valid_name
-from schemas.quantity import Duration, Length
+from schemas.quantity import Duration
 
 __all__ = [
     "EcmParams",
@@ -31,13 +31,8 @@ __all__ = [
 ]
 
 
-class PsmParams(MountedPsm):
-    """A patient-side manipulator: what it holds and where it starts."""
-
-    probe_radius: Length = Field(
-        default=5e-3, gt=0.0, description="radius of the sphere of a palpation probe"
-    )
-
+PsmParams = MountedPsm
+"""A patient-side manipulator: what it holds and where it starts."""
 
 EcmParams = MountedEcm
 """The endoscope camera manipulator."""

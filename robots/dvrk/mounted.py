@@ -11,6 +11,7 @@ from typing import Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from robots.dvrk import ecm, psm
+from robots.dvrk.inertia import PROBE_RADIUS
 from robots.dvrk.instruments import Instrument, instrument
 from robots.dvrk.parameters import (
     FOLDED,
@@ -25,7 +26,9 @@ from robots.dvrk.parameters import (
 from robots.serial_chain import SerialChain
 from schemas.quantity import Angle, Length
 
-__all__ = ["MountedArm", "MountedEcm", "MountedPsm", "PsmTool"]
+__all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedEcm", "MountedPsm", "PsmTool"]
+
+DEFAULT_INSTRUMENT = "palpation-probe"
 
 
 class MountedArm(BaseModel):
@@ -48,7 +51,7 @@ class PsmTool(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     instrument: InstrumentName = Field(
-        default="palpation-probe", description="what the arm holds: name or number, such as 400006"
+        default=DEFAULT_INSTRUMENT, description="what the arm holds: name or number, such as 400006"
     )
     start: MountedPositions = Field(
         default_factory=home,
@@ -80,6 +83,9 @@ class PsmTool(BaseModel):
 class MountedPsm(PsmTool, MountedArm):
     """A patient-side manipulator: where it stands, what it holds and where it starts."""
 
+    probe_radius: Length = Field(
+        default=PROBE_RADIUS, gt=0.0, description="radius of the sphere of a palpation probe"
+    )
     hand: HandPositions = Field(
         default=FOLDED,
         description="closings, then spreads, of a hand's fingers at time 0; default: folded",

@@ -12,6 +12,15 @@ name: pick_by_hand
 step: 2 ms
 duration: 2 s
 pace: fast
+scene:
+  # As in the scenario `pick` the arm starts 19.5 mm above the needle: the tip at [60, 0, -170] mm of its
+  # base, pointing down.
+  arms:
+    PSM1:
+      instrument: "400006"
+      position: [-60 mm, 0 mm, 200 mm]
+      jaw: 15 deg
+      start: [0.3392926, 0, 186.77756 mm, 0, 0, -0.3392926]
 participants:
   stylus:
     kind: simulated-touch
@@ -23,17 +32,9 @@ participants:
           - {at: 0.6 s, buttons: [0, 1]}
           - {at: 1.4 s}
           - {at: 1.8 s, position: [0 mm, 0 mm, 1 mm]}
-  # As in the scenario `pick` the arm starts 19.5 mm above the needle: the tip at [60, 0, -170] mm of its
-  # base, pointing down.
-  teleop: {kind: teleoperation, engage: held, scale: 0.5, instrument: "400006"}
+  teleop: {kind: teleoperation, engage: held, scale: 0.5}
   robot:
     kind: mujoco
-    arms:
-      PSM1:
-        instrument: "400006"
-        position: [-60 mm, 0 mm, 200 mm]
-        jaw: 15 deg
-        start: [0.3392926, 0, 186.77756 mm, 0, 0, -0.3392926]
     table: {position: [0 mm, 0 mm, 0 mm], size: [200 mm, 150 mm, 10 mm]}
     objects:
       needle: {kind: needle, position: [11.44 mm, 0 mm, 0.4 mm], orientation: [0, 0, 1, 0]}
