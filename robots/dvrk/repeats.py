@@ -38,7 +38,7 @@ class RememberedCommands:
         Args:
             sec: stamp of the command, s.
             nanosec: the rest of its stamp, ns.
-            text: what is commanded, where commands of the same stamp are told apart.
+            text: what is commanded, where commands of the same stamp may differ.
         """
         if not (sec or nanosec):
             return False
