@@ -12,7 +12,7 @@ from hub.planning.plan import Plan
 __all__ = ["Watchdog"]
 
 _PERIOD_S = 0.02
-"""Between two checks: the end of a process is reported within 100 ms, with a wide margin."""
+"""Between two looks at the answers; the end of a process is noticed at once."""
 
 
 class Watchdog:
@@ -38,7 +38,7 @@ class Watchdog:
         self._awaited, self._failed = awaited, failed
         self._waiting: Sequence[str] = ()
         self._since_ns = 0
-        self._ending = threading.Event()
+        self._ending = False
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self._thread.start()
 
@@ -51,9 +51,10 @@ class Watchdog:
         self._waiting = participants
 
     def _run(self) -> None:
-        while not self._ending.wait(_PERIOD_S):
+        while not self._ending:
+            self._processes.wait(_PERIOD_S)
             failure = self._ended_process() or self._late_answer()
-            if failure is not None:
+            if failure is not None and not self._ending:
                 self._failed(*failure)
                 return
 
@@ -80,5 +81,6 @@ class Watchdog:
 
     def end(self) -> None:
         """Stop watching."""
-        self._ending.set()
+        self._ending = True
+        self._processes.wake()
         self._thread.join()

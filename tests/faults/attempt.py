@@ -54,11 +54,14 @@ class Fault:
     delay_s: float
     pause_s: float = 0.0
     long_step: bool = False
-    """The part computes for LONG_STEP_MS when it happens, and keeps the interpreter lock."""
+    """The engine's host computes for LONG_STEP_MS when it happens, and keeps the interpreter lock."""
+    stopped: bool = False
+    """The engine's host is stopped when the hub is killed."""
 
     def __str__(self) -> str:
         long = ", in a long step" if self.long_step else ""
-        return f"{self.action} {self.part}, {self.moment} + {1e3 * self.delay_s:.0f} ms{long}"
+        stopped = ", with its host stopped" if self.stopped else ""
+        return f"{self.action} {self.part}, {self.moment} + {1e3 * self.delay_s:.0f} ms{long}{stopped}"
 
     @property
     def ends_session(self) -> bool:
@@ -105,7 +108,9 @@ def fault_of(source: random.Random) -> Fault:
     if action == "stop" and part in (DEVICE, REMOTE):
         action = "pause"
     long_step = part in ("hub", "host one") and moment == "run" and source.random() < 0.25
-    return Fault(part, action, moment, source.random() * longest_s, 0.05 + 0.25 * source.random(), long_step)
+    stopped = part == "hub" and action == "kill" and moment != "close" and not long_step and source.random() < 0.3
+    pause_s = 0.05 + 0.25 * source.random()
+    return Fault(part, action, moment, source.random() * longest_s, pause_s, long_step, stopped)
 
 
 def attempt(mark: str, fault: Fault, directory: Path) -> Result:
@@ -199,10 +204,15 @@ class Running:
         if fault.moment != "birth":
             self._until((self.directory / "running").exists, "the first step")
         process = None if fault.part == "link" else self._until(lambda: self._find(fault.part), fault.part)
+        if fault.part == "hub" and fault.moment == "birth":  # of its first host: before, there is no session
+            self._until(lambda: self._find(ENGINES[0]), ENGINES[0])
         if fault.moment == "close":
             self.hub.terminate()
         sleep(fault.delay_s)
         self.lanes |= lanes(living(self.mark))
+        host = self._find(ENGINES[0]) if fault.stopped else None
+        if host is not None:
+            os.kill(host.pid, signal.SIGSTOP)
         began = time()
         if process is not None:
             self._send(process, fault)

@@ -8,12 +8,16 @@ def test_hosts_may_be_started_while_the_watchdog_checks_processes(monkeypatch):
     class Process:
         """Lives, and lets another host start at the very moment it is looked at."""
 
-        returncode = None
+        stdin = None
 
         def __init__(self, *_, **__):
             pass
 
-        def poll(self):
+        def wait(self):
+            pass
+
+        @property
+        def returncode(self):
             if "two" not in started:
                 started.append("two")
                 processes.start("two", "tcp/127.0.0.1:1", "session")
