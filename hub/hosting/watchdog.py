@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Sequence
 from time import monotonic_ns
@@ -10,6 +11,8 @@ from hub.hosting.host_processes import HostProcesses
 from hub.planning.plan import Plan
 
 __all__ = ["Watchdog"]
+
+log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.02
 """Between two looks at the answers; the end of a process is noticed at once."""
@@ -55,6 +58,8 @@ class Watchdog:
             self._processes.wait(_PERIOD_S)
             failure = self._ended_process() or self._late_answer()
             if failure is not None and not self._ending:
+                # at once: the main thread may be in a call that nothing interrupts
+                log.error("participant '%s': %s", *failure)
                 self._failed(*failure)
                 return
 

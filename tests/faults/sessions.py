@@ -66,14 +66,21 @@ def show(case: str, result: Result, took_s: float) -> None:
 
 
 def summary(results: list[Result]) -> int:
-    named = sorted(r.named_ms for r in results if r.named_ms is not None and r.fault.action == "kill" and r.fault.is_named)
+    named = sorted(
+        r.named_ms
+        for r in results
+        if r.named_ms is not None and r.fault.action == "kill" and r.fault.is_named
+    )
     outlived = sorted(r.outlived_ms for r in results)
     bad = sum(1 for r in results if r.problems)
+
     def at(values, q):
         return f"{values[min(int(q * len(values)), len(values) - 1)]:.0f}" if values else "-"
+
     sys.stdout.write(
-        f"{len(results)} attempts, {bad} with problems; kills named after p50 {at(named, .5)}, p90 {at(named, .9)}, max {at(named, 1)} ms ({len(named)});"
-        f" outlived max {at(outlived, 1)} ms; load {os.getloadavg()}\n")
+        f"{len(results)} attempts, {bad} with problems; kills named after p50 {at(named, 0.5)}, p90 {at(named, 0.9)}, max {at(named, 1)} ms ({len(named)});"
+        f" outlived max {at(outlived, 1)} ms; load {os.getloadavg()}\n"
+    )
     return 1 if bad else 0
 
 
