@@ -1,79 +1,79 @@
-"""What a session has on its machine: processes, abstract sockets, shared memory; Linux only."""
+"""What a session has on its machine: processes, abstract sockets, shared memory. Linux only."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["MARK", "Process", "lanes", "living", "segments"]
+__all__ = ["MARK", "Process", "held", "living", "remaining"]
 
 MARK = "TROCAR_FAULTS"
 """An environment variable that all processes of an attempt have, also those whose parent has ended."""
 
 _MODULES = {
-    "hub.hosting.host_process": "host",
     "hub.security.gate_process": "gate",
     "devices.openhaptics.servo": "servo",
     "devices.openhaptics.watcher": "watcher",
 }
 
 
+@dataclass(frozen=True)
 class Process:
     """A living process of an attempt."""
 
-    def __init__(self, pid: int, command: list[str], started: int) -> None:
-        self.pid, self.command, self.started = pid, command, started
+    pid: int
+    command: tuple[str, ...]
 
     @property
     def part(self) -> str:
-        """`hub`, `host NAME`, `device NAME`, `servo`, `watcher`, `gate`, or the command."""
+        """`hub`, `host NAME`, `device NAME`, `gate`, `servo`, `watcher`, or the command of another one."""
         words = self.command
-        for module, part in _MODULES.items():
-            if module in words:
-                return f"{part} {words[words.index('--host') + 1]}" if part == "host" else part
+        if "hub.hosting.host_process" in words:
+            return f"host {words[words.index('--host') + 1]}"
         if "hub.command_line" in words:
-            verb = words[words.index("hub.command_line") + 1]
-            return "hub" if verb == "run" else f"{verb} {words[words.index(verb) + 1]}"
-        return " ".join(words) or "a process without a command"
+            verb, name = words[words.index("hub.command_line") + 1 :][:2]
+            return "hub" if verb == "run" else f"{verb} {name}"
+        return next((part for module, part in _MODULES.items() if module in words), " ".join(words))
 
 
-def living(mark: str) -> dict[str, Process]:
-    """Return the living processes whose environment has `MARK=mark`, by part; zombies are left out."""
-    wanted, found = f"{MARK}={mark}".encode(), dict[str, Process]()
-    for pid in _pids():
+def living(mark: str) -> list[Process]:
+    """Return the living processes whose environment has `MARK=mark`; zombies are left out."""
+    wanted, found = f"{MARK}={mark}".encode(), list[Process]()
+    for folder in _processes():
         with suppress(OSError):  # it has ended meanwhile
-            if wanted not in Path(f"/proc/{pid}/environ").read_bytes().split(b"\0"):
-                continue
-            command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")[:-1]
-            if command:
-                process = Process(pid, command, 0)
-                found[process.part] = process
-    return found
+            if wanted in (folder / "environ").read_bytes().split(b"\0"):
+                command = (folder / "cmdline").read_bytes().decode().split("\0")[:-1]
+                found.append(Process(int(folder.name), tuple(command)))
+    return [process for process in found if process.command]
 
 
-def _pids() -> Iterator[int]:
-    return (int(name) for name in os.listdir("/proc") if name.isdecimal())
+def _processes() -> Iterator[Path]:
+    return (folder for folder in Path("/proc").iterdir() if folder.name.isdecimal())
 
 
-def lanes(processes: Mapping[str, Process]) -> set[str]:
-    """Return the abstract sockets that `processes` hold, by inode and name."""
-    inodes: set[str] = set()
-    for process in processes.values():
+def held(mark: str) -> set[str]:
+    """Return the abstract sockets and the named shared memory that the processes of an attempt have now."""
+    inodes, names = set[str](), set[str]()
+    for process in living(mark):
+        folder = Path(f"/proc/{process.pid}")
         with suppress(OSError):
-            for file in Path(f"/proc/{process.pid}/fd").iterdir():
+            for file in (folder / "fd").iterdir():
                 with suppress(OSError):
-                    inodes.add(os.readlink(file).removeprefix("socket:[").removesuffix("]"))
-    return {lane for lane in abstract_sockets() if lane.split()[0] in inodes}
+                    inodes.add(os.fspath(file.readlink()).removeprefix("socket:[").removesuffix("]"))
+            names |= {line.split()[-1] for line in (folder / "maps").read_text().splitlines()}
+    sockets = {socket for socket in _abstract_sockets() if socket.partition(" ")[0] in inodes}
+    return sockets | {name for name in names if name.startswith("/dev/shm/")}
 
 
-def abstract_sockets() -> set[str]:
-    """Return all abstract sockets of this machine, by inode and name."""
-    rows = (line.split() for line in Path("/proc/net/unix").read_text(encoding="utf-8").splitlines()[1:])
+def remaining(things: set[str]) -> set[str]:
+    """Return those of `things`, as `held` has found them, that are still there."""
+    files = {thing for thing in things if thing.startswith("/") and Path(thing).exists()}
+    return files | (things & _abstract_sockets())
+
+
+def _abstract_sockets() -> set[str]:
+    rows = (line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:])
     return {f"{row[6]} {row[7]}" for row in rows if len(row) > 7 and row[7].startswith("@")}
-
-
-def segments() -> set[str]:
-    """Return the shared memory that Zenoh and Python's multiprocessing have on this machine."""
-    return {path.name for pattern in ("*.zenoh", "psm_*") for path in Path("/dev/shm").glob(pattern)}

@@ -3,6 +3,7 @@ import select
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -37,17 +38,17 @@ def test_a_process_ends_with_a_parent_that_is_killed(doing):
     command = [sys.executable, "-c", PARENT, CHILD, doing]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as parent:
         child = int(parent.stdout.readline())
+        handle = os.pidfd_open(child)
         try:
             assert parent.stdout.readline() == b"\n"
             if doing == "stopped":
                 os.kill(child, signal.SIGSTOP)
-            handle = os.pidfd_open(child)
             parent.kill()
             parent.wait()
             assert _ended(handle)
         finally:
             parent.kill()
-            if os.path.exists(f"/proc/{child}"):
+            with suppress(ProcessLookupError):
                 signal.pidfd_send_signal(handle, signal.SIGKILL)
             os.close(handle)
 
