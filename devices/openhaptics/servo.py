@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from ctypes import c_double
 from pathlib import Path
 from time import sleep
@@ -80,11 +81,12 @@ def _output() -> Say:
 
     Libraries may write to the standard output, which is redirected to the standard error.
     """
-    stream = os.fdopen(os.dup(1), "w", buffering=1)
+    stream = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)
 
     def say(message: Mapping[str, Any]) -> None:
-        stream.write(json.dumps(message) + "\n")
+        with suppress(BrokenPipeError):  # the device's process has ended, and so has the input
+            stream.write(json.dumps(message).encode() + b"\n")
 
     return say
 
@@ -97,7 +99,10 @@ def main() -> NoReturn:
     """Serve until the input ends."""
     signal.signal(signal.SIGTERM, _terminate)
     say = _output()
-    config = json.loads(sys.stdin.readline())
+    first = sys.stdin.readline()
+    if not first:  # the device's process has ended before it could send it
+        sys.exit()
+    config = json.loads(first)
     memory = memoryview(attach(config["memory"], memory_size(len(config["styluses"]))))
     try:
         hd = load(Path(config["library"]))

@@ -42,7 +42,7 @@ def engine(
     certs: Certificates = None,
 ) -> None:
     """Host one engine or controller here, for a session whose hub runs elsewhere."""
-    from hub.hosting.host_process import run_host
+    from hub.hosting.joining import run_host
 
     run_host(connect, session, f"remote/{name}", directory=directory, certificates=certs)
 
@@ -59,6 +59,6 @@ def device(
 
     It joins again when the hub returns, until it is stopped.
     """
-    from hub.hosting.host_process import run_device
+    from hub.hosting.joining import run_device
 
     run_device(connect, session, name, directory=directory, certificates=certs)

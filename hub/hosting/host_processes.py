@@ -7,9 +7,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from time import monotonic
 
 from hub.hosting.blas import pin_blas
+from hub.hosting.end_with_parent import NEEDS_INPUT
 
 __all__ = ["HostProcesses"]
 
@@ -20,18 +22,28 @@ _END_S = 3.0
 
 
 class HostProcesses:
-    """The host processes that the hub has started."""
+    """The host processes that the hub has started.
+
+    A thread waits for the end of each, so that it is known at once, on every system.
+    """
 
     def __init__(self) -> None:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._waiting: dict[str, threading.Thread] = {}
+        self._changed = threading.Event()
 
     def start(self, host: str, endpoint: str, session: str) -> None:
-        """Start host `host`. It joins over `endpoint`; what it prints goes to stderr."""
+        """Start host `host`. It joins over `endpoint`; what it prints goes to stderr.
+
+        It ends when the calling thread does: on Linux that thread is its parent.
+        """
         command = [
             sys.executable,
             "-P",
             "-m",
             "hub.hosting.host_process",
+            "--hub",
+            str(os.getpid()),
             "--connect",
             endpoint,
             "--session",
@@ -43,32 +55,50 @@ class HostProcesses:
         pin_blas(environment)
         process = subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if NEEDS_INPUT else subprocess.DEVNULL,
             stdout=sys.stderr.fileno(),
             env=environment,
             start_new_session=True,
         )
         # a new dictionary: the watchdog's thread may be iterating over the old one
         self._processes = {**self._processes, host: process}
+        self._waiting[host] = threading.Thread(
+            target=self._wait, args=(process,), name=f"end of host {host}", daemon=True
+        )
+        self._waiting[host].start()
+
+    def _wait(self, process: subprocess.Popen[bytes]) -> None:
+        process.wait()
+        self._changed.set()
 
     def dead(self) -> dict[str, str]:
         """Return, for each host whose process has ended, how it ended."""
         return {
             host: _how(process.returncode)
             for host, process in self._processes.items()
-            if process.poll() is not None
+            if process.returncode is not None
         }
+
+    def wait(self, limit_s: float) -> None:
+        """Wait until a process ends or `wake` is called, at most `limit_s`."""
+        if self._changed.wait(limit_s):
+            self._changed.clear()
+
+    def wake(self) -> None:
+        """Make `wait` return, in another thread."""
+        self._changed.set()
 
     def end(self) -> None:
         """Wait for the hosts, which end once the hub's token is gone; kill those that do not."""
         deadline = monotonic() + _END_S
         for host, process in self._processes.items():
-            try:
-                process.wait(max(deadline - monotonic(), 0.0))
-            except subprocess.TimeoutExpired:
+            self._waiting[host].join(max(deadline - monotonic(), 0.0))
+            if process.returncode is None:
                 log.warning("host '%s' (pid %d) does not end: killing it", host, process.pid)
                 process.kill()
-                process.wait()
+                self._waiting[host].join()
+            if process.stdin is not None:
+                process.stdin.close()
 
 
 def _how(code: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Sequence
 from time import monotonic_ns
@@ -11,8 +12,10 @@ from hub.planning.plan import Plan
 
 __all__ = ["Watchdog"]
 
+log = logging.getLogger(__name__)
+
 _PERIOD_S = 0.02
-"""Between two checks: the end of a process is reported within 100 ms, with a wide margin."""
+"""Between two looks at the answers; the end of a process is noticed at once."""
 
 
 class Watchdog:
@@ -38,7 +41,7 @@ class Watchdog:
         self._awaited, self._failed = awaited, failed
         self._waiting: Sequence[str] = ()
         self._since_ns = 0
-        self._ending = threading.Event()
+        self._ending = False
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self._thread.start()
 
@@ -51,9 +54,12 @@ class Watchdog:
         self._waiting = participants
 
     def _run(self) -> None:
-        while not self._ending.wait(_PERIOD_S):
+        while not self._ending:
+            self._processes.wait(_PERIOD_S)
             failure = self._ended_process() or self._late_answer()
-            if failure is not None:
+            if failure is not None and not self._ending:
+                # at once: the main thread may be in a call that nothing interrupts
+                log.error("participant '%s': %s", *failure)
                 self._failed(*failure)
                 return
 
@@ -80,5 +86,6 @@ class Watchdog:
 
     def end(self) -> None:
         """Stop watching."""
-        self._ending.set()
+        self._ending = True
+        self._processes.wake()
         self._thread.join()

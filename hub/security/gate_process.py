@@ -36,7 +36,10 @@ _LATER_S = 0.3
 
 def main() -> None:
     """Run a gate until the input is closed; exit code 1 if it cannot listen."""
-    orders: dict[str, Any] = json.loads(sys.stdin.readline())
+    first = sys.stdin.readline()
+    if not first:  # the hub has ended before it could send it
+        sys.exit(1)
+    orders: dict[str, Any] = json.loads(first)
     answers, zenohs_log = _split_outputs()
     os.environ["RUST_LOG"] = LOG_FILTER
     zenoh.init_log_from_env_or("error")
@@ -83,10 +86,11 @@ class _Reporter:
             with self._lock:
                 now = int(monotonic())
                 self._second, self._count = now, self._count + 1 if now == self._second else 1
-                if self._count < _MOST_PER_SECOND:
-                    self._answers.write(f"{level} {message}\n")
-                elif self._count == _MOST_PER_SECOND:
-                    self._answers.write(f"{logging.WARNING} more reports in this second are left out\n")
+                if self._count == _MOST_PER_SECOND:
+                    level, message = logging.WARNING, "more reports in this second are left out"
+                if self._count <= _MOST_PER_SECOND:
+                    with suppress(BrokenPipeError):  # the hub is gone, and this process ends with its input
+                        self._answers.write(f"{level} {message}\n")
 
 
 _Report = Callable[[Iterable[tuple[int, str]]], None]

@@ -5,6 +5,7 @@ In wall time: each wait ends as soon as it can.
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from devices.openhaptics.device import Touch
+from devices.openhaptics.exchange import create, memory_size
 from devices.openhaptics.hdapi import Code
 from devices.openhaptics.params import TouchParams
 from hub.participant import Sample
@@ -267,6 +269,31 @@ def test_the_host_is_killed_with_force_on_the_hands(library: Path, world: HdWorl
         # a tick may come late on a busy machine
         assert rows[force > 0.0, Row.TIME].max() - killed < 0.15 + rows[:, Row.GAP].max()
         assert np.diff(force).max() < 0.1 + 1e-9
+
+
+@pytest.mark.parametrize("configured", [False, True])
+def test_a_servo_process_whose_host_has_been_killed_while_it_starts(
+    library: Path, world: HdWorld, configured: bool
+) -> None:
+    """No process is left that it could report to; it ends without a traceback."""
+    memory, handle = create(memory_size(0))
+    with (
+        memory,
+        subprocess.Popen(
+            [sys.executable, "-P", "-m", "devices.openhaptics.servo"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            pass_fds=(handle,),
+        ) as process,
+    ):
+        os.close(handle)
+        process.stdout.close()
+        if configured:
+            orders = {"library": str(library), "memory": handle, "styluses": []}
+            process.stdin.write(json.dumps(orders).encode() + b"\n")
+        process.stdin.close()
+        assert (process.stderr.read(), process.wait(PATIENCE_S)) == (b"", 0)
 
 
 def _lift_and_press(world: HdWorld) -> None:

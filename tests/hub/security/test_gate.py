@@ -1,12 +1,14 @@
 """Who comes to the gate of a hub, what they are let do there, and what is told of those that are refused."""
 
+import json
 import logging
 import os
 import signal
 import socket
 import ssl
+import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from time import monotonic, sleep
 
 import pytest
@@ -427,6 +429,38 @@ def _opens(hub):
             return True
     except ConnectError:
         return False
+
+
+@pytest.mark.parametrize("listens", [False, True])
+def test_a_gate_whose_hub_is_killed_ends_without_a_traceback(tmp_path, listens):
+    """A connection that it would report closes meanwhile."""
+    port, inside = free_port(), free_endpoint()
+    security = Authority.founded(tmp_path).hub.listening() | access_settings(PLAN, "s")
+    orders = {"listen": [f"tls/127.0.0.1:{port}"], "connect": [inside], "security": security}
+    with (
+        open_session("router", listen=[inside]),
+        subprocess.Popen(
+            [sys.executable, "-P", "-m", "hub.security.gate_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        ) as gate,
+    ):
+        if listens:
+            gate.stdin.write(json.dumps(orders).encode() + b"\n")
+            gate.stdin.flush()
+            assert gate.stdout.readline() == b"open\n"
+        gate.stdout.close()
+        if listens:
+            for _ in range(3):
+                with socket.create_connection(("127.0.0.1", port)) as stranger, suppress(OSError):
+                    stranger.sendall(b"GET / HTTP/1.1\r\n\r\n")
+                    while stranger.recv(1000):
+                        pass
+            sleep(0.5)
+        gate.stdin.close()
+        assert gate.stderr.read() == b""
+        gate.wait(10)
 
 
 def test_a_gate_that_cannot_listen_says_so(tmp_path):

@@ -1,0 +1,39 @@
+"""Ends a process together with the one that has started it, however that one ends.
+
+Why not by Zenoh alone, as orderly ends are: docs/decisions/0039-ends-of-processes.md.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+
+__all__ = ["NEEDS_INPUT", "end_with_parent"]
+
+NEEDS_INPUT = sys.platform != "linux"
+"""Whether a process that calls `end_with_parent` needs a pipe from its parent as standard input."""
+
+_PR_SET_PDEATHSIG = 1
+"""Of prctl(2), as in linux/prctl.h."""
+
+
+def end_with_parent(parent: int) -> None:
+    """Let this process end when process `parent`, which has started it, ends.
+
+    On Linux the kernel kills it then, whatever it does: also while it is stopped, or in a call that keeps
+    Python's interpreter lock. Elsewhere a thread waits for the end of the input.
+    """
+    if NEEDS_INPUT:
+        threading.Thread(target=_end_with_input, name="parent", daemon=True).start()
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it had ended before
+        os._exit(1)
+
+
+def _end_with_input() -> None:
+    sys.stdin.buffer.read()
+    os._exit(1)
