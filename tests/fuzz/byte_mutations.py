@@ -49,6 +49,11 @@ def _at(data: bytes, source: random.Random) -> int:
     return source.randrange(len(data) + 1)
 
 
+def _times(part: bytes, source: random.Random) -> int:
+    """Return how often to repeat a part: a few or many times, up to some 200 kB."""
+    return min(source.choice([2, 3, 50, 5000]), 200_000 // max(len(part), 1) + 1)
+
+
 def bits(data: bytes, source: random.Random, _: Sequence[bytes]) -> bytes:
     """Flip a few bits."""
     spoilt = bytearray(data)
@@ -85,7 +90,7 @@ def repeat(data: bytes, source: random.Random, _: Sequence[bytes]) -> bytes:
     """Repeat a part, a few or many times."""
     at, size = _at(data, source), source.choice([1, 4, 16, 100, 1000])
     part = data[at : at + size]
-    return data[:at] + part * min(source.choice([2, 3, 50, 5000]), 200_000 // max(len(part), 1)) + data[at:]
+    return data[:at] + part * _times(part, source) + data[at:]
 
 
 def splice(data: bytes, source: random.Random, others: Sequence[bytes]) -> bytes:
@@ -124,7 +129,7 @@ def line(data: bytes, source: random.Random, others: Sequence[bytes]) -> bytes:
         case 0:
             del lines[at]
         case 1:
-            lines[at:at] = [lines[at]] * source.choice([1, 2, 3000])
+            lines[at:at] = [lines[at]] * _times(lines[at], source)
         case 2:
             lines.insert(to, lines.pop(at))
         case _:

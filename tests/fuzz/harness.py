@@ -60,8 +60,11 @@ class Tally:
     """Resident memory with inputs that are not mutated."""
     failed: list[str] = field(default_factory=list[str])
 
-    def enter(self, what: str, result: str, problem: str, seconds: float, kib: int) -> None:
-        """Count an input that took `seconds` of CPU time, in a process of up to `kib` so far."""
+    def enter(self, what: str, result: str, problem: str, seconds: float, kib: int) -> bool:
+        """Count an input that took `seconds` of CPU time, in a process of up to `kib` so far.
+
+        Return whether it took too much memory.
+        """
         megabytes = (kib - self.usual_kib) / 1024
         self.slowest = max(self.slowest, (seconds, what))
         self.largest = max(self.largest, (megabytes, what))
@@ -72,6 +75,7 @@ class Tally:
         self.outcomes["failed" if problem else result] += 1
         if problem:
             self.failed.append(f"{what}: {problem}")
+        return megabytes > LARGEST_MB
 
     def __str__(self) -> str:
         outcomes = ", ".join(f"{number} {name}" for name, number in sorted(self.outcomes.items()))
@@ -130,19 +134,20 @@ def _try_in_process(target: Target, cases: Sequence[str], directory: Path, tally
         os.close(reader)
         _try_all(target, cases, directory, writer)
     os.close(writer)
-    tried, what, pending = 0, "", True
+    tried, what, stopped = 0, "", False
     for kind, *values in _lines(reader, child):
         if kind == "what":
-            what, pending = values[0], True
+            what = values[0]
             continue
-        tally.enter(f"{cases[tried]}, {what}", *values)
-        tried, what, pending = tried + 1, "", False
-        if time.monotonic() > end:
+        large = tally.enter(f"{cases[tried]}, {what}", *values)
+        tried, what = tried + 1, ""
+        if large or time.monotonic() > end:  # the peak would be that of all further cases, too
+            stopped = True
             os.kill(child, signal.SIGKILL)
             break
     os.close(reader)
     _, status, used = os.wait4(child, 0)
-    if tried < len(cases) and (time.monotonic() < end or pending):
+    if tried < len(cases) and not stopped:
         how = f"the process ended with status {os.waitstatus_to_exitcode(status)}\n{_said(directory)}"
         tally.enter(f"{cases[tried]}, {what}", "failed", how, 0.0, used.ru_maxrss)
         tried += 1
