@@ -87,7 +87,7 @@ def _elements(description: bytes, source: random.Random, others: Sequence[bytes]
                 del element.attrib[source.choice(list(element.attrib))]
             case 4:
                 names.append("more elements")
-                element.extend([other] * source.choice([1, 2, 3000]))
+                element.extend([other] * source.choice([1, 2, 100]))
             case _:
                 names.append("no element")
                 if len(element):
@@ -106,7 +106,7 @@ def attempt(case: str, directory: Path, note: Note) -> None:
         label, description = change(description, source, others)
     if source.random() < 0.05:
         words = [word.decode("utf-8", "replace")[:5000] for word in source.choices(WORDS, k=2)]
-        names, label = (f"resources/{words[0]}", f"{words[1]} "), f"{label} names"
+        names, label = (f"resources/{words[0]}", f"x{words[1]}"), f"{label} names"
     data = _packed(model, description, names)
     if not label or source.random() < 0.1:
         change, data = mutated(data, source, [_packed(other, _description(other)) for other in MODELS])
