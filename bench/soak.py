@@ -33,6 +33,7 @@ from bench.soak_trends import COLUMNS, SESSION_COLUMNS, Sample, SessionSample, p
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.zenoh_session import open_session
 from schemas.codec import decode
+from schemas.errors import ConnectError
 from schemas.keys import Keys
 from schemas.trocar_msgs import SessionStatus
 from tests.devices.standins import build
@@ -190,7 +191,7 @@ def _reached(endpoint: str) -> Iterator[zenoh.Session]:
         try:
             session = open_session("client", connect=[endpoint])
             break
-        except zenoh.ZError:
+        except ConnectError:
             if monotonic() > end:
                 raise
             sleep(0.2)

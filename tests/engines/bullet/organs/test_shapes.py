@@ -369,7 +369,8 @@ def test_a_file_without_tetrahedra_is_refused(tmp_path, content, expected):
     "content",
     [
         f"# vtk DataFile Version 2.0\nx\nASCII\nDATASET {'x' * 30_000}\n",
-        f"# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 {'x' * 30_000} 0\n",
+        f"# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n"
+        f"0 {'x' * 30_000} 0\n",
     ],
 )
 def test_words_of_any_length_are_quoted_in_part(tmp_path, content):
