@@ -44,7 +44,9 @@ class Target:
     attempt: Callable[[str, Path, Note], None]
     """Make the input of a case, SEED:NUMBER, in an own directory, and read it."""
     pristine: Callable[[Path], None]
-    """Read inputs that are not mutated; this also imports what the others need."""
+    """Read inputs that are not mutated."""
+    prepare: Callable[[Path], None] | None = None
+    """Import what the reader needs, before processes are forked; by default `pristine` does."""
     batch: int = 1
     """Cases that one process tries."""
 
@@ -95,7 +97,7 @@ def search(target: Target, description: str, *, hours: float) -> int:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         directory = Path(folder)
-        target.pristine(directory)
+        (target.prepare or target.pristine)(directory)
         tally = Tally(usual_kib=_usual_kib(target, directory))
         end = time.monotonic() + 3600 * options.hours
         first = 0

@@ -20,11 +20,15 @@ from tests.fuzz.harness import Note, Target, search
 from tests.fuzz.scenario_mutations import mutated
 
 
-def pristine(directory: Path) -> None:
-    """Plan every installed scenario, and check one as a command does."""
+def prepare(_directory: Path) -> None:
+    """Plan every installed scenario."""
     for name in installed_scenarios():
         file = load(name)
         plan_of(file.scenario, file.params)
+
+
+def pristine(directory: Path) -> None:
+    """Check a scenario as a command does."""
     _check(installed_scenarios()["palpation"], [], directory)
 
 
@@ -66,4 +70,4 @@ def _check(path: Path, overrides: list[str], directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(search(Target(attempt, pristine), __doc__ or "", hours=15 / 3600))
+    sys.exit(search(Target(attempt, pristine, prepare), __doc__ or "", hours=15 / 3600))
