@@ -96,7 +96,7 @@ def _message(name: str, source: random.Random, *, wild: bool) -> Any:
     )
 
 
-def _cdr(name: str, source: random.Random, *, wild: bool) -> bytes:
+def cdr(name: str, source: random.Random, *, wild: bool) -> bytes:
     """Return the CDR of a random message."""
     try:
         return bytes(typestore().serialize_cdr(_message(name, source, wild=wild), name))
@@ -140,13 +140,13 @@ def _made(source: random.Random) -> tuple[str, bytes, Reader]:
             stamp = Stamp(1, source.randrange(2**62), 5).pack()
             return "stamp", stamp, lambda data: Stamp.of(_sample(data))
         case 3:
-            parts = [_cdr(source.choice(names), source, wild=False)[:300] for _ in range(3)]
+            parts = [cdr(source.choice(names), source, wild=False)[:300] for _ in range(3)]
             whole = b"".join(struct.pack("<II", i, len(part)) + part for i, part in enumerate(parts))
             return "bundle", whole, lambda data: list(unpacked(data))
         case 4:
-            return "grant", _cdr("trocar_msgs/msg/Grant", source, wild=source.random() < 0.5), unpack_grant
+            return "grant", cdr("trocar_msgs/msg/Grant", source, wild=source.random() < 0.5), unpack_grant
         case 5:
-            ack = _cdr("trocar_msgs/msg/Ack", source, wild=source.random() < 0.5)
+            ack = cdr("trocar_msgs/msg/Ack", source, wild=source.random() < 0.5)
             steps, works = source.choice([(0, 0), (1, 0), (2, 3)])
             return "ack", ack, lambda data: unpack_ack(data, steps, works)
         case 6 | 7:
@@ -156,11 +156,11 @@ def _made(source: random.Random) -> tuple[str, bytes, Reader]:
             if vector is not None and not wild and has_vector(codec.port.type):
                 data = codec.encode(vector.neutral, source.randrange(2**60))
             else:
-                data = _cdr(codec.port.type, source, wild=wild)
+                data = cdr(codec.port.type, source, wild=wild)
             return f"port {codec.port.name}", data, source.choice([codec.accept, codec.decode])
         case _:
             name = source.choice(names)
-            data = _cdr(name, source, wild=source.random() < 0.5)
+            data = cdr(name, source, wild=source.random() < 0.5)
             return name, data, lambda data: decode(message_types()[name], data)
 
 
@@ -181,7 +181,7 @@ def pristine(_directory: Path) -> None:
     source = random.Random(0)
     for name, model in message_types().items():
         try:
-            decode(model, _cdr(name, source, wild=False))
+            decode(model, cdr(name, source, wild=False))
         except MessageError:  # a byte of ours has seven bits
             continue
     for model, text in REQUESTS.items():
