@@ -120,7 +120,10 @@ def _usual_kib(target: Target, directory: Path) -> int:
             _quiet(directory)
             target.pristine(directory)
             code = 0
+        except Exception:  # noqa: BLE001 - it is reported by the parent
+            traceback.print_exc()
         finally:
+            sys.stderr.flush()
             os._exit(code)
     _, status, used = os.wait4(child, 0)
     if status:
