@@ -90,4 +90,4 @@ def pristine(directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(search(Target(attempt, pristine, batch=20), __doc__ or "", hours=2 / 3600))
+    sys.exit(search(Target(attempt, pristine, batch=20), __doc__ or "", hours=0.25))

@@ -292,4 +292,4 @@ def pristine(directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(search(Target(attempt, pristine, prepare), __doc__ or "", hours=3 / 3600))
+    sys.exit(search(Target(attempt, pristine, prepare), __doc__ or "", hours=0.25))

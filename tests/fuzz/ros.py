@@ -272,4 +272,4 @@ def prepare(directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(search(Target(attempt, pristine, prepare, batch=20), __doc__ or "", hours=3 / 3600))
+    sys.exit(search(Target(attempt, pristine, prepare, batch=20), __doc__ or "", hours=0.25))

@@ -192,4 +192,4 @@ def pristine(_directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(search(Target(attempt, pristine, batch=1000), __doc__ or "", hours=3 / 3600))
+    sys.exit(search(Target(attempt, pristine, batch=1000), __doc__ or "", hours=0.25))
