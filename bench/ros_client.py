@@ -10,6 +10,7 @@ than the command has come, and then one that is not.
 from __future__ import annotations
 
 import json
+import math
 import random
 import sys
 import threading
@@ -233,7 +234,23 @@ def cycles(client: Any, arm_name: str, count: int) -> dict[str, Any]:
     return {"cycles": count, "missed_busy_edges": missed, "hung": hung, "homing_took": percentiles(took_ns)}
 
 
-TASKS = {"listen": listen, "servo": servo, "moves": moves, "cycles": cycles}
+def stream(client: Any, arm_name: str, rate: float, seconds: float) -> dict[str, Any]:
+    """Read joint states and send `servo_jp` at a steady rate, 20 mrad to and fro in 4 s."""
+    arm, amplitude_rad, cycle_s, sent = Arm(client, arm_name), 0.02, 4.0, 0
+    begin(client)
+    arm.await_joints()
+    with arm.news:
+        start = list(arm.joints["setpoint_js"][0])
+    begun = monotonic()
+    while (now := monotonic() - begun) < seconds:
+        arm.send("servo_jp", [start[0] + amplitude_rad * math.sin(2 * math.pi * now / cycle_s), *start[1:]])
+        sent += 1
+        sleep(max(0.0, begun + sent / rate - monotonic()))
+    with arm.news:
+        return {"sent": sent, "read": sorted(arm.joints)}
+
+
+TASKS = {"listen": listen, "servo": servo, "moves": moves, "cycles": cycles, "stream": stream}
 
 
 def main() -> None:

@@ -101,7 +101,9 @@ def _input_start(
     try:
         return declared_start(row, variable.size)
     except ValueError as error:
-        problem = f"input '{row.name}' (line {row.sourceline}) has the start value {row.start!r}, no number"
+        problem = (
+            f"input '{row.name}' (line {row.sourceline}) has the start value {row.start!r:.80}, no number"
+        )
         if strict:
             raise ScenarioError(
                 f"'{path}': modelDescription.xml breaks a rule of FMI: {problem}. Export the FMU again with a"

@@ -20,6 +20,9 @@ __all__ = ["co_simulation", "read_model"]
 
 _log = logging.getLogger(__name__)
 
+_LONGEST_REASON = 1000
+"""Letters of what FMPy reports: it quotes values of any length."""
+
 
 def read_model(path: Path, *, strict: bool) -> tuple[ModelDescription, int, list[str]]:
     """Return the description of the FMU at `path`, the major version of FMI, and the names in its archive.
@@ -43,11 +46,12 @@ def read_model(path: Path, *, strict: bool) -> tuple[ModelDescription, int, list
     except ScenarioError:
         raise
     except Exception as error:  # FMPy raises BadZipFile, KeyError, XMLSyntaxError, TypeError, bare Exception
+        found = _shown(str(error), most=_LONGEST_REASON)
         if "(line " in str(error):
-            raise ScenarioError(f"'{path}': modelDescription.xml breaks a rule of FMI: {error}") from error
-        raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {error}") from error
+            raise ScenarioError(f"'{path}': modelDescription.xml breaks a rule of FMI: {found}") from error
+        raise ScenarioError(f"'{path}' is no FMI 2.0 or 3.0 FMU: {type(error).__name__}: {found}") from error
     if major not in (2, 3):
-        raise ScenarioError(f"'{path}' is an FMI {model.fmiVersion} FMU; FMI 2.0 and 3.0 are allowed")
+        raise ScenarioError(f"'{path}' is an FMI {_shown(model.fmiVersion)} FMU; FMI 2.0 and 3.0 are allowed")
     _check_texts(path, model)
     return model, major, names
 
@@ -64,6 +68,7 @@ def _read(path: Path, file: IO[bytes], *, strict: bool) -> ModelDescription:
     except Exception as error:
         model = read_model_description(file, validate=False)  # if this fails as well, its error is clearer
         problem = "; ".join(_undefined_display_units(model)) or f"{type(error).__name__}: {error}"
+        problem = _shown(problem, most=_LONGEST_REASON)
         if strict:
             raise ScenarioError(
                 f"'{path}': modelDescription.xml breaks rules of FMI: {problem}. Export the FMU again with a"
@@ -92,6 +97,10 @@ def _check_texts(path: Path, model: ModelDescription) -> None:
     """
     for row in model.modelVariables:
         if row.causality in {"input", "output"} or settable(row):
+            if not row.name:  # FMPy's check, which refuses this, may be off
+                raise ScenarioError(
+                    f"the FMU '{path}' is refused: a variable (line {row.sourceline}) has no name"
+                )
             for kind, text in (("name", row.name), ("unit", unit_of(row))):
                 if not text.isprintable() or "<" in text or ">" in text:
                     raise ScenarioError(
@@ -100,9 +109,9 @@ def _check_texts(path: Path, model: ModelDescription) -> None:
                     )
 
 
-def _shown(text: str) -> str:
-    """Return `text` such that it can be shown in one line."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text[:80])
+def _shown(text: str, *, most: int = 80) -> str:
+    """Return `text` such that it can be shown in one line, its first `most` letters."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text[:most])
 
 
 def co_simulation(path: Path, model: ModelDescription, major: int, names: Collection[str]) -> CoSimulation:

@@ -120,7 +120,10 @@ class Plan(_Part):
     @classmethod
     def _with_current_names(cls, data: Any) -> Any:
         """Accept the plan of a recording of version 0.1.0."""
-        return current_plan(cast("dict[str, Any]", data)) if isinstance(data, dict) else data
+        try:
+            return current_plan(cast("dict[str, Any]", data)) if isinstance(data, dict) else data
+        except (AttributeError, KeyError, TypeError) as error:
+            raise ValueError(f"not a plan ({type(error).__name__}: {error})") from error
 
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""

@@ -8,12 +8,14 @@ https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 
 from __future__ import annotations
 
+import errno
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import Any, BinaryIO
 
 import lz4.frame
 import numpy as np
@@ -53,6 +55,8 @@ _MESSAGE = np.dtype(
 )
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _RECORD_HEADER_BYTES = 9
+_COPIED_BYTES = 2**20
+"""Of the chunks' indexes at once, when a file is finished."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +106,12 @@ class McapFile:
         self.channels: list[Channel] = []
         self.size = 0
         self._attachments: list[AttachmentIndex] = []
-        self._chunks: list[ChunkIndex] = []
+        self._chunks, self._start_ns, self._end_ns = 0, 0, 0
         self._counts: dict[int, int] = {}
         self._file = path.open("xb", buffering=0)
+        # An hour has tens of thousands of chunks: their indexes wait for the summary on disk, not in memory.
+        self._index: BinaryIO = TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115 - closed in `close`
+        self._index_size = 0
         self._append(MCAP0_MAGIC + _bytes_of(Header("ros2", "trocar")))
 
     def attach(self, name: str, data: bytes) -> None:
@@ -138,72 +145,119 @@ class McapFile:
             offsets[channel] = self.size + len(chunk) + len(index)
             index += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(group), channel, len(group)) + group
             at += int(counts[channel])
-        offset = self._append(chunk + bytes(index))
-        self._chunks.append(
+        self._add_index(
             ChunkIndex(
-                len(chunk), offset, "lz4", len(compressed), end, len(index), offsets, start, len(data.records)
-            )
+                len(chunk),
+                self.size,
+                "lz4",
+                len(compressed),
+                end,
+                len(index),
+                offsets,
+                start,
+                len(data.records),
+            ),
+            chunk + bytes(index),
         )
+        self._start_ns = min(self._start_ns, start) if self._chunks else start
+        self._end_ns = max(self._end_ns, end)
+        self._chunks += 1
         for channel in offsets:
             self._counts[channel] = self._counts.get(channel, 0) + int(counts[channel])
+
+    def _add_index(self, index: ChunkIndex, chunk: bytes) -> None:
+        """Append a chunk, and keep its index; both or, with OSError, neither."""
+        record = _bytes_of(index)
+        self._index.seek(self._index_size)
+        _write(self._index, record)
+        self._append(chunk)
+        self._index_size += len(record)
 
     @property
     def statistics(self) -> Statistics:
         """Counts and times of what is in the file."""
-        start = min((chunk.message_start_time for chunk in self._chunks), default=0)
-        end = max((chunk.message_end_time for chunk in self._chunks), default=0)
-        messages = sum(self._counts.values())
         return Statistics(
             len(self._attachments),
             len(self.channels),
             self._counts,
-            len(self._chunks),
-            messages,
-            end,
-            start,
+            self._chunks,
+            sum(self._counts.values()),
+            self._end_ns,
+            self._start_ns,
             0,
             len(self.schemas),
         )
 
     def finish(self) -> None:
         """Append summary and footer. Raises OSError with nothing appended."""
-        data_end = _bytes_of(DataEnd(0))
-        summary_start = self.size + len(data_end)
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, self.schemas),
-            (Opcode.CHANNEL, self.channels),
-            (Opcode.STATISTICS, [self.statistics]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-        ]
-        summary = b""
+        size = self.size
+        try:
+            self._append(_bytes_of(DataEnd(0)))
+            self._append_summary()
+        except OSError:
+            self._cut(size)
+            raise
+
+    def _append_summary(self) -> None:
+        summary_start, checksum = self.size, 0
         places: list[SummaryOffset] = []
-        for opcode, records in groups:
-            group = _bytes_of(*records)
-            places.append(SummaryOffset(opcode, summary_start + len(summary), len(group)))
-            summary += group
-        offset_start = summary_start + len(summary)
-        summary += _bytes_of(*(place for place in places if place.group_length))
+        for opcode, parts in self._summary_parts():
+            start = self.size
+            for part in parts:
+                self._append(part)
+                checksum = zlib.crc32(part, checksum)
+            if self.size > start:
+                places.append(SummaryOffset(opcode, start, self.size - start))
+        offset_start, offsets = self.size, _bytes_of(*places)
         footer_start = struct.pack("<BQQQ", Opcode.FOOTER, 20, summary_start, offset_start)
-        footer = _bytes_of(Footer(summary_start, offset_start, zlib.crc32(footer_start, zlib.crc32(summary))))
-        self._append(data_end + summary + footer + MCAP0_MAGIC)
+        checksum = zlib.crc32(footer_start, zlib.crc32(offsets, checksum))
+        footer = _bytes_of(Footer(summary_start, offset_start, checksum))
+        self._append(offsets + footer + MCAP0_MAGIC)
+
+    def _summary_parts(self) -> Iterator[tuple[Opcode, Iterable[bytes]]]:
+        yield Opcode.SCHEMA, [_bytes_of(*self.schemas)]
+        yield Opcode.CHANNEL, [_bytes_of(*self.channels)]
+        yield Opcode.STATISTICS, [_bytes_of(self.statistics)]
+        yield Opcode.CHUNK_INDEX, self._chunk_indexes()
+        yield Opcode.ATTACHMENT_INDEX, [_bytes_of(*self._attachments)]
+
+    def _chunk_indexes(self) -> Iterator[bytes]:
+        self._index.seek(0)
+        left = self._index_size
+        while left:
+            part = self._index.read(min(left, _COPIED_BYTES))
+            if not part:
+                raise OSError(errno.EIO, "the index of the chunks cannot be read back")
+            left -= len(part)
+            yield part
 
     def close(self) -> None:
         """Close the file, finished or not."""
         self._file.close()
+        self._index.close()
 
     def _append(self, data: bytes) -> int:
         """Write `data` at the end and return its offset."""
-        rest = memoryview(data)
         try:
-            while rest:
-                rest = rest[self._file.write(rest) :]
+            _write(self._file, data)
         except OSError:
-            self._file.truncate(self.size)
-            self._file.seek(self.size)
+            self._cut(self.size)
             raise
         offset, self.size = self.size, self.size + len(data)
         return offset
+
+    def _cut(self, size: int) -> None:
+        """Remove all that stands after `size` bytes."""
+        self._file.truncate(size)
+        self._file.seek(size)
+        self.size = size
+
+
+def _write(file: BinaryIO, data: bytes) -> None:
+    """Write all of `data`; one call of an unbuffered file may write less."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[file.write(rest) :]
 
 
 def _bytes_of(*records: McapRecord) -> bytes:

@@ -77,8 +77,8 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
 
 
 def _whole(reader: StreamReader) -> Iterator[McapRecord]:
-    """Yield records until the first that is not whole."""
-    with suppress(McapError, struct.error, UnicodeDecodeError):
+    """Yield records until the first that is not whole; one may state any length."""
+    with suppress(McapError, struct.error, ValueError, OverflowError, MemoryError):
         yield from reader.records
 
 

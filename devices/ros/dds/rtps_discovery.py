@@ -155,14 +155,23 @@ def disposed_endpoint_id(announcement: Data) -> bytes:
 def announced_participant(announcement: Data) -> tuple[int, int]:
     """Return the UDP ports of a participant: for metatraffic (SEDP), and for user data.
 
-    Raises MessageError if the announcement has not both.
+    Raises MessageError if the announcement has not both, or if one is no port.
     """
     found = _announced(announcement, Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
     metatraffic, default = (
-        struct.unpack_from("<I", found[locator], 4)[0]
-        for locator in (Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
+        _port(found[locator]) for locator in (Pid.METATRAFFIC_UNICAST_LOCATOR, Pid.DEFAULT_UNICAST_LOCATOR)
     )
     return metatraffic, default
+
+
+def _port(locator: bytes) -> int:
+    """Return the port of a locator, which has kind, port (4 bytes each) and address (16 bytes)."""
+    port = int.from_bytes(locator[4:8], "little")
+    if len(locator) < 8 or not 0 < port < 1 << 16:
+        raise MessageError(
+            f"the discovery data of a participant has the UDP port {port}, allowed: 1 to 65535"
+        )
+    return port
 
 
 def announced_endpoint(announcement: Data) -> tuple[bytes, bytes]:

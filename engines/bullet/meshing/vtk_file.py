@@ -67,7 +67,7 @@ class _Reader:
             words = self._line().split()
             keyword = words[0].upper() if words else ""
             if keyword == "DATASET" and words[1:] != ["UNSTRUCTURED_GRID"]:
-                raise ValueError(f"holds a dataset '{' '.join(words[1:])}', not UNSTRUCTURED_GRID")
+                raise ValueError(f"holds a dataset '{' '.join(words[1:])[:40]}', not UNSTRUCTURED_GRID")
             if keyword == "POINTS":
                 nodes = self._numbers(
                     3 * self._count(words, 1), words[2].lower() if len(words) > 2 else ""
@@ -155,4 +155,6 @@ class _Reader:
         try:
             return np.array(words[:count], np.float64)
         except ValueError as error:
-            raise ValueError(f"holds something else where {count} numbers should be ({error})") from error
+            raise ValueError(
+                f"holds something else where {count} numbers should be ({error!s:.80})"
+            ) from error

@@ -68,6 +68,19 @@ class TestStrict:
             with pytest.raises(ScenarioError, match=r"breaks a rule of FMI.*\(line 24\)"):
                 _ = make(SPRING, period=0, edits=edits, strict=strict).ports
 
+    @pytest.mark.parametrize("edits", [{'name="e" ': 'name="" '}, {'<Alias name="height"': "<Alias"}])
+    def test_a_variable_without_a_name(self, make: Make, edits: dict[str, str]) -> None:
+        with pytest.raises(ScenarioError, match=r"a variable \(line \d+\) has no name"):
+            _ = make(BALL, period=0, edits=edits, strict=False).ports
+
+    def test_values_of_any_length_are_quoted_in_part(self, make: Make) -> None:
+        for model, edits in (
+            (SPRING, {'causality="parameter"': f'causality="{"x" * 30_000}"'}),
+            (SPRING, {'fmiVersion="2.0"': f'fmiVersion="{"x" * 30_000}"'}),
+            (SPRING, {'<Real unit="N" start="0"/>': f'<Real unit="N" start="{"x" * 30_000}"/>'}),
+        ):
+            assert len(error_of(make, model, edits)) < 2_000
+
     def test_rules_that_change_nothing_are_logged_with_the_line(
         self, make: Make, caplog: pytest.LogCaptureFixture
     ) -> None:

@@ -3,6 +3,7 @@
 import logging
 
 import pytest
+from pydantic import ValidationError
 
 from hub.planning.plan import Plan
 from hub.planning.renamed import current_names
@@ -187,3 +188,18 @@ def test_a_recorded_plan_gets_the_current_names():
     assert [(c.source, c.source_port) for c in plan.from_devices] == [("hand", "pose")]
     assert [(c.target, c.target_port) for c in plan.to_devices] == [("hand", "force")]
     assert Plan.model_validate_json(plan.model_dump_json()) == plan
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        {"members": None},
+        {"members": {"hand": 7}},
+        {"members": {"hand": {"host": "hub"}}},
+        {"members": {}, "links": [], "inlets": 3},
+        {"members": {}, "links": [], "inlets": [], "outlets": [True]},
+    ],
+)
+def test_what_is_no_recorded_plan_is_an_error_of_validation(plan):
+    with pytest.raises(ValidationError, match="not a plan"):
+        Plan.model_validate(plan)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,11 +16,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.records import Channel, Schema
 from rosbags.highlevel import AnyReader
 
 from hub.recording import recorder as recorder_module
 from hub.recording.bag import Bag, located_messages
-from hub.recording.mcap_file import chunk_data
+from hub.recording.mcap_file import chunk_data, create_bag
 from hub.recording.recorder import Recorder
 from hub.recording.recover import recover
 from schemas.codec import decode, encode
@@ -55,6 +57,30 @@ def test_a_recording_reads_back_in_order(tmp_path: Path) -> None:
     assert [(m.time_ns, m.payload) for m in bag.messages("/engine/robot/out/tip")] == [m[1:] for m in given]
     assert [decode(AckMessage, m.payload).step for m in bag.messages("/engine/robot/ack")] == [4]
     assert bag.attachments == {"scenario.yaml": b"name: x\n", "versions.json": b"{}"}
+
+
+def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
+    chunk = chunk_data([(channel, 5, b"payload") for channel in range(1, 101)])
+    file = create_bag(tmp_path / "run")
+    for number in range(1, 101):
+        schema = Schema(1, b"", "ros2msg", "std_msgs/msg/Empty")
+        file.declare(schema, Channel(number, f"/{number}", "cdr", {}, 1))
+    file.add_chunk(chunk)
+    tracemalloc.start()
+    try:
+        for _ in range(500):
+            file.add_chunk(chunk)
+        grown, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    file.finish()
+    file.close()
+    assert grown < 100_000
+    with file.path.open("rb") as stream:
+        summary = make_reader(stream, validate_crcs=True).get_summary()
+    assert summary is not None
+    assert len(summary.chunk_indexes) == 501
+    assert all(len(index.message_index_offsets) == 100 for index in summary.chunk_indexes)
 
 
 def test_ros_tools_open_it(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+import struct
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,18 @@ def test_every_cut_is_survived(session: Path, tmp_path: Path) -> None:
         assert saved.messages >= before
         before = saved.messages
     assert before > 0
+
+
+@pytest.mark.parametrize("length", [2**60, 2**63])
+def test_a_record_of_a_length_that_cannot_be_is_the_end(session: Path, tmp_path: Path, length: int) -> None:
+    whole = (session / "run_0.mcap").read_bytes()
+    name, data = next(iter(ATTACHMENTS.items()))
+    stated = struct.pack("<Q", len(data)) + data  # of the attachment in its record
+    assert name.encode() in whole
+    file = tmp_path / "long.mcap"
+    file.write_bytes(whole.replace(stated, struct.pack("<Q", length) + data, 1))
+    saved = recover(file)
+    assert (saved.cut_short, saved.attachments, saved.messages) == (True, 0, 0)
 
 
 def test_zeros_at_the_end_after_a_power_loss(session: Path, tmp_path: Path) -> None:

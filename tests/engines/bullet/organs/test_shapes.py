@@ -365,6 +365,21 @@ def test_a_file_without_tetrahedra_is_refused(tmp_path, content, expected):
         organ(mesh=str(tmp_path / "organ.vtk"), material="liver", anchors=[])
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        f"# vtk DataFile Version 2.0\nx\nASCII\nDATASET {'x' * 30_000}\n",
+        f"# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n"
+        f"0 {'x' * 30_000} 0\n",
+    ],
+)
+def test_words_of_any_length_are_quoted_in_part(tmp_path, content):
+    (tmp_path / "organ.vtk").write_text(content)
+    with pytest.raises(ValueError, match=r"organ\.vtk: holds") as caught:
+        read_vtk(tmp_path / "organ.vtk")
+    assert len(str(caught.value)) < 1_000
+
+
 def test_a_mesh_that_is_not_there_and_one_that_nothing_holds(tmp_path):
     with pytest.raises(ValidationError, match=r"gone\.vtk cannot be read: No such file"):
         organ(mesh=str(tmp_path / "gone.vtk"), material="liver", anchors=[])
