@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from time import sleep
 
@@ -24,6 +25,7 @@ from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
+from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
@@ -98,7 +100,7 @@ class HostRun:
         run = RunInfo(reply.plan, self._keys, reply.run, reply.admission)
         for name, device in devices.items():
             if isinstance(device, RouterClient):
-                device.learn_hub(connect)
+                device.learn_hub(_to_programs(reply) or connect)
             planned = reply.plan.participants[name]
             thread = DeviceThread(name, device, planned.read_ns, failed=self._report_failure)
             uplink = DeviceUplink(planned, run, self._session, thread, self._refusals, clock.offset)
@@ -194,3 +196,10 @@ class HostRun:
         self._host.close()
         for token in self._tokens:
             token.undeclare()
+
+
+def _to_programs(reply: JoinReply) -> Callable[[], zenoh.Session] | None:
+    """Return what opens a Zenoh session with the router of programs; None if that is on another machine."""
+    if not reply.programs_endpoint:
+        return None
+    return partial(open_session, "client", connect=[reply.programs_endpoint])

@@ -28,6 +28,7 @@ class JoinedHosts:
         watched: Outputs of which the hub needs every value.
         failed: Is called with participant and cause when a host reports a failure.
         ended: Is called with participant and reason when a host reports that one ends the session.
+        programs_endpoint: Where programs outside Trocar connect, on this machine.
     """
 
     def __init__(
@@ -39,7 +40,10 @@ class JoinedHosts:
         watched: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
         ended: Callable[[str, str], None],
+        *,
+        programs_endpoint: str = "",
     ) -> None:
+        self._programs_endpoint = programs_endpoint
         self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
@@ -96,6 +100,7 @@ class JoinedHosts:
             params=params,
             directory=str(self._directory),
             watched=[output for output in self._watched if output[0] in names],
+            programs_endpoint="" if far else self._programs_endpoint,
         )
 
     def lose(self, host: str) -> None:

@@ -58,6 +58,8 @@ class SessionSpec:
     """Where relative paths of the scenario start."""
     endpoint: str
     """Where the hub listens on loopback."""
+    programs_endpoint: str
+    """Where programs outside Trocar connect; empty if no device has keys for them."""
     gate: Gate | None
     """Lets other machines in."""
     resimulated: bool
@@ -115,7 +117,14 @@ class Run:
         )
         watched = list(self.observers.away.values())
         self.joined_hosts = JoinedHosts(
-            scenario, plan, spec.directory, self.number, watched, self.failure.report, self.end
+            scenario,
+            plan,
+            spec.directory,
+            self.number,
+            watched,
+            self.failure.report,
+            self.end,
+            programs_endpoint=spec.programs_endpoint,
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.observers)
         answering.callback(self.status.undeclare)
@@ -148,7 +157,7 @@ class Run:
 
     def _devices(self) -> SessionDevices:
         """Return the devices of the session, those of this process not yet open."""
-        endpoint, devices = self.spec.endpoint, self.spec.devices
+        endpoint, devices = self.spec.programs_endpoint, self.spec.devices
         for device in devices.values():
             if isinstance(device, RouterClient):
                 device.learn_hub(lambda: open_session("client", connect=[endpoint]))

@@ -76,3 +76,5 @@ class JoinReply(_Json):
     directory: str
     watched: list[tuple[str, str]]
     """Outputs, as participant and port, of which the hub needs every value: for a recording or a measure."""
+    programs_endpoint: str = ""
+    """Where devices on the hub's machine meet programs outside Trocar; empty on other machines."""
