@@ -1,7 +1,7 @@
 """The access rules for other machines, generated from the plan: what they do not allow is denied.
 
 A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of it
-(egress). It applies to a name in a certificate. The hub's own machine, which the gate reaches over loopback or
+(egress). It applies to a name in a certificate. The hub's machine, which the gate reaches over loopback or
 by a socket of the file system, may do everything, as without a gate.
 """
 

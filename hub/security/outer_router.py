@@ -1,8 +1,8 @@
 """The router of those that connect without the secret of a session: programs of other makers, and the gate.
 
-ROS programs look for a router on loopback and know no password. A gate cannot know one either: Zenoh would then
-demand it of those who have a certificate. They connect to a router of their own. It is connected to the hub's
-for a gate only; then access rules hold programs to the keys that devices share with them
+ROS programs look for a router on loopback and know no password. A gate cannot have one either: Zenoh would
+then demand it of those who have a certificate. So these connect to a router of their own. It is connected to
+the hub's for a gate only; then access rules hold programs to the keys that devices share with them
 (docs/decisions/0038-secret-of-a-session.md).
 """
 

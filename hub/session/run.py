@@ -45,6 +45,8 @@ __all__ = ["Run", "SessionSpec"]
 
 log = logging.getLogger(__name__)
 
+_KEY_BYTES = 16
+
 
 @dataclass(frozen=True)
 class SessionSpec:
@@ -105,7 +107,8 @@ class Run:
         self.refusals = Refusals()
         self.clock = _clock(scenario, plan)
         self.observers = Observers(plan, keys, self.number, Measures(scenario, plan), recorder)
-        self.acks = AckReceiver(session, keys, plan, self.number, self.refusals)
+        ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
+        self.acks = AckReceiver(session, keys, plan, self.number, self.refusals, ack_keys)
         self.host = self._host()
         """The stepped participants of this process."""
         stack.callback(self.host.close)
@@ -124,6 +127,7 @@ class Run:
             watched,
             self.failure.report,
             self.end,
+            ack_keys=ack_keys,
             programs_endpoint=spec.programs_endpoint,
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.observers)
