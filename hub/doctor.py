@@ -14,6 +14,7 @@ from hub.import_names import NAMES, collisions
 from hub.planning import registry
 from hub.security import credentials
 from hub.transport.loopback_port import LoopbackPort
+from hub.transport.session_secret import listen_with_secret, secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.errors import TrocarError
 
@@ -97,7 +98,10 @@ def _zenoh() -> Iterator[Finding]:
     """Open a router on loopback and join it, as a session does."""
     try:
         port = LoopbackPort("tcp/127.0.0.1:0")
-        with port.listen(), open_session("client", connect=[port.endpoint]):
+        with (
+            listen_with_secret(port),
+            open_session("client", connect=[port.endpoint], security=secret_of(port.endpoint)),
+        ):
             pass
     except TrocarError as error:
         yield Finding(

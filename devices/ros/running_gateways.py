@@ -10,6 +10,7 @@ from time import sleep
 import zenoh
 from zenoh.handlers import Callback
 
+from hub.transport.session_secret import secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
@@ -38,7 +39,7 @@ def running_gateways(endpoints: Iterable[str]) -> Mapping[tuple[str, str], Gatew
     clients: list[zenoh.Session] = []
     for endpoint in endpoints:
         with suppress(ConnectError, zenoh.ZError):
-            client = open_session("client", connect=[endpoint])
+            client = open_session("client", connect=[endpoint], security=secret_of(endpoint))
             client.declare_subscriber(
                 Keys("*").output("device", "*", "gateway"), Callback(receive, indirect=True)
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from time import sleep
 
@@ -20,10 +21,12 @@ from hub.planning.plan import PlannedParticipant
 from hub.planning.registry import make
 from hub.transport.control_client import ask
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
+from hub.transport.envelope import signature
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
 from hub.transport.wire import Wire
+from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
@@ -52,6 +55,7 @@ class HostRun:
     ) -> None:
         self._session, self._request, self._directory = session, request, directory
         self._keys, self._run, self._step_ns = Keys(reply.session), reply.run, reply.plan.step_ns
+        self._ack_key = bytes.fromhex(reply.ack_key)
         self._next_step = 0
         self._ended: set[str] = set()
         plan, host, keys = reply.plan, request.host, self._keys
@@ -98,7 +102,7 @@ class HostRun:
         run = RunInfo(reply.plan, self._keys, reply.run, reply.admission)
         for name, device in devices.items():
             if isinstance(device, RouterClient):
-                device.learn_hub(connect)
+                device.learn_hub(_to_programs(reply) or connect)
             planned = reply.plan.participants[name]
             thread = DeviceThread(name, device, planned.read_ns, failed=self._report_failure)
             uplink = DeviceUplink(planned, run, self._session, thread, self._refusals, clock.offset)
@@ -126,7 +130,7 @@ class HostRun:
                 self._host.run(grant, self._acknowledge)
             except ParticipantError as error:
                 failed = Ack(self._run, 0, error.step, (), (), (), error.cause)
-                self._acks[error.participant].put(pack_ack(failed))
+                self._send_ack(error.participant, failed)
                 raise
             grant = self._next_grant(self._grants)
 
@@ -178,7 +182,11 @@ class HostRun:
             self._ended.add(planned.name)
             # before the ack: the hub gives no grant after it
             self._send_to_hub(self._request.model_copy(update={"ended": f"{planned.name}: {reason}"}))
-        self._acks[planned.name].put(pack_ack(ack))
+        self._send_ack(planned.name, ack)
+
+    def _send_ack(self, name: str, ack: Ack) -> None:
+        payload = pack_ack(ack)
+        self._acks[name].put(payload, attachment=signature(payload, self._ack_key))
 
     def _report_failure(self, name: str, cause: str) -> None:
         self._send_to_hub(self._request.model_copy(update={"failed": f"{name}: {cause}"}))
@@ -194,3 +202,10 @@ class HostRun:
         self._host.close()
         for token in self._tokens:
             token.undeclare()
+
+
+def _to_programs(reply: JoinReply) -> Callable[[], zenoh.Session] | None:
+    """Return what opens a Zenoh session with the router of programs; None if that is on another machine."""
+    if not reply.programs_endpoint:
+        return None
+    return partial(open_session, "client", connect=[reply.programs_endpoint])

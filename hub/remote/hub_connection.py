@@ -5,17 +5,24 @@ from __future__ import annotations
 import socket
 import ssl
 from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
 
 import zenoh
 
 from hub.security.credentials import HUB, Credentials, examine, load
 from hub.transport.endpoints import address, is_loopback
+from hub.transport.session_secret import secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
 
 __all__ = ["obstacle", "reach"]
 
 _TIMEOUT_S = 3.0
+_STARTING_S = 5.0
+_PUBLISHING_S = 0.2
+"""A hub that listens has published its secret within milliseconds."""
+_POLL_S = 0.05
 
 _VERDICTS = {
     "UNKNOWN_CA": "is of another authority than the hub's",
@@ -28,7 +35,9 @@ _VERDICTS = {
 def reach(
     endpoint: str, name: str, certificates: Path | None = None, *, mode: str = "client"
 ) -> zenoh.Session:
-    """Open a Zenoh session with the hub at `endpoint`; from another machine, with the certificate of `name`.
+    """Open a Zenoh session with the hub at `endpoint`.
+
+    On the hub's machine that takes the secret of the session, from another one the certificate of `name`.
 
     `mode` is Zenoh's, and used on loopback only: from other machines everything goes through the hub. Raises
     ConnectError, which says how to repair it.
@@ -37,7 +46,10 @@ def reach(
     if is_loopback(endpoint):
         try:
             return open_session(
-                mode, listen=["tcp/127.0.0.1:0"] if mode == "peer" else [], connect=[endpoint]
+                mode,
+                listen=["tcp/127.0.0.1:0"] if mode == "peer" else [],
+                connect=[endpoint],
+                security=_secret(endpoint),
             )
         except ConnectError as error:
             if _answers(host, port):
@@ -71,6 +83,20 @@ def reach(
             f" certificate of {', '.join(map(str, names))}"
         )
     return session
+
+
+def _secret(endpoint: str) -> dict[str, Any]:
+    """Return the secret of the session at `endpoint`; its hub may be about to start, or to publish it."""
+    deadline = monotonic() + _STARTING_S
+    while True:
+        try:
+            return secret_of(endpoint)
+        except ConnectError:
+            if monotonic() > deadline:
+                raise
+            if _answers(*address(endpoint)):
+                deadline = min(deadline, monotonic() + _PUBLISHING_S)
+            sleep(_POLL_S)
 
 
 def obstacle(host: str, port: int, credentials: Credentials) -> str:

@@ -14,7 +14,6 @@ from hub.remote.hub_connection import reach
 from hub.security.credentials import OBSERVER
 from hub.transport.control_client import ask
 from hub.transport.endpoints import is_loopback
-from hub.transport.zenoh_session import open_session
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
@@ -72,7 +71,10 @@ def ask_about(
     """
     seen: list[str] = []
     for endpoint in endpoints:
-        with open_session("client", connect=[endpoint]) as client:
+        client = _hub_at(endpoint)
+        if client is None:
+            continue
+        with client:
             for status in _statuses(client):
                 seen.append(status.session)
                 if session in (None, status.session) and any(
@@ -83,6 +85,16 @@ def ask_about(
     raise ConnectError(
         f"there is no '{participant}' in {where} of these hubs; running: {', '.join(sorted(seen)) or 'none'}"
     )
+
+
+def _hub_at(endpoint: str) -> zenoh.Session | None:
+    """Return a session with the hub at `endpoint`; None if what listens there on this machine is none."""
+    try:
+        return reach(endpoint, OBSERVER)
+    except ConnectError:
+        if is_loopback(endpoint):
+            return None
+        raise
 
 
 def _statuses(session: zenoh.Session) -> Iterator[SessionStatus]:

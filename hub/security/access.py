@@ -1,8 +1,8 @@
 """The access rules for other machines, generated from the plan: what they do not allow is denied.
 
 A rule of Zenoh allows kinds of messages on keys in a direction: into the gate (ingress) or out of it
-(egress). It applies to a name in a certificate. The hub's own machine, which reaches the gate by TCP over
-loopback, may do everything, as without a gate.
+(egress). It applies to a name in a certificate. The hub's machine, which the gate reaches over loopback or
+by a socket of the file system, may do everything, as without a gate.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from hub.planning.plan import ConnectionToDevice, Plan, PlannedParticipant
 from hub.security.credentials import CONSOLE, OBSERVER
 from schemas.keys import Keys
 
-__all__ = ["access_settings"]
+__all__ = ["ALL_MESSAGES", "access_settings", "allow"]
 
-_ALL = (
+ALL_MESSAGES = (
     "put",
     "delete",
     "declare_subscriber",
@@ -56,17 +56,17 @@ def access_settings(
     for name, shared in (foreign or {}).items():
         everything += shared
         for holder in (CONSOLE, name) if name in rights else (CONSOLE,):
-            rights[holder] = [*rights.get(holder, ()), _allow("both", _ALL, *shared)]
+            rights[holder] = [*rights.get(holder, ()), allow("both", ALL_MESSAGES, *shared)]
     rules = {f"{name} {index}": rule for name, own in rights.items() for index, rule in enumerate(own)}
     access = {
         "enabled": True,
         "default_permission": "deny",
         "rules": [
-            {"id": "local", **_allow("both", _ALL, *everything)},
+            {"id": "local", **allow("both", ALL_MESSAGES, *everything)},
             *({"id": name, **rule} for name, rule in rules.items()),
         ],
         "subjects": [
-            {"id": "local", "link_protocols": ["tcp"]},
+            {"id": "local", "link_protocols": ["tcp", "unixsock-stream"]},
             *({"id": name, "cert_common_names": [name]} for name in rights),
         ],
         "policies": [
@@ -101,13 +101,13 @@ def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
     # the hub subscribes to these of all participants at once
     of_all = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]
     return [
-        _allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
-        _allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *of_all),
-        _allow("ingress", ["liveliness_token"], keys.alive(role, name)),
+        allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
+        allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *of_all),
+        allow("ingress", ["liveliness_token"], keys.alive(role, name)),
         *_query(Keys("*").join(planned.host), keys.control("clock")),
         *_subscribe(*dict.fromkeys(inputs), keys.link(name) if role == "device" else keys.grant),
-        _allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
-        _allow("egress", ["liveliness_token"], hub),
+        allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
+        allow("egress", ["liveliness_token"], hub),
     ]
 
 
@@ -119,13 +119,14 @@ def _to_device(plan: Plan, keys: Keys, connection: ConnectionToDevice) -> str:
 
 
 def _query(*keys: str) -> list[Rule]:
-    return [_allow("ingress", ["query"], *keys), _allow("egress", ["reply", "declare_queryable"], *keys)]
+    return [allow("ingress", ["query"], *keys), allow("egress", ["reply", "declare_queryable"], *keys)]
 
 
 def _subscribe(*keys: str) -> list[Rule]:
-    return [_allow("ingress", ["declare_subscriber"], *keys), _allow("egress", ["put"], *keys)]
+    return [allow("ingress", ["declare_subscriber"], *keys), allow("egress", ["put"], *keys)]
 
 
-def _allow(flow: str, messages: Sequence[str], *keys: str) -> Rule:
+def allow(flow: str, messages: Sequence[str], *keys: str) -> Rule:
+    """Return a rule that allows `messages` on `keys`, in the direction `flow` or in both."""
     flows = ["ingress", "egress"] if flow == "both" else [flow]
     return {"permission": "allow", "flows": flows, "messages": list(messages), "key_exprs": list(keys)}

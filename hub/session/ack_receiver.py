@@ -9,6 +9,7 @@ import zenoh
 from zenoh.handlers import FifoChannel
 
 from hub.planning.plan import Plan, PlannedParticipant
+from hub.transport.envelope import signature
 from hub.transport.refusals import Refusals
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
@@ -23,11 +24,34 @@ _NO_STEPS: Mapping[str, int] = {}
 
 
 class AckReceiver:
-    """Receives the acks of one run; all other messages are refused and counted."""
+    """Receives the acks of one run, one of each participant for each grant.
 
-    def __init__(self, session: zenoh.Session, keys: Keys, plan: Plan, run: int, refusals: Refusals) -> None:
+    A second one, and one that the participant's host has not signed, end the run: of two acks, only one can
+    have the hashes of what was computed. All other messages are refused and counted.
+
+    Args:
+        session: The hub's Zenoh session.
+        keys: The keys of the session.
+        plan: The plan of the session.
+        run: The number of the run.
+        refusals: Counts the messages that are refused.
+        ack_keys: By host, the key with which it signs.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        plan: Plan,
+        run: int,
+        refusals: Refusals,
+        ack_keys: Mapping[str, bytes],
+    ) -> None:
         self._session, self._key, self._run, self._refusals = session, keys.ack("hub"), run, refusals
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
+        self._ack_keys = ack_keys
+        self._last: dict[str, bytes] = {}
+        """The last ack of each participant."""
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
     def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Accepted | None:
@@ -50,35 +74,69 @@ class AckReceiver:
     def _accept(
         self, sample: zenoh.Sample, waiting: Sequence[str], step: int, steps: Mapping[str, int]
     ) -> Accepted | None:
-        key = str(sample.key_expr)
-        if key == self._key and not sample.payload:
+        if str(sample.key_expr) == self._key and not sample.payload:
             return None
         try:
-            planned = self._planned.get(key)
-            if planned is None:
-                raise MessageError("belongs to no participant of this run")
-            payload = sample.payload.to_bytes()
+            planned, payload, signed = self._opened(sample)
             count = steps.get(planned.name, 0)
-            ack = unpack_ack(payload, count, count * len(planned.bonds))
+            try:
+                ack = unpack_ack(payload, count, count * len(planned.bonds))
+            except MessageError as error:
+                if signed:
+                    raise ParticipantError(planned.name, step, f"its host has sent {error}") from error
+                raise
             if ack.run != self._run:
                 raise MessageError(f"belongs to run {ack.run:x}, this is run {self._run:x}")
-            if ack.error:
-                raise ParticipantError(planned.name, ack.step, ack.error)
+            self._check(planned, ack, payload, signed=signed)
             if planned.name not in waiting or ack.step != step:
-                raise MessageError(f"acknowledges step {ack.step}, which is not awaited")
+                raise ParticipantError(
+                    planned.name,
+                    ack.step,
+                    "a second ack of it has arrived, or one of a step that was not granted: is its host"
+                    f" '{planned.host}' running twice?",
+                )
         except MessageError as error:
             self._refusals.refuse_sample(sample, error)
             return None
+        self._last[planned.name] = payload
         return planned, ack, payload
+
+    def _opened(self, sample: zenoh.Sample) -> tuple[PlannedParticipant, bytes, bool]:
+        """Return the participant that a message is of, its payload, and whether its host has signed it."""
+        planned = self._planned.get(str(sample.key_expr))
+        if planned is None:
+            raise MessageError("belongs to no participant of this run")
+        payload = sample.payload.to_bytes()
+        attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        return planned, payload, attached == signature(payload, self._ack_keys[planned.host])
+
+    def _check(self, planned: PlannedParticipant, ack: Ack, payload: bytes, *, signed: bool) -> None:
+        """Raise ParticipantError if an ack of this run is not its host's, or reports a failure."""
+        if not signed:
+            raise ParticipantError(
+                planned.name,
+                ack.step,
+                f"an ack of it has arrived that its host '{planned.host}' did not send: another process of"
+                " this user takes part in the session",
+            )
+        if ack.error:
+            raise ParticipantError(planned.name, ack.step, ack.error)
+        if payload == self._last.get(planned.name):
+            raise MessageError(f"repeats the ack of step {ack.step}")
 
     def raise_failure(self) -> None:
         """Raise the failure that a participant itself has reported, if such a message has arrived."""
         while (sample := self._subscriber.try_recv()) is not None:
-            planned = self._planned.get(str(sample.key_expr))
             with suppress(MessageError):
-                ack = unpack_ack(sample.payload.to_bytes(), 0, 0)
-                if planned is not None and ack.run == self._run and ack.error:
+                planned, payload, signed = self._opened(sample)
+                ack = unpack_ack(payload, 0, 0)
+                if signed and ack.run == self._run and ack.error:
                     raise ParticipantError(planned.name, ack.step, ack.error)
+
+    def end(self, step: int) -> None:
+        """Raise ParticipantError if an ack has arrived after those of the last grant, that ended at `step`."""
+        while (sample := self._subscriber.try_recv()) is not None:
+            self._accept(sample, (), step, _NO_STEPS)
 
     def wake(self) -> None:
         """Make `receive` return."""

@@ -28,6 +28,8 @@ class JoinedHosts:
         watched: Outputs of which the hub needs every value.
         failed: Is called with participant and cause when a host reports a failure.
         ended: Is called with participant and reason when a host reports that one ends the session.
+        ack_keys: By host, the key with which it signs its acks.
+        programs_endpoint: Where programs outside Trocar connect, on this machine.
     """
 
     def __init__(
@@ -39,7 +41,12 @@ class JoinedHosts:
         watched: Sequence[tuple[str, str]],
         failed: Callable[[str, str], None],
         ended: Callable[[str, str], None],
+        *,
+        ack_keys: Mapping[str, bytes],
+        programs_endpoint: str = "",
     ) -> None:
+        self._ack_keys = ack_keys
+        self._programs_endpoint = programs_endpoint
         self._watched = list(watched)
         self._scenario = scenario
         self._plan = plan
@@ -96,6 +103,8 @@ class JoinedHosts:
             params=params,
             directory=str(self._directory),
             watched=[output for output in self._watched if output[0] in names],
+            ack_key=self._ack_keys[request.host].hex(),
+            programs_endpoint="" if far else self._programs_endpoint,
         )
 
     def lose(self, host: str) -> None:

@@ -67,7 +67,15 @@ def launch(
     foreign = {name: p.foreign_keys for name, p in participants.items() if isinstance(p, RouterClient)}
     gate = _gate(outside, certificates, access_settings(plan, scenario.name, foreign)) if outside else None
     return Session(
-        scenario, plan, here, directory, endpoint=endpoint, gate=gate, record=record, attachments=attachments
+        scenario,
+        plan,
+        here,
+        directory,
+        endpoint=endpoint,
+        gate=gate,
+        foreign_keys=[key for keys in foreign.values() for key in keys],
+        record=record,
+        attachments=attachments,
     )
 
 

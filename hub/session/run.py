@@ -45,6 +45,8 @@ __all__ = ["Run", "SessionSpec"]
 
 log = logging.getLogger(__name__)
 
+_KEY_BYTES = 16
+
 
 @dataclass(frozen=True)
 class SessionSpec:
@@ -58,6 +60,8 @@ class SessionSpec:
     """Where relative paths of the scenario start."""
     endpoint: str
     """Where the hub listens on loopback."""
+    programs_endpoint: str
+    """Where programs outside Trocar connect; empty if no device has keys for them."""
     gate: Gate | None
     """Lets other machines in."""
     resimulated: bool
@@ -103,7 +107,8 @@ class Run:
         self.refusals = Refusals()
         self.clock = _clock(scenario, plan)
         self.observers = Observers(plan, keys, self.number, Measures(scenario, plan), recorder)
-        self.acks = AckReceiver(session, keys, plan, self.number, self.refusals)
+        ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
+        self.acks = AckReceiver(session, keys, plan, self.number, self.refusals, ack_keys)
         self.host = self._host()
         """The stepped participants of this process."""
         stack.callback(self.host.close)
@@ -115,7 +120,15 @@ class Run:
         )
         watched = list(self.observers.away.values())
         self.joined_hosts = JoinedHosts(
-            scenario, plan, spec.directory, self.number, watched, self.failure.report, self.end
+            scenario,
+            plan,
+            spec.directory,
+            self.number,
+            watched,
+            self.failure.report,
+            self.end,
+            ack_keys=ack_keys,
+            programs_endpoint=spec.programs_endpoint,
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.observers)
         answering.callback(self.status.undeclare)
@@ -148,7 +161,7 @@ class Run:
 
     def _devices(self) -> SessionDevices:
         """Return the devices of the session, those of this process not yet open."""
-        endpoint, devices = self.spec.endpoint, self.spec.devices
+        endpoint, devices = self.spec.programs_endpoint, self.spec.devices
         for device in devices.values():
             if isinstance(device, RouterClient):
                 device.learn_hub(lambda: open_session("client", connect=[endpoint]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -13,11 +13,13 @@ from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
+from hub.security.outer_router import OuterRouter
 from hub.session.run import Run, SessionSpec
 from hub.session.run_state import RunState
 from hub.session.startup import start
 from hub.session.step_loop import OnAck, StepLoop
 from hub.transport.loopback_port import LoopbackPort
+from hub.transport.session_secret import listen_with_secret
 from schemas.errors import ScenarioError, SessionError
 from schemas.scenario import Scenario
 from schemas.trocar_msgs import GrantMessage
@@ -37,6 +39,7 @@ class Session:
         directory: Where relative paths of the scenario start.
         endpoint: Where the hub listens on loopback; by default at a free port.
         gate: Lets other machines in.
+        foreign_keys: Keys that devices share with programs, which meet them at a router of their own.
         record: The directory of the recording.
         attachments: What is kept in the recording beside the messages, by name.
         grants: Re-simulate these instead of reading devices.
@@ -52,6 +55,7 @@ class Session:
         *,
         endpoint: str | LoopbackPort | None = None,
         gate: Gate | None = None,
+        foreign_keys: Sequence[str] = (),
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
         grants: Iterator[GrantMessage] | None = None,
@@ -60,6 +64,13 @@ class Session:
         self.scenario = scenario
         self.plan = plan
         self._port = endpoint if isinstance(endpoint, LoopbackPort) else LoopbackPort(endpoint)
+        programs = None
+        if foreign_keys:
+            # programs look for the first port; one that was given is the hub's
+            programs, given = self._port.another(), self._port
+            if not given.given:
+                programs, self._port = given, programs
+        self._outer = OuterRouter(programs, foreign_keys, gated=gate is not None)
         self.gate = gate
         self.state = RunState()
         self._participants = participants
@@ -74,6 +85,11 @@ class Session:
         """Where the hub listens on loopback; one that was not given may become another one in `run`."""
         return self._port.endpoint
 
+    @property
+    def programs_endpoint(self) -> str:
+        """Where ROS programs and the like connect; empty if no device has keys for them."""
+        return self._outer.programs
+
     def run(self, progress: Callable[[Progress], None] | None = None) -> Summary:
         """Run to the end and return the summary. SIGTERM ends it as Ctrl-C does.
 
@@ -87,7 +103,8 @@ class Session:
         try:
             with (
                 Interrupt() as interrupt,
-                self._port.listen() as session,
+                self._outer.opened(),
+                listen_with_secret(self._port, connect=self._outer.inside) as session,
                 ExitStack() as stack,
             ):
                 spec = SessionSpec(
@@ -96,6 +113,7 @@ class Session:
                     self._participants,
                     self._directory,
                     self.endpoint,
+                    self.programs_endpoint,
                     self.gate,
                     resimulated=self._grants is not None,
                 )
@@ -110,7 +128,7 @@ class Session:
         steps = StepLoop(run, self._grants, self._on_ack)
         try:
             if self.gate is not None:
-                self.gate.open(self.endpoint)
+                self.gate.open(*self._outer.inside)
             _start_and_step(run, steps, interrupt, progress)
             run.bookkeeping.phase = "done"
         except SessionError as error:

@@ -80,6 +80,7 @@ class StepLoop:
                 published = now
                 run.status.publish()
         run.bookkeeping.stop()
+        run.acks.end(clock.step)
         run.host.drain()
         self.book_acks()
         if progress is not None:

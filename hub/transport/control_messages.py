@@ -76,3 +76,7 @@ class JoinReply(_Json):
     directory: str
     watched: list[tuple[str, str]]
     """Outputs, as participant and port, of which the hub needs every value: for a recording or a measure."""
+    ack_key: str
+    """The key with which the host signs its acks, in hexadecimal digits."""
+    programs_endpoint: str = ""
+    """Where devices on the hub's machine meet programs outside Trocar; empty on other machines."""

@@ -1,8 +1,12 @@
-"""The attachments of values and samples on Zenoh: run, step or sequence number, and time of sending."""
+"""The attachments of messages on Zenoh.
+
+Those of values and samples have run, step or sequence number, and time of sending; those of acks a signature.
+"""
 
 from __future__ import annotations
 
 import struct
+from hashlib import blake2b
 from time import monotonic_ns
 from typing import NamedTuple
 
@@ -10,7 +14,7 @@ import zenoh
 
 from schemas.errors import MessageError
 
-__all__ = ["Stamp", "Tag"]
+__all__ = ["Stamp", "Tag", "signature"]
 
 _TAG = struct.Struct("<QIqqHHq")
 _STAMP = struct.Struct("<QQq")
@@ -73,3 +77,8 @@ class Stamp(NamedTuple):
         if len(raw) != _STAMP.size:
             raise MessageError(f"attachment of {len(raw)} bytes, a device's sample has {_STAMP.size}")
         return cls(*_STAMP.unpack(raw))
+
+
+def signature(payload: bytes, key: bytes) -> bytes:
+    """Return the attachment of an ack; only the host that the hub has given `key` can make it."""
+    return blake2b(payload, digest_size=8, key=key).digest()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 from weakref import finalize
 
 import zenoh
@@ -30,6 +31,7 @@ class LoopbackPort:
 
         Raises ScenarioError if `endpoint` is not on loopback, ConnectError if no port is free.
         """
+        self._range = ports
         self._ports: Sequence[int] = ports
         self._held: socket.socket | None = None
         self.endpoint = "" if endpoint is None else require_loopback(endpoint)
@@ -40,12 +42,33 @@ class LoopbackPort:
         if self._ports:
             self._hold()
 
-    def listen(self) -> zenoh.Session:
-        """Open the hub's Zenoh session on the port. Raises ConnectError if a port that was given is taken."""
+    @property
+    def given(self) -> bool:
+        """Whether the port was given, not chosen."""
+        return not self._ports
+
+    def another(self) -> LoopbackPort:
+        """Return another free port, chosen as this one was."""
+        return LoopbackPort(ports=self._ports or self._range)
+
+    def listen(
+        self,
+        *,
+        listen: Sequence[str] = (),
+        connect: Sequence[str] = (),
+        security: Mapping[str, Any] | None = None,
+    ) -> zenoh.Session:
+        """Open the Zenoh session of a router on the port, and on the endpoints `listen` too.
+
+        `connect` and `security` are those of `open_session`. Raises ConnectError if a port that was given is
+        taken.
+        """
         while True:
             self.release()
             try:
-                return open_session("router", listen=[self.endpoint])
+                return open_session(
+                    "router", listen=[self.endpoint, *listen], connect=connect, security=security
+                )
             except ConnectError:
                 if not self._ports or _bound(address(self.endpoint)[1]) is not None:
                     raise
@@ -81,10 +104,9 @@ def listening_ports(endpoints: Iterable[str]) -> tuple[LoopbackPort, list[str]]:
     inside = [require_loopback(endpoint) for endpoint in given if endpoint not in outside]
     if len(inside) > 1:
         raise ScenarioError(f"{', '.join(inside)}: a hub listens once on loopback")
-    if inside:
-        return LoopbackPort(inside[0]), outside
     taken = {address(endpoint)[1] for endpoint in outside}
-    return LoopbackPort(ports=[port for port in PORTS if port not in taken]), outside
+    free = [port for port in PORTS if port not in taken]
+    return LoopbackPort(inside[0] if inside else None, free), outside
 
 
 def _bound(port: int) -> socket.socket | None:

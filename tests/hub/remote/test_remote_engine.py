@@ -104,6 +104,7 @@ def test_a_host_elsewhere_is_told_what_concerns_it(loaded):
         [("near", "out"), ("hand", "hand")],
         lambda *_: None,
         lambda *_: None,
+        ack_keys=dict.fromkeys(plan.hosts(), b"key"),
     )
     reply = joined_hosts.join(JoinRequest(host="remote/hand", pid=1))
     assert (reply.session, set(reply.params), reply.watched) == ("apart", {"hand"}, [("hand", "hand")])

@@ -6,11 +6,11 @@ from time import sleep
 
 import pytest
 
+from hub.remote.hub_connection import reach
 from hub.remote.live_sessions import live_sessions
 from hub.session.run_state import RunState
 from hub.transport.control_client import ask
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest, SetRequest, StepRequest
-from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError, MessageError, SessionError
 from schemas.keys import Keys
 
@@ -68,7 +68,7 @@ def steer(prepare):
                 for status in live_sessions([session.endpoint])
             ):
                 sleep(0.05)
-            with open_session("client", connect=[session.endpoint]) as client:
+            with reach(session.endpoint, "console") as client:
                 yield Console(session, client, thread), outcome
         finally:
             session.state.shutdown()

@@ -1,4 +1,4 @@
-"""What a stranger on the network can send to a running session: it is counted, logged and dropped, and
+"""What a process that has the secret of a session can send to it: garbage is counted, logged and dropped, and
 changes nothing.
 """
 
@@ -14,6 +14,7 @@ import zenoh
 from zenoh.handlers import Callback, RingChannel
 
 from hub.recording.recording import Recording
+from hub.remote.hub_connection import reach
 from hub.session.startup import start
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
@@ -167,7 +168,7 @@ def test_garbage_on_every_key_changes_nothing(prepare: Prepare, tmp_path, monkey
 
     def attack():
         try:
-            with open_session("client", connect=[session.endpoint]) as client:
+            with reach(session.endpoint, "stranger") as client:
                 strangers.append(Stranger(client))
                 with strangers[0].sending():
                     while strangers[0].rounds < 2 and not over.wait(0.01):
