@@ -55,7 +55,7 @@ def test_the_session_is_done_and_its_recording_verifies(
         "participant 'stair' has ended the session: the FMU asks to end the simulation at 3 s"
         " (fmi2Terminated)"
     )
-    again = verify(Recording(recorded))
+    again = verify(Recording(recorded), trust=True)
     assert (again.same, again.steps, again.hashes) == (True, steps, 2 * steps)
 
 
@@ -66,7 +66,7 @@ def test_at_an_event_of_fmi3(scenario: Path, tmp_path: Path) -> None:
     assert summary.ending is not None
     assert summary.ending.startswith("participant 'ball' has ended the session: the FMU asks to end")
     assert "at 0.451523641 s (terminateSimulation of fmi3UpdateDiscreteStates)" in summary.ending
-    assert verify(Recording(tmp_path / "recording")).same
+    assert verify(Recording(tmp_path / "recording"), trust=True).same
 
 
 def test_a_session_that_no_participant_ends(scenario: Path) -> None:

@@ -6,10 +6,11 @@ from pydantic import Field
 
 from hub.participant import Params
 from hub.planning.scenario_file import load
-from hub.recording.file_hashes import changed_files, file_hashes
+from hub.recording.file_hashes import file_hashes, unrecorded_files
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
+from schemas.errors import TrustError
 
 
 class Mesh(Params):
@@ -43,14 +44,22 @@ def test_every_path_among_the_parameters_is_hashed_once(directory):
     )
     expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c")}
     assert file_hashes([params, params], directory) == expected
-    assert changed_files(expected) == []
+    assert unrecorded_files(params, directory, expected.values()) == [str(directory / "missing.txt")]
 
 
 def test_what_has_changed_or_is_gone_is_named(directory):
-    hashes = file_hashes([Models(model=Path("a.txt"), more=[Path("b.txt"), Path("bag")])], directory)
+    params = Models(model=Path("a.txt"), more=[Path("b.txt"), Path("bag")])
+    recorded = file_hashes([params], directory).values()
+    assert unrecorded_files(params, directory, recorded) == []
     (directory / "a.txt").write_text("other")
     (directory / "bag/c.txt").unlink()
-    assert changed_files(hashes) == [str(directory / "a.txt"), str(directory / "bag" / "c.txt")]
+    assert unrecorded_files(params, directory, recorded) == [str(directory / "a.txt"), str(directory / "bag")]
+
+
+def test_a_file_with_the_recorded_contents_may_be_elsewhere(directory):
+    recorded = file_hashes([Models(model=Path("a.txt"))], directory).values()
+    (directory / "a.txt").rename(directory / "bag" / "a.txt")
+    assert unrecorded_files(Models(model=Path("a.txt")), directory / "bag", recorded) == []
 
 
 PLUGIN = """
@@ -93,5 +102,7 @@ def test_a_verification_tells_which_file_is_another_one_by_now(install_plugin, d
     assert verify(recording).same
     assert "expect differences" not in caplog.text
     (directory / "a.txt").write_text("longer")
-    assert not verify(recording).same
+    with pytest.raises(TrustError, match=r"asks for .*: the file '.*a\.txt', which is missing or has other"):
+        verify(recording)
+    assert not verify(recording, trust=True).same
     assert f"file '{directory / 'a.txt'}' has changed or is missing since the recording" in caplog.text
