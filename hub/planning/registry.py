@@ -35,7 +35,6 @@ __all__ = [
     "make",
     "missing_packages",
     "require_extra",
-    "validated",
 ]
 
 Participant = type[Stepped] | type[Device]
@@ -136,20 +135,17 @@ def _import(kind: Kind) -> Any:
         ) from error
 
 
-def validated(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Params:
-    """Return the parameters of a participant of kind `name`; relative paths in them start at `directory`.
+def make(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Stepped | Device:
+    """Return a participant of kind `name`; relative paths in its parameters start at `directory`.
 
     Raises ScenarioError if the kind cannot be loaded or the parameters are invalid.
     """
+    kind = load(name)
     try:
-        return load(name).params_model.model_validate(params, context={"directory": directory})
+        checked = kind.params_model.model_validate(params, context={"directory": directory})
     except ValidationError as error:
         raise ScenarioError(f"participant '{participant}' of kind '{name}': {error}") from error
-
-
-def make(name: str, participant: str, params: Mapping[str, Any], directory: Path) -> Stepped | Device:
-    """Return a participant of kind `name`; the arguments and errors are those of `validated`."""
-    return load(name)(participant, validated(name, participant, params, directory))
+    return kind(participant, checked)
 
 
 def broken() -> dict[str, str]:

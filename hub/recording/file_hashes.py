@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from hub.participant import Params
 
-__all__ = ["file_hashes", "unrecorded_files"]
+__all__ = ["file_hashes", "has_contents"]
 
 
 def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
@@ -26,17 +26,11 @@ def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
     return {str(file): _hash(file) for file in sorted(files)}
 
 
-def unrecorded_files(params: Params, directory: Path, recorded: Collection[str]) -> list[str]:
-    """Return the paths in `params` whose contents are missing or have none of the hashes in `recorded`.
+def has_contents(path: Path, recorded: Collection[str]) -> bool:
+    """Return whether there is a file at `path` whose hash is among those in `recorded`.
 
-    Relative paths start at `directory`. A directory stands for all that is directly in it, so that one with
-    a directory in it is never recorded.
+    A directory stands for all that is directly in it, so that one with a directory in it has none.
     """
-    named = sorted({directory / path for path in _paths(params)})
-    return [str(path) for path in named if not _is_recorded(path, recorded)]
-
-
-def _is_recorded(path: Path, recorded: Collection[str]) -> bool:
     try:
         files = list(path.iterdir()) if path.is_dir() else [path]
         return bool(files) and all(file.is_file() and _hash(file) in recorded for file in files)

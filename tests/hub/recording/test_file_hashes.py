@@ -1,4 +1,5 @@
 import hashlib
+import os
 from pathlib import Path
 
 import pytest
@@ -6,7 +7,7 @@ from pydantic import Field
 
 from hub.participant import Params
 from hub.planning.scenario_file import load
-from hub.recording.file_hashes import file_hashes, unrecorded_files
+from hub.recording.file_hashes import file_hashes, has_contents
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
@@ -44,22 +45,33 @@ def test_every_path_among_the_parameters_is_hashed_once(directory):
     )
     expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c")}
     assert file_hashes([params, params], directory) == expected
-    assert unrecorded_files(params, directory, expected.values()) == [str(directory / "missing.txt")]
 
 
-def test_what_has_changed_or_is_gone_is_named(directory):
-    params = Models(model=Path("a.txt"), more=[Path("b.txt"), Path("bag")])
-    recorded = file_hashes([params], directory).values()
-    assert unrecorded_files(params, directory, recorded) == []
+def test_what_has_changed_or_is_gone(directory):
+    paths = [directory / name for name in ("a.txt", "b.txt", "bag")]
+    recorded = file_hashes([Models(model=Path("a.txt"), more=paths)], directory).values()
+    assert all(has_contents(path, recorded) for path in paths)
     (directory / "a.txt").write_text("other")
     (directory / "bag/c.txt").unlink()
-    assert unrecorded_files(params, directory, recorded) == [str(directory / "a.txt"), str(directory / "bag")]
+    assert [has_contents(path, recorded) for path in paths] == [False, True, False]
+
+
+def test_a_directory_with_more_than_was_recorded(directory):
+    recorded = file_hashes([Models(model=Path("bag"))], directory).values()
+    (directory / "bag" / "more").mkdir()
+    assert not has_contents(directory / "bag", recorded)
 
 
 def test_a_file_with_the_recorded_contents_may_be_elsewhere(directory):
     recorded = file_hashes([Models(model=Path("a.txt"))], directory).values()
-    (directory / "a.txt").rename(directory / "bag" / "a.txt")
-    assert unrecorded_files(Models(model=Path("a.txt")), directory / "bag", recorded) == []
+    assert has_contents((directory / "a.txt").rename(directory / "bag" / "a.txt"), recorded)
+
+
+def test_what_is_no_file_has_no_contents(directory):
+    os.mkfifo(directory / "pipe")
+    (directory / "loop").symlink_to("loop")
+    for name in ("pipe", "loop", "a" * 5000, "\0", "missing"):
+        assert not has_contents(directory / name, [sha256("")])
 
 
 PLUGIN = """
