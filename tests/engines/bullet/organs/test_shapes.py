@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 
 import numpy as np
 import pytest
@@ -339,6 +340,10 @@ def test_a_bad_mesh_is_refused_with_what_is_wrong(tmp_path, mesh, expected):
             "ends too early",
         ),
         (
+            "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 99999999999999999999 float\n",
+            "ends too early",
+        ),
+        (
             "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 x 0\n",
             "something else",
         ),
@@ -362,6 +367,12 @@ def test_a_bad_mesh_is_refused_with_what_is_wrong(tmp_path, mesh, expected):
 def test_a_file_without_tetrahedra_is_refused(tmp_path, content, expected):
     (tmp_path / "organ.vtk").write_text(content)
     with pytest.raises(ValidationError, match=expected):
+        organ(mesh=str(tmp_path / "organ.vtk"), material="liver", anchors=[])
+
+
+def test_a_pipe_has_no_end_and_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "organ.vtk")
+    with pytest.raises(ValidationError, match=r"organ\.vtk: is no file"):
         organ(mesh=str(tmp_path / "organ.vtk"), material="liver", anchors=[])
 
 
