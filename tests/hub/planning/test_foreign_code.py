@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -29,11 +31,12 @@ scene: {library: ./vendor.so}
 
 
 @pytest.fixture
-def scenario(pendulum: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def scenario(pendulum: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     (tmp_path / "foreign_module.py").write_text(MODULE)
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "session.yaml").write_text(SCENARIO)
-    return str(tmp_path / "session.yaml")
+    yield str(tmp_path / "session.yaml")
+    sys.modules.pop("foreign_module", None)
 
 
 def test_one_line_names_the_code_before_it_is_imported(

@@ -24,11 +24,11 @@ class Bone(BaseModel):
 class Everything(Params):
     model: Path
     name: str = ""
-    parts: dict[Annotated[str, StringConstraints(pattern=r"^[a-z]+$")], Skin] = {}
+    parts: dict[Annotated[str, StringConstraints(pattern=r"^[a-z]+$")], Skin] = Field(default={})
     either: Annotated[Skin | Bone, Field(discriminator="kind")] | None = None
     pair: tuple[Path, str, Path] | None = None
-    more: list[Path | Skin] = []
-    free: dict[str, Any] = {}
+    more: list[Path | Skin] = Field(default=[])
+    free: dict[str, Any] = Field(default={})
 
     @model_validator(mode="before")
     @classmethod

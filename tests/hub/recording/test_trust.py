@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +113,9 @@ Stranger = Callable[..., Recording]
 
 
 @pytest.fixture
-def place(install_plugin: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def place(
+    install_plugin: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Path]:
     """A directory on PYTHONPATH with a foreign module, a library, a secret, a link to it and a known file."""
     kinds = {"plant": "installed:Plant", "reader": "installed:Reader"}
     entries = {"trocar.engines": kinds, "trocar.devices": {"hand": "installed:Hand"}}
@@ -129,7 +131,9 @@ def place(install_plugin: Callable[..., None], tmp_path: Path, monkeypatch: pyte
         (place / name).write_text(text)
     (place / "link.txt").symlink_to(place / "secret.txt")
     (place / "session.yaml").write_text(SCENARIO)
-    return place
+    yield place
+    for name in ("foreign", "package", "package.__main__"):
+        sys.modules.pop(name, None)
 
 
 @pytest.fixture(scope="module")

@@ -108,8 +108,8 @@ CODE = "__import__('pathlib').Path('{}').touch()"
         (
             "std_msgs/msg/A",
             "ros2idl",
-            "module std_msgs {{ module msg {{ struct A {{ string data; @verbatim(language='x', text=\"{code}\")"
-            ' long y; const string X = "{code}"; }}; }}; }};',
+            "module std_msgs {{ module msg {{ struct A {{ string data; @verbatim(language='x', text="
+            '"{code}") long y; const string X = "{code}"; }}; }}; }};',
         ),
     ],
 )
