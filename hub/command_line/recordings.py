@@ -73,4 +73,4 @@ def report(recording: RecordingPath, *, output: Output = None) -> None:
 
     page = output or recording.with_name(f"{recording.stem if recording.is_file() else recording.name}.html")
     write(Recording(recording), page)
-    console.print(f"wrote {page}", soft_wrap=True)
+    console.print(f"wrote {page}", markup=False, soft_wrap=True)

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from hub.command_line import main
+from hub.command_line.display import show
 from hub.planning.scenario_file import load
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
@@ -319,3 +320,17 @@ def test_the_command_line(
     assert caught.value.code == 2
     assert "the class 'foreign:Quiet'" in capfd.readouterr().err
     assert left(place) == set()
+
+
+def test_nothing_in_a_recording_is_a_command_to_the_terminal(
+    stranger: Stranger, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    recording = stranger(name="[/]\x1b]0;title\x07", kind="plant")
+    monkeypatch.setattr(sys, "argv", ["trocar", "verify", str(recording.file)])
+    with pytest.raises(SystemExit):
+        main()
+    err = capfd.readouterr().err
+    assert "\x1b" not in err
+    assert "title" in err
+    show({"name": "[/]\x1b[2J"}, as_json=False)
+    assert "[/]\\x1b[2J" in capfd.readouterr().err
