@@ -110,5 +110,5 @@ def _rows(status: GatewayStatus) -> Iterable[tuple[Any, ...]]:
             f"{topic.rate:.1f}",
             topic.messages,
             topic.refused or "",
-            escape(topic.reason),
+            topic.reason,
         )

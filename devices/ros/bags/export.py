@@ -42,6 +42,10 @@ _Routes = Mapping[str, Sequence[tuple[Row, Port]]]
 """By the topics of a recording: the rows that get its values, each with the port that has written them."""
 
 
+_LONGEST_GAP_NS = 3_600_000_000_000
+"""Between two messages: states are repeated at each period, so that a wrong time would fill the disk."""
+
+
 @dataclass(frozen=True)
 class ExportSummary:
     """What was written."""
@@ -76,6 +80,11 @@ def export(
     with BagWriter(directory) as bag:
         replay, last_ns = _Replay(shown, routes, _RowWriter(bag, recording.started_ns())), -1
         for message in recording.messages(*routes):
+            if message.time_ns - max(last_ns, 0) > _LONGEST_GAP_NS:
+                raise RecordingError(
+                    f"'{recording.file}': nothing from {max(last_ns, 0) * 1e-9:g} s to"
+                    f" {message.time_ns * 1e-9:g} s; at most {_LONGEST_GAP_NS * 1e-9:g} s are allowed"
+                )
             last_ns = max(last_ns, message.time_ns)
             try:
                 replay.publish_before(message.time_ns)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,8 @@ from devices.ros.bags.export import export
 from hub.planning import registry
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
+from schemas.codec import encode
+from schemas.crtk import StringStamped
 from schemas.errors import RecordingError, TrustError
 
 MODULE = """
@@ -33,8 +35,11 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sys.modules.pop("foreign_gateway", None)
 
 
-def stranger(place: Path, **gateways: dict[str, object]) -> Recording:
-    """Return a recording of a session with these gateways, of which each has a kind and parameters."""
+def stranger(place: Path, hours: Sequence[int] = (), **gateways: dict[str, object]) -> Recording:
+    """Return a recording of a session with these gateways, of which each has a kind and parameters.
+
+    At each of `hours` a message entered by `ros`.
+    """
     scenario = {"name": "guest", "step": 1_000_000, "participants": gateways}
     participants = {
         name: {
@@ -54,7 +59,12 @@ def stranger(place: Path, **gateways: dict[str, object]) -> Recording:
         "plan.json": json.dumps(plan).encode(),
         "origin.json": json.dumps({"directory": str(place)}).encode(),
     }
-    Recorder(place / "recording", attachments=attachments).close()
+    with Recorder(place / "recording", attachments=attachments) as recorder:
+        if hours:
+            entered = recorder.channel("/device/ros/out/PSM1/state_command", StringStamped.ros_type)
+            message = StringStamped(string="enable")
+            for hour in hours:
+                recorder.write(entered, hour * 3_600_000_000_000, encode(message))
     return Recording(place / "recording")
 
 
@@ -86,6 +96,13 @@ def test_a_description_with_other_contents_is_not_read(place: Path) -> None:
         export(recording, place / "bag")
     assert not (place / "bag").exists()
     export(recording, place / "bag", trust=True)
+
+
+def test_a_time_that_would_fill_the_disk(place: Path) -> None:
+    """A gateway's transforms are written in each of its periods up to the time of the last message."""
+    recording = stranger(place, ros={**INSTALLED, "arms": {"PSM1": {"instrument": "400006"}}}, hours=[1, 3])
+    with pytest.raises(RecordingError, match="nothing from 3600 s to 10800 s; at most 3600 s are allowed"):
+        export(recording, place / "bag")
 
 
 CODE = "__import__('pathlib').Path('{}').touch()"
