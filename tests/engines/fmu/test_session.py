@@ -10,6 +10,7 @@ from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
+from schemas.errors import TrustError
 from tests.engines.fmu.driving import BALL, STAIR
 from tests.engines.fmus import build
 
@@ -84,3 +85,17 @@ def test_the_command_line_shows_who_ended_it(scenario: Path) -> None:
     shown = " ".join(result.stderr.split())
     assert "ending participant 'stair' has ended the session" in shown
     assert "at 3 s" in shown
+
+
+def test_without_trust_a_recording_runs_no_fmu(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also not one whose contents have not changed: their hash, too, is from whoever has recorded it."""
+    launch(load(str(scenario), ["duration=200 ms"]), record=tmp_path / "recording").run()
+    recording = Recording(tmp_path / "recording")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))  # nothing can be unpacked
+    for directory in (None, tmp_path):
+        with pytest.raises(TrustError) as caught:
+            verify(recording, directory=directory)
+        for name in ("stair", "ball"):
+            assert f"native code in '{tmp_path / name}.fmu' (participant '{name}')" in str(caught.value)

@@ -170,6 +170,8 @@ def stranger(
         own |= spec
         new = planned["participants"].setdefault(name, {"role": "engine", "host": "hub", "period": 1})
         new |= {"name": name, "kind": own["kind"], "ports": [], **(plan or {})}
+        if new["role"] == "engine" and name not in planned["order"]:
+            planned["order"].append(name)
         origin["directory"] = directory
         attachments = {
             f"{part}.json": json.dumps(content).encode()
@@ -301,6 +303,18 @@ def test_a_device_that_the_plan_has_as_an_engine(stranger: Stranger, place: Path
     with pytest.raises(RecordingError, match="has participant 'hand' as engine, but kind 'hand' is one of a"):
         verify(recording)
     assert left(place) == set()
+
+
+@pytest.mark.parametrize(
+    ("plan", "problem"),
+    [
+        ({"name": "other"}, "a participant has two names"),
+        ({"role": "device"}, "its order is not that of its engines and controllers"),
+    ],
+)
+def test_a_plan_that_contradicts_itself(stranger: Stranger, plan: dict[str, str], problem: str) -> None:
+    with pytest.raises(RecordingError, match=f"its plan contradicts itself: {problem}"):
+        verify(stranger(plan=plan), trust=True)
 
 
 def test_to_read_a_recording_imports_nothing(stranger: Stranger, place: Path) -> None:
