@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from hub.observation.summary import Progress
 from hub.planning import registry
 from hub.planning.plan import Plan, PlannedParticipant
-from hub.recording.file_hashes import changed_files
 from hub.recording.recording import Recording
+from hub.recording.trust import require_trust
 from hub.session.session import Session
 from schemas.lockstep import Ack
 from schemas.trocar_msgs import AckMessage
 
 __all__ = ["VerifySummary", "verify"]
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -40,21 +38,34 @@ class VerifySummary:
 
 
 def verify(
-    recording: Recording, *, endpoint: str | None = None, progress: Callable[[Progress], None] | None = None
+    recording: Recording,
+    *,
+    trust: bool = False,
+    directory: Path | None = None,
+    endpoint: str | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> VerifySummary:
     """Run the recorded session again, in new processes, with the recorded grants.
 
-    Raises RecordingError if the recording is not of a session, and what `Session.run` raises.
+    Args:
+        recording: The recording, which may be a stranger's.
+        trust: Allow what `require_trust` refuses.
+        directory: Where relative paths of the scenario start, by default where they did.
+        endpoint: Where the hub listens on loopback; by default at a free port.
+        progress: Is called several times a second of wall time.
+
+    Raises RecordingError if the recording is not of a session, and what `require_trust` and `Session.run`
+    raise.
     """
     scenario = recording.scenario().model_copy(update={"pace": "fast"})
-    plan, directory = _plan(recording), recording.directory()
+    plan, directory = _plan(recording), directory or recording.directory()
+    stepped = {name: planned for name, planned in plan.participants.items() if planned.role != "device"}
+    require_trust(recording, stepped, directory, trust=trust)
     made = {
         name: registry.make(planned.kind, name, scenario.participants[name].params, directory)
-        for name, planned in plan.participants.items()
-        if planned.host == "hub" and planned.role != "device"
+        for name, planned in stepped.items()
+        if planned.host == "hub"
     }
-    for path in changed_files(recording.files()):
-        log.warning("file '%s' has changed or is missing since the recording: expect differences", path)
     comparison = _Comparison(recording, plan)
     session = Session(
         scenario,
@@ -115,10 +126,15 @@ class _Comparison:
 
 
 def _plan(recording: Recording) -> Plan:
-    """Return the recorded plan, with remote participants in processes here and without outputs to devices."""
+    """Return the recorded plan, with remote participants in processes here and without outputs to devices.
+
+    Devices are in the hub's process, which makes none in a re-simulation; a host process would open them.
+    """
     plan = recording.plan()
     participants = {
-        name: planned.model_copy(update={"host": planned.host.replace("/", "_")})
+        name: planned.model_copy(
+            update={"host": "hub" if planned.role == "device" else planned.host.replace("/", "_")}
+        )
         for name, planned in plan.participants.items()
     }
     connections = tuple(k for k in plan.connections if plan.participants[k.target].role != "device")

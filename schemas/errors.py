@@ -2,7 +2,8 @@
 
 TrocarError
 ├── ScenarioError          the scenario cannot be run as written (exit code 2)
-│   └── MissingExtraError  a package that an optional part needs is not installed
+│   ├── MissingExtraError  a package that an optional part needs is not installed
+│   └── TrustError         a recording asks for code or files that were not allowed
 ├── MessageError           bytes or values that are not a valid message
 │   └── LateError          a message that arrives after a newer one
 ├── SessionError           the running session ended before its time (exit code 1)
@@ -32,6 +33,7 @@ __all__ = [
     "SessionError",
     "StateError",
     "TrocarError",
+    "TrustError",
     "did_you_mean",
 ]
 
@@ -59,6 +61,10 @@ class MissingExtraError(ScenarioError):
             f" '{distribution}[{extra}]'"
         )
         self.extra = extra
+
+
+class TrustError(ScenarioError):
+    """A recording asks for code that is not installed, or for files, and the user has not allowed it."""
 
 
 class MessageError(TrocarError):

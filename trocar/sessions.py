@@ -93,7 +93,11 @@ def run(
 
 
 def verify(
-    recording: str | Path | Recording, *, progress: Callable[[Progress], None] | None = None
+    recording: str | Path | Recording,
+    *,
+    trust: bool = False,
+    directory: str | Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> VerifySummary:
     """Simulate a recorded session again from its grants and compare every state hash.
 
@@ -101,15 +105,20 @@ def verify(
 
     Args:
         recording: A recording, or the path of its directory or MCAP file.
+        trust: Allow it to run classes, FMUs and native libraries that it names, and to read files other than
+            those it was recorded with.
+        directory: Where relative paths of its scenario start, by default where they did.
         progress: Is called several times a second of wall time.
 
     Raises:
         RecordingError: Not a recording of a session, or a damaged one.
+        TrustError: It asks for what `trust` allows; the message lists it.
         SessionError: The session failed.
     """
     _warn_of_other_bits()
     opened = recording if isinstance(recording, Recording) else Recording(Path(recording))
-    return resimulate(opened, progress=progress)
+    start = None if directory is None else Path(directory)
+    return resimulate(opened, trust=trust, directory=start, progress=progress)
 
 
 def _warn_of_other_bits() -> None:

@@ -21,6 +21,7 @@ __all__ = ["LibOvr", "LibOvrParams"]
 class LibOvrParams(HeadsetParams):
     """Where the library is, and what is read."""
 
+    native_code = ("library",)
     library: Annotated[
         Path | None,
         Field(

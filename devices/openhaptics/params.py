@@ -43,6 +43,7 @@ class StylusParams(Params):
 class TouchParams(Params):
     """The styluses of one host: one process of one host may use OpenHaptics."""
 
+    native_code = ("library",)
     library: Annotated[
         Path | None,
         Field(

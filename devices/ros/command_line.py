@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from hub.command_line.display import show, table
-from hub.command_line.options import Json, RecordingPath
+from hub.command_line.options import Json, RecordingPath, Trust
 from schemas.trocar_msgs import GatewayStatus
 
 __all__ = ["app"]
@@ -74,6 +74,7 @@ def bag(
     gateway: Annotated[
         str | None, typer.Option(help="Whose topics, where a session has several gateways.")
     ] = None,
+    trust: Trust = False,
     as_json: Json = False,
 ) -> None:
     """Write what a recorded session exchanged with ROS programs as a bag, for `ros2 bag play`."""
@@ -81,10 +82,8 @@ def bag(
     from hub.recording.recording import Recording
 
     stem = recording.parent if recording.is_file() else recording
-    show(
-        asdict(export(Recording(recording), output or stem.with_name(f"{stem.resolve().name}-ros"), gateway)),
-        as_json=as_json,
-    )
+    target = output or stem.with_name(f"{stem.resolve().name}-ros")
+    show(asdict(export(Recording(recording), target, gateway, trust=trust)), as_json=as_json)
 
 
 def _print(out: Console, session: str, name: str, status: GatewayStatus) -> None:
@@ -111,5 +110,5 @@ def _rows(status: GatewayStatus) -> Iterable[tuple[Any, ...]]:
             f"{topic.rate:.1f}",
             topic.messages,
             topic.refused or "",
-            escape(topic.reason),
+            topic.reason,
         )

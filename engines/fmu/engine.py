@@ -33,6 +33,7 @@ __all__ = ["FmuEngine", "FmuParams"]
 class FmuParams(Params):
     """Parameters of an FMU."""
 
+    native_code = ("path",)
     path: Path = Field(description="the .fmu file; a relative path starts at the scenario")
     start: dict[str, Any] = Field(
         default_factory=dict[str, Any],

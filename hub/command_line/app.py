@@ -19,11 +19,15 @@ from hub.command_line.hosts import device, engine
 from hub.command_line.link import link
 from hub.command_line.ls import ls
 from hub.command_line.run import run
+from hub.planning.limits import shown
 from schemas.errors import ScenarioError, TrocarError
 
 __all__ = ["app", "main"]
 
 log = logging.getLogger("trocar")
+
+_LONGEST = 100_000
+"""Characters of an error message."""
 
 app = typer.Typer(
     name="trocar",
@@ -87,5 +91,6 @@ def main() -> None:
         app()
     except TrocarError as error:
         log.debug("traceback", exc_info=error)  # shown with --debug
-        console.print(Text("error: ", "bold red"), Text(str(error)), sep="", soft_wrap=True)
+        message = shown(str(error), _LONGEST)  # it may quote a stranger's file
+        console.print(Text("error: ", "bold red"), Text(message), sep="", soft_wrap=True)
         sys.exit(2 if isinstance(error, ScenarioError) else 1)

@@ -18,7 +18,10 @@ __all__ = ["check", "schema"]
 
 
 def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json = False) -> None:
-    """Check a scenario without starting anything, and show its ports and connections."""
+    """Check a scenario without starting anything, and show its ports and connections.
+
+    A class that it names as a kind is imported, which one line says before: only the class has the ports.
+    """
     file = load(scenario, overrides or ())
     with with_places(file.source):
         plan, _ = plan_of(file.scenario, file.params)

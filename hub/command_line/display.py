@@ -12,11 +12,16 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
+from rich.text import Text
 
 from hub.observation.summary import Progress
+from hub.planning.limits import shown
 from schemas.scenario import Scenario
 
 __all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]
+
+_LONGEST = 10_000
+"""Characters of one cell."""
 
 _UNITS = {"s": "s", "n": "N", "j": "J", "m": "m"}
 
@@ -29,7 +34,8 @@ def table(rows: Iterable[Iterable[object]], *columns: str) -> Table:
     for name in columns:
         made.add_column(name, overflow="fold")  # a narrow terminal cuts nothing off
     for row in rows:
-        made.add_row(*(str(cell) for cell in row))
+        # a name may be a stranger's: it is neither markup of rich nor a command to the terminal
+        made.add_row(*(Text(shown(str(cell), _LONGEST)) for cell in row))
     return made
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hub.command_line.options import Certificates
+from hub.command_line.options import Certificates, Directory
 
 __all__ = ["device", "engine"]
 
@@ -24,12 +23,6 @@ Connect = Annotated[
 SessionName = Annotated[
     str,
     typer.Option("--session", metavar="NAME", help="The session to join; default: the one of that hub."),
-]
-Directory = Annotated[
-    Path | None,
-    typer.Option(
-        exists=True, file_okay=False, help="Where relative paths of the scenario start on this machine."
-    ),
 ]
 
 

@@ -15,12 +15,14 @@ from schemas.errors import ScenarioError
 
 __all__ = [
     "Certificates",
+    "Directory",
     "HubEndpoints",
     "Json",
     "Listen",
     "Overrides",
     "RecordingPath",
     "ScenarioName",
+    "Trust",
     "with_places",
 ]
 
@@ -40,6 +42,22 @@ RecordingPath = Annotated[
     Path,
     typer.Argument(
         metavar="RECORDING", exists=True, help="The directory of a recording, or the MCAP file in it."
+    ),
+]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        help=(
+            "Allow the recording to run classes, FMUs and native libraries that it names, and to read files"
+            " other than those it was recorded with."
+        ),
+    ),
+]
+Directory = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True, file_okay=False, help="Where relative paths of the scenario start on this machine."
     ),
 ]
 Listen = Annotated[

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hub.command_line.display import RunProgress, console, show
-from hub.command_line.options import Json, Listen, RecordingPath
+from hub.command_line.options import Directory, Json, Listen, RecordingPath, Trust
 from hub.recording.recording import Recording
 
 __all__ = ["recover", "replay", "report", "verify"]
@@ -19,7 +19,14 @@ Output = Annotated[
 ]
 
 
-def verify(recording: RecordingPath, *, listen: Listen = None, as_json: Json = False) -> None:
+def verify(
+    recording: RecordingPath,
+    *,
+    trust: Trust = False,
+    directory: Directory = None,
+    listen: Listen = None,
+    as_json: Json = False,
+) -> None:
     """Simulate a recorded session again and compare every state hash.
 
     If one differs, the exit code is 1 and the result names the first step and participant that differ.
@@ -28,7 +35,7 @@ def verify(recording: RecordingPath, *, listen: Listen = None, as_json: Json = F
 
     opened = Recording(recording)
     with RunProgress(opened.scenario()) as progress:
-        summary = resimulate(opened, endpoint=listen, progress=progress)
+        summary = resimulate(opened, trust=trust, directory=directory, endpoint=listen, progress=progress)
     show(asdict(summary), as_json=as_json)
     if not summary.same:
         raise typer.Exit(1)
@@ -66,4 +73,4 @@ def report(recording: RecordingPath, *, output: Output = None) -> None:
 
     page = output or recording.with_name(f"{recording.stem if recording.is_file() else recording.name}.html")
     write(Recording(recording), page)
-    console.print(f"wrote {page}", soft_wrap=True)
+    console.print(f"wrote {page}", markup=False, soft_wrap=True)

@@ -38,6 +38,12 @@ class Params(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    native_code: ClassVar[tuple[str, ...]] = ()
+    """Names of the parameters that are files of native code, such as a vendor's library.
+
+    A recording that gives such a parameter is re-simulated only with `--trust`.
+    """
+
 
 class Participant(ABC):
     """What engines, controllers and devices have in common: a name, parameters and ports."""

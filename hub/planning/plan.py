@@ -125,6 +125,21 @@ class Plan(_Part):
         except (AttributeError, KeyError, TypeError) as error:
             raise ValueError(f"not a plan ({type(error).__name__}: {error})") from error
 
+    def contradiction(self) -> str:
+        """Return what in a plan of unknown origin refers to something that it lacks; empty if nothing."""
+        if any(name != planned.name for name, planned in self.participants.items()):
+            return "a participant has two names"
+        if sorted(self.order) != sorted(n for n, p in self.participants.items() if p.role != "device"):
+            return "its order is not that of its engines and controllers"
+        ports = {(name, port.name) for name, planned in self.participants.items() for port in planned.ports}
+        for one in (*self.connections, *self.from_devices, *self.to_devices):
+            if not {(one.source, one.source_port), (one.target, one.target_port)} <= ports:
+                return "a connection has an end that is no port"
+        for one in self.bonds:
+            if not {one.bond.motion.participant, one.bond.force.participant} <= self.participants.keys():
+                return "a bond has a side without a participant"
+        return ""
+
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""
         planned = self.participants[participant]

@@ -55,7 +55,8 @@ def _new_values(spec: dict[str, Any]) -> dict[str, str]:
     found: dict[str, str] = {}
     for parameter, values in _PARAMETER_VALUES.items():
         old = spec.get(parameter)
-        if isinstance(old, str) and old in values and isinstance(spec.get("kind"), str):
+        # a kind of 0.1.0 is an installed one: to read a recording must not import what it names
+        if isinstance(old, str) and old in values and str(spec.get("kind")) in registry.kinds():
             with suppress(ScenarioError):  # the validation of parameters reports an unknown kind
                 field = registry.load(spec["kind"]).params_model.model_fields.get(parameter)
                 accepted = get_args(field.annotation) if field else ()

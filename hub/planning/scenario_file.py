@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from hub.participant import Params
 from hub.planning import registry
+from hub.planning.foreign_code import foreign_code
 from hub.planning.limits import MAX_PARTICIPANTS, MAX_PROBLEMS, shown
 from hub.planning.renamed import SCENARIOS, replace_old_names
 from hub.planning.scenario_source import Location, Source, read
@@ -52,6 +53,7 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
         source.override(override)
     _check_number(source)
     replace_old_names(source)
+    _log_code(source)
     found = [
         str(located(error, source)) for error in islice(spread_scene(source, _models(source)), MAX_PROBLEMS)
     ]
@@ -102,6 +104,15 @@ def _check_number(source: Source) -> None:
     if number > MAX_PARTICIPANTS:
         problem = f"a session of {number} participants; at most {MAX_PARTICIPANTS} are allowed"
         raise located(ScenarioError(problem, path=("participants",)), source)
+
+
+def _log_code(source: Source) -> None:
+    """Log what is about to be imported or loaded that is not an installed kind."""
+    code = foreign_code(_specs(source).values(), source.tree.get("scene"))
+    if code:
+        more = f" and {len(code) - MAX_PROBLEMS} more" if len(code) > MAX_PROBLEMS else ""
+        named = ", ".join(map(shown, code[:MAX_PROBLEMS]))
+        log.info("this scenario runs code that is not installed as a kind: %s%s", named, more)
 
 
 def _specs(source: Source) -> dict[str, dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from hub.participant import Params
 
-__all__ = ["changed_files", "file_hashes"]
+__all__ = ["file_hashes", "has_contents"]
 
 
 def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
@@ -26,11 +26,16 @@ def file_hashes(params: Iterable[Params], directory: Path) -> dict[str, str]:
     return {str(file): _hash(file) for file in sorted(files)}
 
 
-def changed_files(recorded: Mapping[str, str]) -> list[str]:
-    """Return the files in `recorded`, hashes by path, that are missing now or have other contents."""
-    return [
-        path for path, digest in recorded.items() if not Path(path).is_file() or _hash(Path(path)) != digest
-    ]
+def has_contents(path: Path, recorded: Collection[str]) -> bool:
+    """Return whether there is a file at `path` whose hash is among those in `recorded`.
+
+    A directory stands for all that is directly in it, so that one with a directory in it has none.
+    """
+    try:
+        files = list(path.iterdir()) if path.is_dir() else [path]
+        return bool(files) and all(file.is_file() and _hash(file) in recorded for file in files)
+    except OSError:  # what cannot be read has no contents that could have been recorded
+        return False
 
 
 def _hash(file: Path) -> str:

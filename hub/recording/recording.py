@@ -156,9 +156,12 @@ class Recording(Bag):
             raise RecordingError(f"'{self.file}': attachment {name} is not a table: {error}") from error
 
     def plan(self) -> Plan:
-        """Return the plan of the session. Raises RecordingError if the recording is not one of a session."""
+        """Return the plan of the session.
+
+        Raises RecordingError if the recording is not one of a session, or if its plan contradicts itself.
+        """
         try:
-            return Plan.model_validate_json(self.attachments["plan.json"])
+            plan = Plan.model_validate_json(self.attachments["plan.json"])
         except KeyError:
             raise RecordingError(
                 f"'{self.file}' holds no plan.json: it was not recorded by `trocar run`"
@@ -168,6 +171,9 @@ class Recording(Bag):
                 f"'{self.file}': this version cannot read the plan in it:"
                 f" {error.errors(include_url=False)[0]['msg']}"
             ) from error
+        if problem := plan.contradiction():
+            raise RecordingError(f"'{self.file}': its plan contradicts itself: {problem}")
+        return plan
 
     def directory(self) -> Path:
         """Return the directory in which relative paths of the scenario started.

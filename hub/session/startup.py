@@ -6,7 +6,7 @@ import logging
 from time import monotonic, sleep
 
 from hub.planning.bonds import check_bonds
-from hub.session.run import Run, SessionSpec
+from hub.session.run import Run
 from schemas.errors import SessionError
 
 __all__ = ["start"]
@@ -21,7 +21,7 @@ def start(run: Run) -> None:
     ParticipantError.
     """
     spec = run.spec
-    hosts = [host for host in spec.plan.hosts() if host != "hub" and _is_needed(host, spec)]
+    hosts = [host for host in spec.plan.hosts() if host != "hub"]
     for host in hosts:
         if not host.startswith("remote/"):
             run.processes.start(host, spec.endpoint, spec.scenario.name)
@@ -30,12 +30,6 @@ def start(run: Run) -> None:
     _wait_for_hosts(run, hosts)
     check_bonds(spec.plan, {**bonds, **run.joined_hosts.bonds()})
     _wait_for_connections(run)
-
-
-def _is_needed(host: str, spec: SessionSpec) -> bool:
-    """Return whether a host takes part: one with devices alone does not in a re-simulation."""
-    roles = {planned.role for planned in spec.plan.participants.values() if planned.host == host}
-    return not spec.resimulated or roles != {"device"}
 
 
 def _wait_for_hosts(run: Run, hosts: list[str]) -> None:

@@ -19,9 +19,11 @@ from devices.ros.topics.stamps import Stamps
 from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
 from devices.samples import stamped
 from hub.planning import registry
+from hub.planning.foreign_code import names_class
 from hub.planning.plan import Plan
 from hub.recording.recording import Recording
 from hub.recording.ros_bag_writer import BagWriter
+from hub.recording.trust import require_trust
 from hub.transport.port_codec import PortCodec
 from schemas.codec import decode, encode, message_type
 from schemas.errors import DeviceError, MessageError, RecordingError, did_you_mean
@@ -40,6 +42,10 @@ _Routes = Mapping[str, Sequence[tuple[Row, Port]]]
 """By the topics of a recording: the rows that get its values, each with the port that has written them."""
 
 
+_LONGEST_GAP_NS = 3_600_000_000_000
+"""Between two messages: states are repeated at each period, so that a wrong time would fill the disk."""
+
+
 @dataclass(frozen=True)
 class ExportSummary:
     """What was written."""
@@ -51,25 +57,34 @@ class ExportSummary:
     duration_s: float
 
 
-def export(recording: Recording, directory: Path, gateway: str | None = None) -> ExportSummary:
+def export(
+    recording: Recording, directory: Path, gateway: str | None = None, *, trust: bool = False
+) -> ExportSummary:
     """Write what a gateway of a recorded session has published and received to a new `directory`.
 
     Args:
         recording: the recording of the session.
         directory: the bag, which must not exist yet.
         gateway: the gateway's name; by default the session's only one.
+        trust: allow what `require_trust` refuses.
 
     Raises:
         RecordingError: if the session has no such gateway, if the directory exists or cannot be written,
             or if the recording is damaged.
         ScenarioError: if the gateway's kind is not installed.
+        TrustError: if the gateway, or without a name any device, asks for what is not allowed.
     """
     plan = recording.plan()
-    shown = _gateway(recording, plan, gateway)
+    shown = _gateway(recording, plan, gateway, trust=trust)
     routes = {name: rows for name, rows in _routes(plan, shown).items() if name in recording.topics}
     with BagWriter(directory) as bag:
         replay, last_ns = _Replay(shown, routes, _RowWriter(bag, recording.started_ns())), -1
         for message in recording.messages(*routes):
+            if message.time_ns - max(last_ns, 0) > _LONGEST_GAP_NS:
+                raise RecordingError(
+                    f"'{recording.file}': nothing from {max(last_ns, 0) * 1e-9:g} s to"
+                    f" {message.time_ns * 1e-9:g} s; at most {_LONGEST_GAP_NS * 1e-9:g} s are allowed"
+                )
             last_ns = max(last_ns, message.time_ns)
             try:
                 replay.publish_before(message.time_ns)
@@ -83,14 +98,17 @@ def export(recording: Recording, directory: Path, gateway: str | None = None) ->
     return ExportSummary(str(directory), shown.name, bag.topics, bag.messages, recording.duration_ns * 1e-9)
 
 
-def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
+def _gateway(recording: Recording, plan: Plan, name: str | None, *, trust: bool) -> Gateway:
     """Return the gateway with this name, or the only one, as the scenario declares it."""
-    kinds = {
-        planned.name: registry.load(planned.kind)
-        for planned in plan.participants.values()
-        if planned.role == "device"
-    }
-    there = [device for device, kind in kinds.items() if issubclass(kind, Gateway)]
+    devices = {key: planned for key, planned in plan.participants.items() if planned.role == "device"}
+    classes = {key: planned for key, planned in devices.items() if names_class(planned.kind)}
+    there = [
+        key
+        for key, planned in devices.items()
+        if (trust or key not in classes) and issubclass(registry.load(planned.kind), Gateway)
+    ]
+    if not trust and (name in classes or not there):  # one of these may be the gateway that is meant
+        require_trust(recording, classes, recording.directory(), trust=False)
     if name is None and len(there) != 1:
         none = (
             "no gateway to ROS, which would define its topics: add one to the scenario, with"
@@ -106,6 +124,7 @@ def _gateway(recording: Recording, plan: Plan, name: str | None) -> Gateway:
             f" '{name}'.{did_you_mean(name, there)}"
         )
     meant = there[0] if name is None else name
+    require_trust(recording, {meant: devices[meant]}, recording.directory(), trust=trust)
     made = registry.make(
         plan.participants[meant].kind,
         meant,

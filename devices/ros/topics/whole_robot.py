@@ -41,7 +41,7 @@ def robot_description(file: Path) -> str:
     """
     try:
         robot = ElementTree.fromstring(file.read_text("utf-8"))
-    except (OSError, ElementTree.ParseError) as error:
+    except (OSError, UnicodeDecodeError, ElementTree.ParseError) as error:
         raise DeviceError(
             f"robot_description '{file}' is no URDF: {error}; `trocar model export` writes one"
         ) from error

@@ -38,6 +38,8 @@ def read_vtk(path: Path) -> tuple[Vector, Indices]:
     try:
         if path.stat().st_size > _LARGEST_FILE:
             raise ValueError(f"has more than {_LARGEST_FILE // 1_000_000} MB")
+        if not path.is_file():
+            raise ValueError("is no file")  # a pipe or a device has no end
         return _Reader(path.read_bytes()).mesh()
     except OSError as error:
         raise ValueError(f"mesh {path} cannot be read: {error.strerror}") from error
@@ -130,7 +132,10 @@ class _Reader:
     def _count(self, words: list[str], place: int) -> int:
         if len(words) <= place or not words[place].isdigit():
             raise ValueError(f"the line '{' '.join(words)[:60]}' does not state how many numbers follow")
-        return int(words[place])
+        count = int(words[place])
+        if count > len(self._content):
+            raise ValueError("ends too early")
+        return count
 
     def _integers(self, count: int, kind: str) -> Indices:
         numbers = self._numbers(count, kind)

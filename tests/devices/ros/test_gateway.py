@@ -209,9 +209,21 @@ def test_a_description_is_latched(tmp_path: Path) -> None:
         assert gateway.transport.rows["/robot_description"].latched
 
 
-def test_a_description_that_is_none(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"solid tip",
+        b"\xff\xfe",
+        b'<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/hostname">]><robot>&b;</robot>',
+        b"<!DOCTYPE a [<!ENTITY a 'aaaaaaaaaa'>"
+        + b"".join(b"<!ENTITY %c '%b'>" % (98 + i, b"&%c;" % (97 + i) * 10) for i in range(9))
+        + b"]><robot>&j;</robot>",
+    ],
+    ids=["another format", "not UTF-8", "a file of this machine", "a billion laughs"],
+)
+def test_a_description_that_is_none(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "dvrk.urdf"
-    file.write_text("solid tip")
+    file.write_bytes(content)
     with (
         make(SMALL | {"robot_description": str(file)}) as gateway,
         pytest.raises(DeviceError, match="is no URDF"),

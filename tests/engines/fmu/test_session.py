@@ -10,6 +10,7 @@ from hub.planning.scenario_file import load
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
+from schemas.errors import TrustError
 from tests.engines.fmu.driving import BALL, STAIR
 from tests.engines.fmus import build
 
@@ -55,7 +56,7 @@ def test_the_session_is_done_and_its_recording_verifies(
         "participant 'stair' has ended the session: the FMU asks to end the simulation at 3 s"
         " (fmi2Terminated)"
     )
-    again = verify(Recording(recorded))
+    again = verify(Recording(recorded), trust=True)
     assert (again.same, again.steps, again.hashes) == (True, steps, 2 * steps)
 
 
@@ -66,7 +67,7 @@ def test_at_an_event_of_fmi3(scenario: Path, tmp_path: Path) -> None:
     assert summary.ending is not None
     assert summary.ending.startswith("participant 'ball' has ended the session: the FMU asks to end")
     assert "at 0.451523641 s (terminateSimulation of fmi3UpdateDiscreteStates)" in summary.ending
-    assert verify(Recording(tmp_path / "recording")).same
+    assert verify(Recording(tmp_path / "recording"), trust=True).same
 
 
 def test_a_session_that_no_participant_ends(scenario: Path) -> None:
@@ -84,3 +85,17 @@ def test_the_command_line_shows_who_ended_it(scenario: Path) -> None:
     shown = " ".join(result.stderr.split())
     assert "ending participant 'stair' has ended the session" in shown
     assert "at 3 s" in shown
+
+
+def test_without_trust_a_recording_runs_no_fmu(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also not one whose contents have not changed: their hash, too, is from whoever has recorded it."""
+    launch(load(str(scenario), ["duration=200 ms"]), record=tmp_path / "recording").run()
+    recording = Recording(tmp_path / "recording")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))  # nothing can be unpacked
+    for directory in (None, tmp_path):
+        with pytest.raises(TrustError) as caught:
+            verify(recording, directory=directory)
+        for name in ("stair", "ball"):
+            assert f"native code in '{tmp_path / name}.fmu' (participant '{name}')" in str(caught.value)

@@ -1,4 +1,5 @@
 import hashlib
+import os
 from pathlib import Path
 
 import pytest
@@ -6,10 +7,11 @@ from pydantic import Field
 
 from hub.participant import Params
 from hub.planning.scenario_file import load
-from hub.recording.file_hashes import changed_files, file_hashes
+from hub.recording.file_hashes import file_hashes, has_contents
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
+from schemas.errors import TrustError
 
 
 class Mesh(Params):
@@ -43,14 +45,33 @@ def test_every_path_among_the_parameters_is_hashed_once(directory):
     )
     expected = {str(directory / f"{name}.txt"): sha256(name) for name in ("a", "b", "bag/c")}
     assert file_hashes([params, params], directory) == expected
-    assert changed_files(expected) == []
 
 
-def test_what_has_changed_or_is_gone_is_named(directory):
-    hashes = file_hashes([Models(model=Path("a.txt"), more=[Path("b.txt"), Path("bag")])], directory)
+def test_what_has_changed_or_is_gone(directory):
+    paths = [directory / name for name in ("a.txt", "b.txt", "bag")]
+    recorded = file_hashes([Models(model=Path("a.txt"), more=paths)], directory).values()
+    assert all(has_contents(path, recorded) for path in paths)
     (directory / "a.txt").write_text("other")
     (directory / "bag/c.txt").unlink()
-    assert changed_files(hashes) == [str(directory / "a.txt"), str(directory / "bag" / "c.txt")]
+    assert [has_contents(path, recorded) for path in paths] == [False, True, False]
+
+
+def test_a_directory_with_more_than_was_recorded(directory):
+    recorded = file_hashes([Models(model=Path("bag"))], directory).values()
+    (directory / "bag" / "more").mkdir()
+    assert not has_contents(directory / "bag", recorded)
+
+
+def test_a_file_with_the_recorded_contents_may_be_elsewhere(directory):
+    recorded = file_hashes([Models(model=Path("a.txt"))], directory).values()
+    assert has_contents((directory / "a.txt").rename(directory / "bag" / "a.txt"), recorded)
+
+
+def test_what_is_no_file_has_no_contents(directory):
+    os.mkfifo(directory / "pipe")
+    (directory / "loop").symlink_to("loop")
+    for name in ("pipe", "loop", "a" * 5000, "\0", "missing"):
+        assert not has_contents(directory / name, [sha256("")])
 
 
 PLUGIN = """
@@ -93,5 +114,7 @@ def test_a_verification_tells_which_file_is_another_one_by_now(install_plugin, d
     assert verify(recording).same
     assert "expect differences" not in caplog.text
     (directory / "a.txt").write_text("longer")
-    assert not verify(recording).same
+    with pytest.raises(TrustError, match=r"asks for .*: the file '.*a\.txt', which is missing or has other"):
+        verify(recording)
+    assert not verify(recording, trust=True).same
     assert f"file '{directory / 'a.txt'}' has changed or is missing since the recording" in caplog.text

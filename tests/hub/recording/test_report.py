@@ -1,4 +1,5 @@
 import builtins
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,8 +14,11 @@ from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from hub.recording.report import report
 from hub.recording.report_figures import BondTrace
+from schemas.codec import encode
 from schemas.errors import MissingExtraError, RecordingError
-from tests.hub.sample_session import ATTACHMENTS, write_session
+from schemas.ros import Header, Time
+from schemas.trocar_msgs import AckMessage, CouplingEnergy, SessionStatus
+from tests.hub.sample_session import ATTACHMENTS, SCENARIO, STEP_NS, write_session
 
 
 class Page(HTMLParser):
@@ -165,3 +169,78 @@ def test_no_contact_at_all() -> None:
     trace = BondTrace("x", np.arange(10.0), np.ones((10, 3)), np.zeros((10, 3)))
     assert trace.episodes() == []
     assert trace.depth.tolist() == [0.0] * 10
+
+
+HOSTILE = (
+    r"""</title></pre></svg></script><script>alert(1)</script><img src=x onerror=alert(2)>"'>\1\g<0>$x$ """
+)
+
+
+def _hostile(directory: Path) -> Path:
+    """Write a session in which every text that the schema allows is markup; its bond is a stranger's too."""
+    bond = f"PSM1/{HOSTILE}"
+    scenario = {
+        **SCENARIO,
+        "description": HOSTILE,
+        "participants": {name: {"kind": HOSTILE, HOSTILE: HOSTILE} for name in ("robot", "tissue")},
+        "bonds": [{"motion": {"participant": "robot", "port": bond}, "force": f"tissue.{HOSTILE}"}],
+        "measure": {},
+    }
+    texts = {HOSTILE: HOSTILE}
+    attachments = {
+        "scenario.yaml": HOSTILE.encode(),
+        "scenario.json": json.dumps(scenario).encode(),
+        "versions.json": json.dumps(texts).encode(),
+        "files.json": json.dumps(texts).encode(),
+    }
+    now = SessionStatus(
+        session=HOSTILE,
+        run=1,
+        state=HOSTILE,
+        step=0,
+        sim_time_ns=0,
+        real_time_factor=1.0,
+        late_steps=0,
+        dropped_messages=0,
+        participants=[],
+        detail=HOSTILE,
+    )
+    file = directory / "<img src=x onerror=alert(3)>"
+    with Recorder(file, attachments=attachments) as recorder:
+        status = recorder.channel("/hub/status", SessionStatus.ros_type)
+        ack = recorder.channel("/engine/robot/ack", AckMessage.ros_type)
+        energy = recorder.channel(f"/hub/energy/robot/{bond}", CouplingEnergy.ros_type)
+        odd = recorder.channel(f"/engine/robot/out/{HOSTILE}", CouplingEnergy.ros_type)
+        for step in range(1, 5):
+            time_ns = step * STEP_NS
+            spent = np.array([1000 * step], np.uint64)
+            done = AckMessage(
+                run=1, epoch=0, step=step, state_hash=spent, compute_ns=spent, work_j=np.zeros(1)
+            )
+            recorder.write(ack, time_ns, encode(done))
+            works = {"motion_work_j": 1e-3 * step, "force_work_j": 2e-3 * step, "residual_j": 1e-3 * step}
+            book = CouplingEnergy(header=Header(stamp=Time.from_ns(time_ns)), bond=HOSTILE, **works)
+            recorder.write(energy, time_ns, encode(book))
+            recorder.write(odd, time_ns, encode(book))
+            recorder.write(status, time_ns, encode(now.model_copy(update={"step": step})))
+    return file
+
+
+def test_nothing_in_a_strangers_recording_is_markup(tmp_path: Path, text: str) -> None:
+    """The page of a hostile recording has no element and no attribute that another page has not."""
+    report(Recording(_hostile(tmp_path)), tmp_path / "x.html")
+    page, usual = Page((tmp_path / "x.html").read_text()), Page(text)
+    known = {(tag, name) for tag, attributes in usual.tags for name in ("", *attributes)}
+    assert {(tag, name) for tag, attributes in page.tags for name in ("", *attributes)} <= known
+    assert page.words.count("<script>alert(1)</script>") >= 8
+    assert "<img src=x onerror=alert(3)>" in page.words
+    assert "<script" not in Recording(tmp_path / "<img src=x onerror=alert(3)>")._repr_html_()
+
+
+def test_a_browser_runs_and_loads_nothing_of_the_page(text: str) -> None:
+    page = Page(text)
+    policy = {
+        "http-equiv": "Content-Security-Policy",
+        "content": "default-src 'none'; style-src 'unsafe-inline'",
+    }
+    assert ("meta", policy) in page.tags

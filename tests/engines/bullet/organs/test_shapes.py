@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 
 import numpy as np
 import pytest
@@ -339,6 +340,10 @@ def test_a_bad_mesh_is_refused_with_what_is_wrong(tmp_path, mesh, expected):
             "ends too early",
         ),
         (
+            f"# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {10**20} float\n",
+            "ends too early",
+        ),
+        (
             "# vtk DataFile Version 2.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 x 0\n",
             "something else",
         ),
@@ -378,6 +383,12 @@ def test_words_of_any_length_are_quoted_in_part(tmp_path, content):
     with pytest.raises(ValueError, match=r"organ\.vtk: holds") as caught:
         read_vtk(tmp_path / "organ.vtk")
     assert len(str(caught.value)) < 1_000
+
+
+def test_a_pipe_has_no_end_and_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "organ.vtk")
+    with pytest.raises(ValidationError, match=r"organ\.vtk: is no file"):
+        organ(mesh=str(tmp_path / "organ.vtk"), material="liver", anchors=[])
 
 
 def test_a_mesh_that_is_not_there_and_one_that_nothing_holds(tmp_path):

@@ -1,0 +1,51 @@
+"""The paths among the parameters of a participant, before they are validated: to validate may read them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, cast
+
+from hub.participant import Params
+
+__all__ = ["parameter_paths"]
+
+_Schema = Mapping[str, Any]
+
+_FORMATS = ("path", "file-path", "directory-path")
+"""Of `Path`, `FilePath` and `DirectoryPath` of pydantic, in a JSON schema."""
+
+
+def parameter_paths(model: type[Params], values: Mapping[str, Any]) -> set[str]:
+    """Return every text in `values` that stands where the model has a path, as it is written."""
+    schema = model.model_json_schema()
+    return set(_paths(schema, values, schema.get("$defs", {})))
+
+
+def _paths(schema: _Schema, value: Any, definitions: _Schema) -> Iterator[str]:
+    """Yield the paths in `value`; where the schema has alternatives, those of each."""
+    if isinstance(value, str) and schema.get("format") in _FORMATS:
+        yield value
+    if "$ref" in schema:
+        yield from _paths(definitions[schema["$ref"].removeprefix("#/$defs/")], value, definitions)
+    for alternatives in ("anyOf", "oneOf", "allOf"):
+        for alternative in schema.get(alternatives, ()):
+            yield from _paths(alternative, value, definitions)
+    for of_part, part in _parts(schema, value):
+        yield from _paths(of_part, part, definitions)
+
+
+def _parts(schema: _Schema, value: Any) -> Iterator[tuple[_Schema, Any]]:
+    """Yield the entries of a mapping or a list, each with its schema, if there is one."""
+    if isinstance(value, dict):
+        known = schema.get("properties", {})
+        others = (schema.get("additionalProperties"), *schema.get("patternProperties", {}).values())
+        for key, part in cast("dict[str, Any]", value).items():
+            for of_part in (known[key],) if key in known else others:
+                if isinstance(of_part, dict):
+                    yield cast("_Schema", of_part), part
+    elif isinstance(value, list):
+        first = schema.get("prefixItems", ())
+        for index, part in enumerate(cast("list[Any]", value)):
+            of_part = first[index] if index < len(first) else schema.get("items")
+            if isinstance(of_part, dict):
+                yield cast("_Schema", of_part), part
