@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-from devices.ros.bags.bag import RosBag
 from devices.ros.bags.export import export
 from hub.planning import registry
 from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
+from hub.recording.ros_bag_reader import RosBag
 from schemas.codec import encode
 from schemas.crtk import StringStamped
 from schemas.errors import RecordingError, TrustError
