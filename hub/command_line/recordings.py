@@ -10,6 +10,7 @@ import typer
 
 from hub.command_line.display import RunProgress, console, show
 from hub.command_line.options import Directory, Json, Listen, RecordingPath, Trust
+from hub.recording.bag import default_output
 from hub.recording.recording import Recording
 
 __all__ = ["recover", "replay", "report", "verify"]
@@ -71,6 +72,7 @@ def report(recording: RecordingPath, *, output: Output = None) -> None:
     """Write one self-contained HTML page with plots of a recording."""
     from hub.recording.report import report as write
 
-    page = output or recording.with_name(f"{recording.stem if recording.is_file() else recording.name}.html")
+    name = recording.stem if recording.is_file() else recording.name
+    page = output or default_output(recording.with_name(f"{name}.html"))
     write(Recording(recording), page)
     console.print(f"wrote {page}", markup=False, soft_wrap=True)

@@ -32,6 +32,7 @@ __all__ = [
     "BagMessage",
     "bag_file",
     "chunk_records",
+    "default_output",
     "located_messages",
     "locating",
     "output_port",
@@ -73,7 +74,7 @@ def bag_file(path: Path) -> Path:
     Raises RecordingError if there is not exactly one.
     """
     if path.is_dir():
-        files = sorted(path.glob("*.mcap"))
+        files = sorted(file for file in path.glob("*.mcap") if file.is_file())  # a pipe would never end
         if len(files) != 1:
             raise RecordingError(
                 f"'{path}' holds {len(files)} .mcap files; name a recording's directory, which holds one, or"
@@ -82,6 +83,17 @@ def bag_file(path: Path) -> Path:
         return files[0]
     if not path.is_file():
         raise RecordingError(f"no recording at '{path}'; name a recording's directory or an .mcap file")
+    return path
+
+
+def default_output(path: Path) -> Path:
+    """Return `path`, where the output of a recording goes that the user has not named.
+
+    Raises RecordingError if it is a link: what is beside a stranger's recording may be the stranger's, and
+    lead to any file of the user.
+    """
+    if path.is_symlink():
+        raise RecordingError(f"'{path}' is a link, through which nothing is written: name another --output")
     return path
 
 

@@ -14,7 +14,14 @@ from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
-from hub.recording.bag import MAX_RECORD_BYTES, bag_file, chunk_records, located_messages, reading
+from hub.recording.bag import (
+    MAX_RECORD_BYTES,
+    bag_file,
+    chunk_records,
+    default_output,
+    located_messages,
+    reading,
+)
 from hub.recording.mcap_file import ChunkData, McapFile, create_bag, write_rosbag2_metadata
 from schemas.errors import RecordingError
 
@@ -50,7 +57,7 @@ def recover(path: Path, output: Path | None = None) -> RecoverSummary:
             raise RecordingError(f"'{source}' is not an MCAP file")
     named = path.resolve()
     target = create_bag(
-        output or named.with_name(f"{named.name if named.is_dir() else named.stem}-recovered")
+        output or default_output(named.with_name(f"{named.name if named.is_dir() else named.stem}-recovered"))
     )
     try:
         copy = _Copy(target)

@@ -21,6 +21,7 @@ from hub.session.launch import launch
 from hub.verify import verify
 from schemas.errors import RecordingError, ScenarioError, TrustError
 from tests.engines.fmus import build
+from tests.hub.sample_session import write_session
 
 INSTALLED = """
 import ctypes
@@ -348,3 +349,31 @@ def test_nothing_in_a_recording_is_a_command_to_the_terminal(
     assert "title" in err
     show({"name": "[/]\x1b[2J"}, as_json=False)
     assert "[/]\\x1b[2J" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(("command", "suffix"), [("report", ".html"), ("recover", "-recovered")])
+def test_a_link_beside_a_recording_does_not_lead_the_output_elsewhere(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    command: str,
+    suffix: str,
+) -> None:
+    write_session(tmp_path / "run", 0.01)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "secret").write_text("secret")
+    (tmp_path / f"run{suffix}").symlink_to("secret" if command == "report" else "empty")
+    monkeypatch.setattr(sys, "argv", ["trocar", command, str(tmp_path / "run")])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == 1
+    assert f"run{suffix}' is a link, through which nothing is written" in capfd.readouterr().err
+    assert (tmp_path / "secret").read_text() == "secret"
+    assert list((tmp_path / "empty").iterdir()) == []
+
+
+def test_a_pipe_in_a_recording_is_not_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    os.mkfifo(tmp_path / "run" / "run.mcap")
+    with pytest.raises(RecordingError, match=r"holds 0 \.mcap files"):
+        Recording(tmp_path / "run")
