@@ -12,8 +12,9 @@ from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recording import Recording
 from hub.recording.trust import require_trust
 from hub.session.session import Session
+from schemas.errors import RecordingError
 from schemas.lockstep import Ack
-from schemas.trocar_msgs import AckMessage
+from schemas.trocar_msgs import AckMessage, GrantMessage
 
 __all__ = ["VerifySummary", "verify"]
 
@@ -73,7 +74,7 @@ def verify(
         made,
         directory,
         endpoint=endpoint,
-        grants=recording.grants(),
+        grants=_grants(recording, plan),
         on_ack=comparison.take,
     )
     comparison.stop = session.state.shutdown
@@ -123,6 +124,20 @@ class _Comparison:
     def _differ(self, step: int, planned: PlannedParticipant) -> None:
         self._differences.append((step, self._order.index(planned.name)))
         self.stop()
+
+
+def _grants(recording: Recording, plan: Plan) -> Iterator[GrantMessage]:
+    """Yield the recorded grants; raises RecordingError at one that does not follow the one before."""
+    step = 0
+    for grant in recording.grants():
+        end, rest = divmod(grant.horizon_ns, plan.step_ns)
+        if (grant.step, grant.start_ns) != (step, step * plan.step_ns) or end <= step or rest:
+            raise RecordingError(
+                f"'{recording.file}' cannot be simulated again: the grant of step {step} should follow, and"
+                f" there is one of step {grant.step}, from {grant.start_ns} to {grant.horizon_ns} ns"
+            )
+        yield grant
+        step = end
 
 
 def _plan(recording: Recording) -> Plan:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, cast
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from hub.participant import BondPlan
 from hub.planning.registry import Role
@@ -37,7 +37,7 @@ class PlannedParticipant(_Part):
     role: Role
     host: str
     """`hub`, the name of a process, or `remote/<participant>`."""
-    period: int
+    period: int = Field(gt=0)
     """In communication steps; 1 for a device in wall time."""
     read_ns: int = 0
     """For a device in wall time: the time between two reads."""
@@ -107,7 +107,7 @@ class PlannedBond(_Part):
 class Plan(_Part):
     """Everything that hosts need to know about a session."""
 
-    step_ns: int
+    step_ns: int = Field(gt=0)
     order: tuple[str, ...]
     """The stepped participants in the order in which they step."""
     participants: dict[str, PlannedParticipant]

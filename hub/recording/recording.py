@@ -186,8 +186,18 @@ class Recording(Bag):
         return Path(origin["directory"])
 
     def started_ns(self) -> int:
-        """Return the wall time (ns since 1970) at which the session was started; 0 if not recorded."""
-        return int(self._table("origin.json").get("started_ns", 0))
+        """Return the wall time (ns since 1970) at which the session was started; 0 if not recorded.
+
+        Raises RecordingError if what is recorded is no time.
+        """
+        started = self._table("origin.json").get("started_ns", "0")
+        try:
+            return int(started)
+        except ValueError as error:
+            raise RecordingError(
+                f"'{self.file}': attachment origin.json has the start '{started[:40]}', expected ns since"
+                " 1970"
+            ) from error
 
     def session(self) -> str:
         """Return the name of the session."""

@@ -26,6 +26,9 @@ __all__ = ["ControlServer", "Joins"]
 
 Q = TypeVar("Q", bound=BaseModel)
 
+_LONGEST_REASON = 1000
+"""Letters of a refusal, which quotes parts of the request."""
+
 
 class Joins(Protocol):
     """Answers hosts that join."""
@@ -103,7 +106,7 @@ class ControlServer:
                         at = key_of(request)
                     reply = handler(request)
                 except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
-                    reason = _reason(error)
+                    reason = _reason(error)[:_LONGEST_REASON]
                     self._refusals.refuse(key, reason)
                     reply = Refusal(refused=reason)
                 query.reply(
@@ -148,6 +151,6 @@ def _reason(error: Exception) -> str:
     found = error.errors(include_url=False)
     return "; ".join(
         f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].removeprefix('Value error, ')} (got"
-        f" {detail['input']!r})"
+        f" {detail['input']!r:.200})"
         for detail in found
     )

@@ -3,6 +3,7 @@ import sys
 import pytest
 
 from hub.planning.scenario_file import load
+from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from hub.session.launch import launch
 from hub.verify import verify
@@ -60,3 +61,24 @@ def test_a_recording_of_something_else_is_refused(tmp_path):
 
     with pytest.raises(RecordingError, match="holds no scenario: it was not recorded by `trocar run`"):
         verify(Recording(installed_scenarios()["palpation"].parent / "data" / "palpation_hand"))
+
+
+@pytest.mark.parametrize(
+    ("step", "start_ns", "horizon_ns"),
+    [(4, 4_000_000, 8_000_000), (0, 1, 4_000_000), (0, 0, 4_000_001), (0, 0, 0), (0, 0, -1_000_000)],
+)
+def test_grants_that_do_not_follow_one_another_are_refused(
+    recording, monkeypatch, step, start_ns, horizon_ns
+):
+    first = next(recording.grants())
+    wrong = first.model_copy(update={"step": step, "start_ns": start_ns, "horizon_ns": horizon_ns})
+    monkeypatch.setattr(Recording, "grants", lambda _: iter([wrong]))
+    with pytest.raises(RecordingError, match="the grant of step 0 should follow"):
+        verify(recording)
+
+
+def test_a_start_that_is_no_time_is_named(tmp_path):
+    with Recorder(tmp_path / "run", attachments={"origin.json": b'{"started_ns": "noon"}'}):
+        pass
+    with pytest.raises(RecordingError, match=r"origin\.json has the start 'noon'"):
+        Recording(tmp_path / "run").started_ns()

@@ -56,7 +56,7 @@ def parse_header(content: bytes) -> Fields:
             name, equals, value = content[at + 4 : at + 4 + length].decode().partition("=")
             at += 4 + length
             if not equals or at > len(content):
-                raise ValueError(f"field '{name}' has no value or no end")
+                raise ValueError(f"field '{name[:40]}' has no value or no end")
             fields[name] = value
     except (struct.error, ValueError) as error:
         raise MessageError(f"{len(content)} bytes are no header of ROS 1 ({error})") from error

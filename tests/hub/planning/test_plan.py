@@ -1,4 +1,5 @@
 import pytest
+from pydantic import ValidationError
 
 from hub.planning.plan import Plan
 from schemas.errors import ScenarioError
@@ -396,3 +397,10 @@ def test_a_link_is_for_devices():
     assert [planned.name for planned in device.meetings()] == ["s"]
     with pytest.raises(ScenarioError, match=r"but 'a' is no device \(engine\): remove it"):
         plan_of(Part("a", out()), specs={"a": {"network_link": link}})
+
+
+@pytest.mark.parametrize("step_ns", [0, -1])
+def test_a_plan_without_steps_is_refused(step_ns):
+    nothing = dict.fromkeys(("order", "connections", "from_devices", "to_devices", "bonds"), ())
+    with pytest.raises(ValidationError, match="greater than 0"):
+        Plan.model_validate({"step_ns": step_ns, "participants": {}} | nothing)

@@ -10,9 +10,11 @@ from hub.remote.hub_connection import reach
 from hub.remote.live_sessions import live_sessions
 from hub.session.run_state import RunState
 from hub.transport.control_client import ask
-from hub.transport.control_messages import Empty, JoinReply, JoinRequest, SetRequest, StepRequest
+from hub.transport.control_messages import Empty, JoinReply, JoinRequest, Refusal, SetRequest, StepRequest
+from schemas.codec import decode, encode
 from schemas.errors import ConnectError, MessageError, SessionError
 from schemas.keys import Keys
+from schemas.ros import StringMessage
 
 SCENARIO = """\
 name: steered
@@ -129,6 +131,18 @@ def test_what_cannot_be_set_is_refused_with_the_reason(steer, participant, port,
     with steer() as (console, outcome), pytest.raises(MessageError, match=message):
         console.ask("set", SetRequest(participant=participant, port=port, value=value))
     assert outcome[0].state == "done"
+
+
+@pytest.mark.parametrize(
+    "text", ['{"steps": "' + 30_000 * "x" + '"}', 30_000 * "x", 30_000 * "[", '{"' + 30_000 * "x" + '": 1}']
+)
+def test_a_request_of_any_length_is_quoted_in_part(steer, text):
+    with steer(paused=True) as (console, _):
+        payload = encode(StringMessage(data=text))
+        (reply,) = console._client.get(KEYS.control("step"), payload=payload)
+        refusal = Refusal.model_validate_json(decode(StringMessage, reply.ok.payload.to_bytes()).data)
+    assert refusal.refused
+    assert len(refusal.refused) <= 1_000
 
 
 def test_unknown_hosts_may_not_join(steer):

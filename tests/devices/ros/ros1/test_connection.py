@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from devices.ros.ros1.connection import Connection, header_frame, parse_header
 from devices.ros.ros1.event_loop import EventLoop
+from schemas.errors import MessageError
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="="), min_size=1)
 
@@ -87,6 +88,12 @@ def test_what_is_no_header_is_hung_up_on(data, caplog):
         assert ends.get(timeout=5.0)
         assert heard.empty()
         assert "is closed" in caplog.text
+
+
+def test_a_field_of_any_length_is_quoted_in_part():
+    with pytest.raises(MessageError, match="has no value or no end") as caught:
+        parse_header(framed(b"a" * 30_000))
+    assert len(str(caught.value)) < 200
 
 
 def test_a_message_that_is_too_large_is_hung_up_on(caplog):
