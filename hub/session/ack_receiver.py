@@ -134,7 +134,10 @@ class AckReceiver:
                     raise ParticipantError(planned.name, ack.step, ack.error)
 
     def end(self, step: int) -> None:
-        """Raise ParticipantError if an ack has arrived after the last grant's, which ended at `step`."""
+        """Raise ParticipantError if an ack has arrived after the last grant's, which ended at `step`.
+
+        It must be called when all have arrived.
+        """
         while (sample := self._subscriber.try_recv()) is not None:
             self._accept(sample, (), step, _NO_STEPS)
 

@@ -48,6 +48,8 @@ def open_session(
         "connect/endpoints": list(connect),
         "connect/timeout_ms": 5000,
         "connect/exit_on_failure": True,
+        # of two hosts one connects: where both do at once, and passwords are checked, both may give up
+        "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
         "transport/link/tx/lease": LEASE_MS,
         "transport/link/tx/queue/size/interactive_high": _EVENT_BATCHES,
         "transport/shared_memory/enabled": False,  # its segments outlive a process that is killed
