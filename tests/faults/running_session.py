@@ -148,9 +148,10 @@ class RunningSession:
 
     def go_on(self) -> bool:
         """Let the session go on for a moment, and end it; return whether it went on."""
-        if self._fault.moment != "close":
-            self._until(self._running.exists)
-            sleep(0.2)
+        if self._fault.moment == "close":
+            return True  # it ends already
+        self._until(self._running.exists)
+        sleep(0.2)
         went_on = self.hub.poll() is None
         self.hub.terminate()
         return went_on
