@@ -151,6 +151,8 @@ class RunningSession:
         if self._fault.moment == "close":
             return True  # it ends already
         self._until(self._running.exists)
+        if self._fault.is_named:
+            self._until(lambda: "'hand' is gone" in self.logs[0].read_text(errors="replace"))
         sleep(0.2)
         went_on = self.hub.poll() is None
         self.hub.terminate()
