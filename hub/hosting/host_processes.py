@@ -60,16 +60,15 @@ class HostProcesses:
             env=environment,
             start_new_session=True,
         )
+        waiting = threading.Thread(target=self._wait, args=(process,), name=f"host {host}", daemon=True)
+        waiting.start()
+        self._waiting[host] = waiting
         # a new dictionary: the watchdog's thread may be iterating over the old one
         self._processes = {**self._processes, host: process}
-        self._waiting[host] = threading.Thread(
-            target=self._wait, args=(process,), name=f"end of host {host}", daemon=True
-        )
-        self._waiting[host].start()
 
     def _wait(self, process: subprocess.Popen[bytes]) -> None:
         process.wait()
-        self._changed.set()
+        self._changed.set()  # `dead` may miss it this once, if the process ends while it is started
 
     def dead(self) -> dict[str, str]:
         """Return, for each host whose process has ended, how it ended."""

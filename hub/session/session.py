@@ -100,27 +100,28 @@ class Session:
         readable), ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
         """
         recorder = Recorder(self._record, attachments=self._attachments) if self._record is not None else None
-        try:
-            with (
-                Interrupt() as interrupt,
-                self._outer.opened(),
-                listen_with_secret(self._port, connect=self._outer.inside) as session,
-                ExitStack() as stack,
-            ):
-                spec = SessionSpec(
-                    self.scenario,
-                    self.plan,
-                    self._participants,
-                    self._directory,
-                    self.endpoint,
-                    self.programs_endpoint,
-                    self.gate,
-                    resimulated=self._grants is not None,
-                )
-                run = Run(stack, spec, session, self.state, interrupt, recorder)
-                self._step(run, interrupt, progress)
-        finally:
-            recorded = recorder.close() if recorder is not None else None
+        with Interrupt() as interrupt:
+            try:
+                with (
+                    self._outer.opened(),
+                    listen_with_secret(self._port, connect=self._outer.inside) as session,
+                    ExitStack() as stack,
+                ):
+                    spec = SessionSpec(
+                        self.scenario,
+                        self.plan,
+                        self._participants,
+                        self._directory,
+                        self.endpoint,
+                        self.programs_endpoint,
+                        self.gate,
+                        resimulated=self._grants is not None,
+                    )
+                    run = Run(stack, spec, session, self.state, interrupt, recorder)
+                    self._step(run, interrupt, progress)
+            finally:
+                interrupt.disarm()  # a second SIGTERM does not cut the recording short
+                recorded = recorder.close() if recorder is not None else None
         return run.bookkeeping.summary(recorded)
 
     def _step(self, run: Run, interrupt: Interrupt, progress: Callable[[Progress], None] | None) -> None:

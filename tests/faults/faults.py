@@ -35,10 +35,17 @@ class Fault:
     """The engine is in a step that takes long and keeps the interpreter lock."""
     stopped: bool = False
     """The engine's host is stopped before."""
+    beside: str = ""
+    """A part that the session has as well: the gate, or the remote device."""
 
     def __str__(self) -> str:
         notes = ", in a long step" * self.long_step + ", with its host stopped" * self.stopped
+        notes += f", beside {self.beside}" if self.beside else ""
         return f"{self.action} {self.part}, {self.moment} + {1e3 * self.delay_s:.0f} ms{notes}"
+
+    def concerns(self, *parts: str) -> bool:
+        """Whether it is about one of `parts`."""
+        return self.part in parts or self.beside in parts
 
     @property
     def kills_hub(self) -> bool:
@@ -69,11 +76,12 @@ def fault_of(source: random.Random) -> Fault:
         moment, action = "run", source.choice(["cut", "choke"])
     elif part in (SERVO, WATCHER, GATE):
         action = "kill"
+        moment = "run" if (part, moment) == (GATE, "birth") else moment  # before it listens, the hub ends
     elif part in (DEVICE, REMOTE) and action == "stop":
         action = "pause"  # a device that is silent is stale, which ends nothing
     if part == DEVICE and moment == "birth" and build.USABLE:
         moment = source.choice(["birth", "servo"])
-    state = source.choice(["", "", "long step", "stopped"])
+    state, beside = source.choice(["", "", "long step", "stopped"]), source.choice(["", GATE, REMOTE])
     kills_running = part == HUB and action == "kill" and moment == "run"
     return Fault(
         part,
@@ -83,4 +91,5 @@ def fault_of(source: random.Random) -> Fault:
         pause_s=0.05 + 0.25 * source.random(),
         long_step=state == "long step" and kills_running,
         stopped=state == "stopped" and kills_running,
+        beside=beside if part == HUB and not state else "",
     )

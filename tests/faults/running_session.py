@@ -57,7 +57,7 @@ class RunningSession:
         stack.callback(self._kill_all)
         endpoint = free_endpoint()
         self.hub = self._start("run", *self._scenario(), *self._gate(), "--listen", endpoint)
-        if fault.part in (REMOTE, LINK):
+        if fault.concerns(REMOTE, LINK):
             self._proxy = stack.enter_context(Proxy(address(endpoint)[1]))
             self._until(lambda: self._find(ENGINE))  # the hub listens
             self.remote = self._start("device", "hand", "--connect", f"tcp/127.0.0.1:{self._proxy.port}")
@@ -67,7 +67,7 @@ class RunningSession:
         fault, device = self._fault, {"kind": "fault_parts:Hand", "host": "hand"}
         long_step = {"long_step": 20, "long_step_ms": LONG_STEP_MS} if fault.long_step else {}
         engine, port = {"kind": "fault_parts:Engine"}, "pose"
-        if fault.part in (REMOTE, LINK):
+        if fault.concerns(REMOTE, LINK):
             device["host"] = "remote"
         elif fault.part in (SERVO, WATCHER, DEVICE) and LIBRARY.exists():
             self._environment[VARIABLE] = str(HdWorld(LIBRARY, self._directory / "world").file)
@@ -91,7 +91,7 @@ class RunningSession:
         return [str(file), "--record", str(self._directory / "recording")]
 
     def _gate(self) -> list[str]:
-        if self._fault.part != GATE:
+        if not self._fault.concerns(GATE):
             return []
         certificates = Authority.founded(self._directory / "certificates").directory
         return ["--listen", f"tls/127.0.0.1:{free_port()}", "--certs", str(certificates)]
@@ -148,9 +148,12 @@ class RunningSession:
 
     def go_on(self) -> bool:
         """Let the session go on for a moment, and end it; return whether it went on."""
-        if self._fault.moment != "close":
-            self._until(self._running.exists)
-            sleep(0.2)
+        if self._fault.moment == "close":
+            return True  # it ends already
+        self._until(self._running.exists)
+        if self._fault.is_named:
+            self._until(lambda: "'hand' is gone" in self.logs[0].read_text(errors="replace"))
+        sleep(0.2)
         went_on = self.hub.poll() is None
         self.hub.terminate()
         return went_on

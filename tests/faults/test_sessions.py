@@ -7,7 +7,7 @@ import pytest
 CASES = {
     "1:11": "kill hub, birth",
     "1:34": "kill host one, run",
-    "1:44": "kill hub, run + 170 ms, with its host stopped",
+    "1:44": "kill hub, run + 4 ms, with its host stopped",
     "1:50": "kill host hand, close",
 }
 

@@ -1,11 +1,14 @@
 """Failures: the participant and its step are named, the recording is readable, and nothing is left behind."""
 
+import os
+import signal
 from pathlib import Path
 from time import monotonic_ns
 
 import pytest
 
 from hub.hosting.interrupt import Interrupt
+from hub.recording.recorder import Recorder
 from hub.recording.recording import Recording
 from hub.session import session as session_module
 from hub.session.run import Run
@@ -141,6 +144,23 @@ def test_a_process_that_ends_by_itself(fail):
     error = fail(TRIO, "participants.bad.how=exit", *BAD_AWAY)
     assert (error.participant, error.step) == ("bad", 5)
     assert "exit code 7" in str(error)
+
+
+def test_a_second_sigterm_does_not_cut_the_recording_short(prepare, monkeypatch, tmp_path):
+    ended, close = [], Recorder.close
+
+    def close_and_terminate(recorder):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return close(recorder)
+
+    monkeypatch.setattr(Recorder, "close", close_and_terminate)
+    before = signal.signal(signal.SIGTERM, lambda *_: ended.append("here the process would end"))
+    try:
+        session = prepare(TRIO, "participants.bad.at=1000", record=tmp_path / "recording")
+        assert session.run().recording_complete
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert ended == []
 
 
 def test_a_remote_participant_that_does_not_join(fail):
