@@ -13,6 +13,7 @@ from time import monotonic, sleep
 
 from hub.recording.recording import Recording
 from hub.recording.recover import recover
+from hub.transport.session_secret import private_directory
 from schemas.errors import RecordingError
 from tests.faults.faults import ENGINE, HUB, Fault
 from tests.faults.running_session import RunningSession
@@ -64,7 +65,7 @@ def attempt(mark: str, fault: Fault, directory: Path) -> Result:
     result.log = "".join(path.read_text(errors="replace") for path in session.logs)
     result.named_ms = _named_ms(result, struck)
     result.recording = _recording(directory / "recording")
-    left = [*remaining(session.held), *(path.name for path in session.temporary.iterdir())]
+    left = [*remaining(session.held), *_temporary(session.temporary, fault)]
     if left:
         result.problems.append(f"left behind: {', '.join(left)}")
     _judge(result)
@@ -121,6 +122,17 @@ def _recording(path: Path) -> str:
         return f"recovered, {sum(1 for _ in recovered.grants())} grants"
     except RecordingError as error:
         return f"none: {error}"
+
+
+def _temporary(directory: Path, fault: Fault) -> list[str]:
+    """Return what is left of temporary files; a hub that is killed leaves the secret of its session."""
+    private = private_directory().name
+    found = (path.relative_to(directory) for path in directory.rglob("*"))
+    return [
+        str(path)
+        for path in found
+        if path.parts != (private,) and (path.parts[0] != private or not fault.kills_hub)
+    ]
 
 
 def _judge(result: Result) -> None:
