@@ -15,6 +15,7 @@ from time import monotonic, sleep, time
 from typing import TypeVar
 
 from hub.transport.endpoints import address
+from hub.transport.session_secret import private_directory
 from tests.devices.standins.hd import VARIABLE, HdWorld
 from tests.faults.faults import DEVICE, ENGINE, GATE, HUB, LINK, REMOTE, SERVO, WATCHER, Fault
 from tests.faults.traces import MARK, Process, held, living
@@ -60,6 +61,9 @@ class RunningSession:
         if fault.concerns(REMOTE, LINK):
             self._proxy = stack.enter_context(Proxy(address(endpoint)[1]))
             self._until(lambda: self._find(ENGINE))  # the hub listens
+            secret = self.temporary / private_directory().name / str(self._proxy.port)
+            secret.symlink_to(str(address(endpoint)[1]))  # which is the secret at the hub's port
+            stack.callback(secret.unlink)
             self.remote = self._start("device", "hand", "--connect", f"tcp/127.0.0.1:{self._proxy.port}")
 
     def _scenario(self) -> list[str]:
