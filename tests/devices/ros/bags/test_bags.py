@@ -65,8 +65,8 @@ GOALS = [0.02, -0.01, 0.125, 0.05, 0.0, 0.1]
 
 
 def recorded(directory, device, connections="", *, pace="fast", duration="20 s", drive=None):
-    """Run the scenario with `device` as `ros`, and return its recording; `drive` gets the programs' endpoint, in
-    a thread.
+    """Run the scenario with `device` as `ros`, and return its recording; `drive` gets the endpoint of
+    programs, in a thread.
     """
     directory.mkdir()
     file = directory / "bags.yaml"
