@@ -146,8 +146,8 @@ class ControlServer:
         while (answer := self._waiting.get()) is not None:
             try:
                 answer()
-            except zenoh.ZError as error:
-                log.warning("a control request is not answered: %s", error)
+            except Exception:
+                log.exception("a control request is not answered")  # the next ones are
 
     @staticmethod
     def _clock(_: Empty) -> ClockReply:
