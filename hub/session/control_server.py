@@ -111,21 +111,20 @@ class ControlServer:
         limit = TokenBucket(_RATE)
 
         def take(query: zenoh.Query) -> None:
-            size = 0 if query.payload is None else len(query.payload)
+            payload = b"" if query.payload is None else query.payload.to_bytes()
             try:
-                if size > MOST_BYTES:
-                    raise MessageError(f"{size} bytes, a control message has at most {MOST_BYTES}")
+                if len(payload) > MOST_BYTES:
+                    raise MessageError(f"{len(payload)} bytes, a control message has at most {MOST_BYTES}")
                 if not limit.spend(monotonic_ns()):
                     raise MessageError(f"more than {_RATE:g} requests/s")
-                self._waiting.put_nowait(lambda: answer(query))
+                self._waiting.put_nowait(lambda: answer(query, payload))
             except MessageError as error:
                 self._refuse(query, key, str(error))
             except Full:
                 self._refuse(query, key, f"{_MOST_WAITING} requests wait already")
 
-        def answer(query: zenoh.Query) -> None:
+        def answer(query: zenoh.Query, payload: bytes) -> None:
             try:
-                payload = b"" if query.payload is None else query.payload.to_bytes()
                 request = model.model_validate_json(control_text(payload) if payload else "{}")
                 at = key if key_of is None else key_of(request)
                 if not query.key_expr.intersects(at):

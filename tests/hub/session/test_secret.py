@@ -63,7 +63,7 @@ def running(session):
     thread = threading.Thread(target=run)
     thread.start()
     try:
-        until(lambda: any(status.state == "paused" for status in live_sessions([session.endpoint])))
+        until(lambda: outcome or any(s.state == "paused" for s in live_sessions([session.endpoint])))
         yield outcome
     finally:
         session.state.resume()
