@@ -172,7 +172,7 @@ def in_session(
         result: dict[str, Any] = {}
         thread = Thread(
             target=_beside,
-            args=(session, result, lambda: Console(kind, place, session.endpoint, task, arguments)),
+            args=(session, result, lambda: Console(kind, place, session.programs_endpoint, task, arguments)),
         )
         thread.start()
         summary = session.run()

@@ -15,12 +15,12 @@ from hub.devices.network_link import NetworkLink, NetworkLinkOrder, in_words
 from hub.devices.run_info import RunInfo
 from hub.participant import Sample
 from hub.planning.plan import PlannedParticipant
+from hub.transport.control_text import control_text
 from hub.transport.envelope import Stamp
 from hub.transport.refusals import Refusals
-from schemas.codec import decode, encode
+from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.ports import Port
-from schemas.ros import StringMessage
 from schemas.trocar_msgs import DeviceStatus
 
 __all__ = ["DeviceUplink"]
@@ -109,8 +109,7 @@ class DeviceUplink:
 
     def _change_network_link(self, sample: zenoh.Sample) -> None:
         try:
-            text = decode(StringMessage, sample.payload.to_bytes()).data
-            self._link.order(NetworkLinkOrder.model_validate_json(text))
+            self._link.order(NetworkLinkOrder.model_validate_json(control_text(sample.payload.to_bytes())))
         except (MessageError, ValidationError) as error:
             self._refusals.refuse_sample(sample, error)
 

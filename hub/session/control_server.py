@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
+from queue import Full, Queue
+from threading import Thread
 from time import monotonic_ns
 from typing import Protocol, TypeVar
 
@@ -13,21 +16,31 @@ from zenoh.handlers import Callback
 
 from hub.devices.inlets import Inlets
 from hub.devices.network_link_control import NetworkLinkControl, NetworkLinkRequest
+from hub.participant.token_bucket import TokenBucket
 from hub.session.run_state import RunState
 from hub.transport.control_messages import ClockReply, Empty, JoinRequest, Refusal, SetRequest, StepRequest
+from hub.transport.control_text import MOST_BYTES, control_text
 from hub.transport.port_codec import PortCodec
 from hub.transport.refusals import Refusals
-from schemas.codec import decode, encode, message_type
+from schemas.codec import encode, message_type
 from schemas.errors import MessageError, TrocarError
 from schemas.keys import Keys
 from schemas.ros import StringMessage
 
 __all__ = ["ControlServer", "Joins"]
 
-Q = TypeVar("Q", bound=BaseModel)
+log = logging.getLogger(__name__)
 
+_MOST_WAITING = 64
+_RATE = 100.0
+"""Requests per second on a key: a device asks for the time 20 times a second at first, then twice.
+
+Zenoh does not say who sends a query, so those who send on one key share the rate; each host joins on its own.
+"""
 _LONGEST_REASON = 1000
 """Letters of a refusal, which quotes parts of the request."""
+
+Q = TypeVar("Q", bound=BaseModel)
 
 
 class Joins(Protocol):
@@ -39,7 +52,9 @@ class Joins(Protocol):
 
 
 class ControlServer:
-    """Answers control requests in Zenoh's threads; a refused request gets the reason.
+    """Answers control requests in a thread of its own; a refused request gets the reason.
+
+    What is too long, too frequent or too much to wait is refused at once, unread.
 
     Args:
         session: The hub's Zenoh session.
@@ -63,6 +78,9 @@ class ControlServer:
     ) -> None:
         self._refusals = refusals
         self._inlets = inlets
+        self._waiting: Queue[Callable[[], None] | None] = Queue(_MOST_WAITING)
+        self._thread = Thread(target=self._run, name="control", daemon=True)
+        self._thread.start()
         self._queryables = [
             self._declare(
                 session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)
@@ -90,32 +108,45 @@ class ControlServer:
         key_of: Callable[[Q], str] | None = None,
     ) -> zenoh.Queryable[None]:
         """Answer on `key`; if that is a pattern, a request is allowed on the key that `key_of` returns."""
+        limit = TokenBucket(_RATE)
 
-        def answer(query: zenoh.Query) -> None:
-            at = key
-            with query:
-                try:
-                    payload = b"" if query.payload is None else query.payload.to_bytes()
-                    text = decode(StringMessage, payload).data if payload else "{}"
-                    request = model.model_validate_json(text)
-                    if key_of is not None:
-                        if not query.key_expr.intersects(key_of(request)):
-                            raise MessageError(
-                                f"this request belongs on {key_of(request)}, and was sent on {query.key_expr}"
-                            )
-                        at = key_of(request)
-                    reply = handler(request)
-                except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
-                    reason = _reason(error)[:_LONGEST_REASON]
-                    self._refusals.refuse(key, reason)
-                    reply = Refusal(refused=reason)
-                query.reply(
-                    at,
-                    encode(StringMessage(data=reply.model_dump_json())),
-                    encoding=zenoh.Encoding.APPLICATION_CDR,
-                )
+        def take(query: zenoh.Query) -> None:
+            payload = b"" if query.payload is None else query.payload.to_bytes()
+            try:
+                if len(payload) > MOST_BYTES:
+                    raise MessageError(f"{len(payload)} bytes, a control message has at most {MOST_BYTES}")
+                if not limit.spend(monotonic_ns()):
+                    raise MessageError(f"more than {_RATE:g} requests/s")
+                self._waiting.put_nowait(lambda: answer(query, payload))
+            except MessageError as error:
+                self._refuse(query, key, str(error))
+            except Full:
+                self._refuse(query, key, f"{_MOST_WAITING} requests wait already")
 
-        return session.declare_queryable(key, Callback(answer))
+        def answer(query: zenoh.Query, payload: bytes) -> None:
+            try:
+                request = model.model_validate_json(control_text(payload) if payload else "{}")
+                at = key if key_of is None else key_of(request)
+                if not query.key_expr.intersects(at):
+                    raise MessageError(f"this request belongs on {at}, and was sent on {query.key_expr}")
+                reply = handler(request)
+            except (TrocarError, ValueError, TypeError, ArithmeticError) as error:
+                self._refuse(query, key, _reason(error)[:_LONGEST_REASON])
+            else:
+                _reply(query, at, reply)
+
+        return session.declare_queryable(key, Callback(take, indirect=False))
+
+    def _refuse(self, query: zenoh.Query, key: str, reason: str) -> None:
+        self._refusals.refuse(key, reason)
+        _reply(query, key, Refusal(refused=reason))
+
+    def _run(self) -> None:
+        while (answer := self._waiting.get()) is not None:
+            try:
+                answer()
+            except Exception:
+                log.exception("a control request is not answered")  # the next ones are
 
     @staticmethod
     def _clock(_: Empty) -> ClockReply:
@@ -142,6 +173,17 @@ class ControlServer:
         """Answer no more."""
         for queryable in self._queryables:
             queryable.undeclare()
+        self._waiting.put(None)
+        self._thread.join()
+
+
+def _reply(query: zenoh.Query, key: str, reply: BaseModel) -> None:
+    with query:
+        query.reply(
+            key,
+            encode(StringMessage(data=reply.model_dump_json())),
+            encoding=zenoh.Encoding.APPLICATION_CDR,
+        )
 
 
 def _reason(error: Exception) -> str:

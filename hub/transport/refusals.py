@@ -16,10 +16,13 @@ log = logging.getLogger(__name__)
 class Refusals:
     """Counts refused messages by key, and logs the first ones of each key with their sender.
 
+    A sender may make up keys without end: beyond some, all are counted under one.
+
     May be used from any thread. `report` is called with the key of each refused message.
     """
 
     _LOGGED_PER_KEY = 3
+    _MOST_KEYS = 1000
 
     def __init__(self, report: Callable[[str], object] | None = None) -> None:
         self.by_key: dict[str, int] = {}
@@ -34,6 +37,8 @@ class Refusals:
     def add(self, key: str) -> int:
         """Count one refusal on `key`; return the count of this key."""
         with self._lock:
+            if len(self.by_key) >= self._MOST_KEYS and key not in self.by_key:
+                key = "further keys"
             n = self.by_key[key] = self.by_key.get(key, 0) + 1
         if self._report is not None:
             self._report(key)

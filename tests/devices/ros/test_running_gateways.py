@@ -8,7 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from devices.ros.command_line import app
-from hub.transport.zenoh_session import open_session
+from hub.transport.loopback_port import LoopbackPort
+from hub.transport.session_secret import listen_with_secret
 from schemas.codec import encode
 from schemas.keys import Keys
 from schemas.trocar_msgs import GatewayClient, GatewayStatus, GatewayTopic
@@ -41,7 +42,7 @@ def endpoint() -> Generator[str]:
             hub.put(Keys("surgery").output("device", "ros", "gateway"), encode(STATUS))
             hub.put(Keys("surgery").output("device", "broken", "gateway"), b"nonsense")
 
-    with open_session("router", listen=[endpoint]) as hub:
+    with listen_with_secret(LoopbackPort(endpoint)) as hub:
         teller = threading.Thread(target=tell)
         teller.start()
         yield endpoint

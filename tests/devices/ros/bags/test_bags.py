@@ -65,8 +65,8 @@ GOALS = [0.02, -0.01, 0.125, 0.05, 0.0, 0.1]
 
 
 def recorded(directory, device, connections="", *, pace="fast", duration="20 s", drive=None):
-    """Run the scenario with `device` as `ros`, and return its recording; `drive` gets the hub's endpoint, in
-    a thread.
+    """Run the scenario with `device` as `ros`, and return its recording; `drive` gets the endpoint of
+    programs, in a thread.
     """
     directory.mkdir()
     file = directory / "bags.yaml"
@@ -76,7 +76,7 @@ def recorded(directory, device, connections="", *, pace="fast", duration="20 s",
 
     def driving():
         try:
-            drive(session.endpoint)
+            drive(session.programs_endpoint)
         except Exception as error:  # noqa: BLE001  # it is raised in the main thread
             failures.append(error)
         session.state.shutdown()

@@ -72,7 +72,7 @@ def test_a_program_moves_an_arm(host, prepare, tmp_path, monkeypatch):
 
     def console():
         try:
-            with Peer(session.endpoint) as program:
+            with Peer(session.programs_endpoint) as program:
                 program.listen(STATE, JOINTS, lambda message, _: heard.append(message.position.tolist()))
                 assert until(lambda: heard, 20.0), "no state came"
                 publish = program.publisher(COMMAND, JOINTS)

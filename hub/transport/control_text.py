@@ -1,0 +1,37 @@
+"""The text of a control message, with limits that hold before its JSON is parsed.
+
+A parser of JSON and the models behind it take time and memory by what a message holds: sixteen nested ones
+held a hub for two minutes.
+"""
+
+from __future__ import annotations
+
+import re
+
+from schemas.codec import decode
+from schemas.errors import MessageError
+from schemas.ros import StringMessage
+
+__all__ = ["MOST_BYTES", "control_text"]
+
+MOST_BYTES = 2**18
+"""The largest value that is set by hand has some thousand numbers."""
+
+_MOST_NESTED = 16
+"""A pose with covariance, as JSON within a request, has 6."""
+
+_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"?', re.DOTALL)
+_NO_BRACKETS = re.compile(r"[^\[\]{}]+")
+
+
+def control_text(payload: bytes) -> str:
+    """Return the JSON in a `std_msgs/String`; raises MessageError if it is too long or too deeply nested."""
+    if len(payload) > MOST_BYTES:
+        raise MessageError(f"{len(payload)} bytes, a control message has at most {MOST_BYTES}")
+    text = decode(StringMessage, payload).data
+    depth = 0
+    for bracket in _NO_BRACKETS.sub("", _STRINGS.sub("", text)):
+        depth += 1 if bracket in "[{" else -1
+        if depth > _MOST_NESTED:
+            raise MessageError(f"its JSON is nested more than {_MOST_NESTED} deep")
+    return text
