@@ -145,6 +145,12 @@ def test_a_request_of_any_length_is_quoted_in_part(steer, text):
     assert len(refusal.refused) <= 1_000
 
 
+@pytest.mark.parametrize("host", ["", "/", "a//b", "/dev/zero", "a b#$*", "remote/"])
+def test_what_is_no_name_of_a_host_may_not_join(steer, host):
+    with steer(paused=True) as (console, _), pytest.raises(MessageError, match="host: String should match"):
+        ask(console._client, KEYS.join("other"), JoinRequest.model_construct(host=host, pid=1), JoinReply)
+
+
 def test_unknown_hosts_may_not_join(steer):
     with steer() as (console, _):
         for host, message in (
