@@ -63,7 +63,7 @@ MESSAGES = {
     KEYS.refused("engine", "teleop"): "std_msgs/msg/String",
     KEYS.link("keys"): "std_msgs/msg/String",
 }
-PATIENCE_S = 60.0
+PATIENCE_S = 300.0
 
 
 class Hub:
