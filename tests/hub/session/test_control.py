@@ -141,7 +141,7 @@ def test_a_request_of_any_length_is_quoted_in_part(steer, text):
         payload = encode(StringMessage(data=text))
         (reply,) = console._client.get(KEYS.control("step"), payload=payload)
         refusal = Refusal.model_validate_json(decode(StringMessage, reply.ok.payload.to_bytes()).data)
-    assert refusal.refused
+    assert len(refusal.refused.split()) > 2
     assert len(refusal.refused) <= 1_000
 
 
