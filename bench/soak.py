@@ -18,6 +18,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -30,8 +31,9 @@ from typing import Any
 import zenoh
 
 from bench.soak_trends import COLUMNS, SESSION_COLUMNS, Sample, SessionSample, plotted, report
+from hub.remote.hub_connection import reach
+from hub.security.credentials import OBSERVER
 from hub.transport.loopback_port import LoopbackPort
-from hub.transport.zenoh_session import open_session
 from schemas.codec import decode
 from schemas.errors import ConnectError
 from schemas.keys import Keys
@@ -42,6 +44,7 @@ from tests.devices.standins.hd import VARIABLE, HdWorld
 ROOT = Path(__file__).parents[1]
 NAME = "soak"
 EVERY_S, PATIENCE_S = 5.0, 60.0
+_PROGRAMS = re.compile(r"programs that share keys with devices may connect at (\S+)")
 ARMS = {"PSM1": {"instrument": "400006"}, "PSM2": {"instrument": "400006"}}
 SCENARIO: dict[str, Any] = {
     "name": NAME,
@@ -102,7 +105,13 @@ class Running:
         )
         self._wait_for_steps()
         task = {"arm_name": "PSM2", "rate": 100.0, "seconds": client_s}
-        client = (str(ROOT / "bench/ros_client.py"), "ros2-zenoh", endpoint, "stream", json.dumps(task))
+        client = (
+            str(ROOT / "bench/ros_client.py"),
+            "ros2-zenoh",
+            self._programs(),
+            "stream",
+            json.dumps(task),
+        )
         process = self._start("ROS client", *client)
         assert process.stdin is not None
         process.stdin.write(b"\n")
@@ -132,6 +141,13 @@ class Running:
                 raise RuntimeError("the session does not start; see log.txt")
             sleep(0.1)
         self._begun = monotonic()
+
+    def _programs(self) -> str:
+        """Return where ROS programs connect, which the hub logs."""
+        found = _PROGRAMS.search(Path(self._log.name).read_text(encoding="utf-8"))
+        if found is None:
+            raise RuntimeError("the hub does not log where programs connect; see log.txt")
+        return found[1]
 
     def move_hand(self) -> None:
         """Take the stylus up anew, and let it swing onto the table and off it."""
@@ -189,7 +205,7 @@ def _reached(endpoint: str) -> Iterator[zenoh.Session]:
     end = monotonic() + PATIENCE_S
     while True:
         try:
-            session = open_session("client", connect=[endpoint])
+            session = reach(endpoint, OBSERVER)
             break
         except ConnectError:
             if monotonic() > end:

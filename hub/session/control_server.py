@@ -192,7 +192,7 @@ def _reason(error: Exception) -> str:
         return str(error)
     found = error.errors(include_url=False)
     return "; ".join(
-        f"{'.'.join(map(str, detail['loc']))}: {detail['msg'].removeprefix('Value error, ')} (got"
+        f"{'.'.join(map(str, detail['loc'])):.80}: {detail['msg'].removeprefix('Value error, ')} (got"
         f" {detail['input']!r:.200})"
         for detail in found
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -43,7 +43,7 @@ class SetRequest(_Json):
 class JoinRequest(_Json):
     """A host process joins (first request), and reports that its participants are configured (second)."""
 
-    host: str
+    host: Annotated[str, Field(pattern=r"^(remote/)?[A-Za-z][A-Za-z0-9_]*$")]
     pid: int
     ready: bool = False
     bonds: dict[str, tuple[BondSide, ...]] = {}

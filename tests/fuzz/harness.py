@@ -30,6 +30,8 @@ LONGEST_S = 10.0
 """Of CPU time, for one input."""
 LARGEST_MB = 100.0
 """Of memory, in addition to that of inputs that are not mutated."""
+_PATIENCE_S = 30 * LONGEST_S
+"""Of wall time, for one input, on a busy machine."""
 _ADDRESS_SPACE = 8 * 2**30
 """Bytes of a process: a reader without bounds fails before it takes the machine's memory."""
 
@@ -162,7 +164,7 @@ def _try_in_process(target: Target, cases: Sequence[str], directory: Path, tally
 def _lines(reader: int, child: int) -> Iterator[list[Any]]:
     """Yield what a process writes; one that takes far too long is killed."""
     rest = b""
-    while select([reader], [], [], 6 * LONGEST_S)[0]:
+    while select([reader], [], [], _PATIENCE_S)[0]:
         part = os.read(reader, 65536)
         if not part:
             return

@@ -63,7 +63,8 @@ def _check(path: Path, overrides: list[str], directory: Path) -> None:
         os.close(file)
         os.close(before)
     text = said.read_text(encoding="utf-8", errors="replace")
-    if code not in (0, 2) or "Traceback" in text or (code == 2 and not text.startswith("error: ")):
+    rejected = any(line.startswith("error: ") for line in text.splitlines())  # behind what is logged
+    if code not in (0, 2) or "Traceback" in text or rejected != (code == 2):
         raise AssertionError(f"exit code {code}: {text[-3000:]}")
     if code == 2:
         raise ScenarioError(text)
