@@ -22,6 +22,7 @@ from hub.planning.plan import (
     PlannedConnection,
     PlannedParticipant,
 )
+from hub.security import certs, revoked
 from hub.security.access import access_settings
 from hub.security.credentials import Credentials
 from hub.security.gate import Gate
@@ -104,7 +105,10 @@ class Hub:
         self.endpoint = f"tls/127.0.0.1:{self.port}"
         self.heard: list[str] = []
         self.router = open_session("router", listen=[inside])
-        self.gate = Gate([self.endpoint], self.authority.hub.listening() | access_settings(PLAN, "s"))
+        self.revoked = self.authority.directory / revoked.FILE
+        self.gate = Gate(
+            [self.endpoint], self.authority.hub.listening() | access_settings(PLAN, "s"), self.revoked
+        )
         self.router.declare_subscriber(
             "**", Callback(lambda sample: self.heard.append(str(sample.key_expr)), indirect=False)
         )
@@ -436,7 +440,7 @@ def test_a_gate_whose_hub_is_killed_ends_without_a_traceback(tmp_path, listens):
     """A connection that it would report closes meanwhile."""
     port, inside = free_port(), free_endpoint()
     security = Authority.founded(tmp_path).hub.listening() | access_settings(PLAN, "s")
-    orders = {"listen": [f"tls/127.0.0.1:{port}"], "connect": [inside], "security": security}
+    orders = {"listen": [f"tls/127.0.0.1:{port}"], "connect": [inside], "security": security, "revoked": None}
     with (
         open_session("router", listen=[inside]),
         subprocess.Popen(
@@ -461,6 +465,43 @@ def test_a_gate_whose_hub_is_killed_ends_without_a_traceback(tmp_path, listens):
         gate.stdin.close()
         assert gate.stderr.read() == b""
         gate.wait(10)
+
+
+def test_a_revoked_certificate_loses_its_connection_and_its_rights(tmp_path, told):
+    hub = Hub(tmp_path)
+    pose, others = (KEYS.output("device", name, "pose") for name in ("touch", "head"))
+    try:
+        stolen = hub.authority.issued("touch")
+        with hub.client(stolen) as thief, hub.client(hub.authority.issued("head")) as head:
+            thief.put(pose, b"x")
+            wait_for(lambda: pose in hub.heard)
+            certs.revoke(hub.authority.directory, "touch")
+            told("the list of revoked certificates has changed")
+            told("'touch' connects from 127.0.0.1:", "with a revoked certificate: it has no rights")
+            hub.heard.clear()
+            thief.put(pose, b"x")
+            wait_for(lambda: head.put(others, b"x") or others in hub.heard)
+            assert pose not in hub.heard
+            assert asks(thief, Keys("*").join("remote/touch")) == []
+            with hub.client(hub.authority.issued("touch")) as touch:
+                told("'touch.2' connects from 127.0.0.1:")
+                touch.put(pose, b"x")
+                wait_for(lambda: pose in hub.heard)
+                assert asks(touch, Keys("*").join("remote/touch")) == [KEYS.join("remote/touch")]
+    finally:
+        hub.close()
+
+
+def test_a_gate_whose_list_cannot_be_read_stays_closed_until_it_can(tmp_path, told):
+    hub = Hub(tmp_path)
+    try:
+        hub.revoked.write_text("touch, lost on Monday\n")
+        told("revoked.txt:1: 'touch, lost on Monday' is no name of a certificate")
+        assert not _opens(hub)
+        hub.revoked.write_text("observer\n")
+        wait_for(lambda: _opens(hub))
+    finally:
+        hub.close()
 
 
 def test_a_gate_that_cannot_listen_says_so(tmp_path):
