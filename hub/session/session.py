@@ -18,6 +18,7 @@ from hub.session.run import Run, SessionSpec
 from hub.session.run_state import RunState
 from hub.session.startup import start
 from hub.session.step_loop import OnAck, StepLoop
+from hub.transport.hub_files import hub_file
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
 from schemas.errors import ScenarioError, SessionError
@@ -122,6 +123,7 @@ class Session:
             finally:
                 interrupt.disarm()  # a second SIGTERM does not cut the recording short
                 recorded = recorder.close() if recorder is not None else None
+                hub_file(self.endpoint, self.gate.endpoints if self.gate is not None else ()),
         return run.bookkeeping.summary(recorded)
 
     def _step(self, run: Run, interrupt: Interrupt, progress: Callable[[Progress], None] | None) -> None:

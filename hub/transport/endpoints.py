@@ -17,7 +17,7 @@ __all__ = [
 ]
 
 PORTS = range(7447, 7467)
-"""Zenoh's own port, and the next ones for further hubs on the same machine."""
+"""Zenoh's own port, and the next ones for further hubs on the same machine, before any free one."""
 
 
 def listening_endpoints() -> list[str]:
