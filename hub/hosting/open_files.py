@@ -20,8 +20,8 @@ _OF_A_HOST = 2
 def allow_open_files(plan: Plan) -> None:
     """Raise this process' own limit, which hosts inherit, to what a session of `plan` needs.
 
-    Raises SessionError if the system does not allow that. Without it, an import, a connection or the recording
-    fails somewhere in the middle, for a reason that is hard to find.
+    Raises SessionError if the system does not allow that. Otherwise an import, a connection or the recording
+    would fail somewhere in the middle, for a reason that is hard to find.
     """
     if sys.platform == "win32":  # has no such limit
         return
@@ -33,9 +33,9 @@ def allow_open_files(plan: Plan) -> None:
         return
     if hard != resource.RLIM_INFINITY and hard < needed:
         raise SessionError(
-            f"each process may have {hard} files and sockets open (ulimit -n), and this session needs about"
-            f" {needed} in one of its processes. Start it after: ulimit -n {max(1024, needed)}; or put more of"
-            " its participants into one host"
+            f"each process may have {hard} files and sockets open (ulimit -n), and one of this session needs"
+            f" about {needed}. Start it after: ulimit -n {max(1024, needed)}; or put more of its participants"
+            " into one host"
         )
     resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
 
