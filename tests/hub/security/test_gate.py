@@ -177,8 +177,8 @@ def told(caplog):
     return wait
 
 
-def wait_for(true):
-    until = monotonic() + 5
+def wait_for(true, limit_s=5):
+    until = monotonic() + limit_s
     while not true():
         assert monotonic() < until
         sleep(0.01)
@@ -408,6 +408,28 @@ def test_nobody_without_a_certificate_gets_in(hub, told):
     ):
         secure.recv(1)
     told("refused a connection: it shows no certificate")
+
+
+def test_connections_that_say_nothing_cost_those_who_are_in_nothing_and_others_a_while(tmp_path):
+    hub = Hub(tmp_path)
+    pose = KEYS.output("device", "touch", "pose")
+    try:
+        with hub.client(hub.authority.issued("touch")) as touch:
+            silent = [socket.create_connection(("127.0.0.1", hub.port)) for _ in range(50)]
+            for one in silent:
+                one.sendall(b"\x16\x03\x01")  # the beginning of a hello
+            hub.heard.clear()
+            wait_for(lambda: touch.put(pose, b"x") or pose in hub.heard)
+            assert _opens(hub)
+            for one in silent:
+                one.close()
+            hub.heard.clear()
+            wait_for(lambda: touch.put(pose, b"x") or pose in hub.heard)
+        # Zenoh waits 0.1 s for each of them
+        wait_for(lambda: _opens(hub), limit_s=60)
+        assert hub.gate._process.poll() is None
+    finally:
+        hub.close()
 
 
 def test_a_connection_ends_when_its_certificate_does(hub):
