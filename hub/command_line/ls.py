@@ -68,11 +68,11 @@ class _Found(NamedTuple):
 def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
     """Return the sessions at the endpoints `connect`, by default all of this machine, sorted by name."""
     from hub.remote.live_sessions import live_sessions
-    from hub.transport.hub_files import hub_endpoints, running_hubs
+    from hub.transport.hub_files import running_hubs
 
     at = {
         endpoint: live_sessions([endpoint], certificates)
-        for endpoint in connect or hub_endpoints(running_hubs())
+        for endpoint in connect or [hub.endpoint for hub in running_hubs()]
     }
     hubs = {hub.endpoint: hub for hub in running_hubs()}  # again, as some may have begun in between
     found: dict[tuple[str, int], _Found] = {}
