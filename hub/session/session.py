@@ -108,6 +108,7 @@ class Session:
                 with (
                     self._outer.opened(),
                     listen_with_secret(self._port, connect=self._outer.inside) as session,
+                    hub_file(self.endpoint, self.gate.endpoints if self.gate is not None else ()),
                     ExitStack() as stack,
                 ):
                     spec = SessionSpec(
@@ -125,7 +126,6 @@ class Session:
             finally:
                 interrupt.disarm()  # a second SIGTERM does not cut the recording short
                 recorded = recorder.close() if recorder is not None else None
-                hub_file(self.endpoint, self.gate.endpoints if self.gate is not None else ()),
         return run.bookkeeping.summary(recorded)
 
     def _step(self, run: Run, interrupt: Interrupt, progress: Callable[[Progress], None] | None) -> None:
