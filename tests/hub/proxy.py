@@ -1,8 +1,11 @@
 """A network between a hub and a host that tests can hold and cut."""
 
+import shutil
 import socket
 import threading
 from contextlib import suppress
+
+from hub.transport.session_secret import private_directory
 
 
 class Proxy:
@@ -16,6 +19,8 @@ class Proxy:
         self._pairs = []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
+        self._secret = private_directory() / str(self.port)
+        shutil.copy(private_directory() / str(port), self._secret)
         self._start(self._accept)
 
     def __enter__(self):
@@ -25,6 +30,7 @@ class Proxy:
         self.cut()
         self._flowing.set()
         self._listener.close()
+        self._secret.unlink()
 
     def hold(self):
         """Let nothing through, and keep what arrives for later."""
