@@ -39,9 +39,9 @@ def ros(
     if context.invoked_subcommand is not None:
         return
     from devices.ros.running_gateways import running_gateways
-    from hub.transport.endpoints import listening_endpoints
+    from hub.transport.hub_files import running_hubs
 
-    gateways = running_gateways(connect or listening_endpoints())
+    gateways = running_gateways(connect or [hub.endpoint for hub in running_hubs()])
     if as_json:
         typer.echo(
             json.dumps(

@@ -15,7 +15,7 @@ from schemas.errors import ConnectError, MissingExtraError
 __all__ = ["app"]
 
 app = typer.Typer(
-    help="Create and show the certificates with which a hub and other machines identify each other.",
+    help="Create, revoke and show the certificates with which a hub and other machines identify each other.",
     no_args_is_help=True,
 )
 
@@ -26,7 +26,7 @@ Source: CA/Browser Forum, Baseline Requirements 6.3.2.
 """
 
 _PARTICIPANT_DAYS = 30
-"""Short, as a certificate that is lost or stolen cannot be revoked."""
+"""Short, as a certificate that is lost or stolen may stay unnoticed."""
 
 _LEAST_DAYS, _MOST_DAYS = 0.01, 3650
 """A quarter of an hour, to try it out; ten years, as the authority's own certificate."""
@@ -116,7 +116,7 @@ def issue(
 ) -> None:
     """Create the certificate of one participant on another machine.
 
-    An older certificate of the participant stays valid until it expires.
+    An older certificate of the participant stays valid until it expires, or is revoked.
     """
     _require_cryptography()
     from hub.security.certs import issue as make
@@ -141,11 +141,37 @@ def issue(
 
 
 @app.command()
+def revoke(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="A participant, `observer` or `console`: as in `issue`.")
+    ],
+    *,
+    directory: Directory = None,
+) -> None:
+    """Let a hub reject all certificates that NAME has, for instance because a file was lost.
+
+    Hubs that run with this directory apply it within a second or two, and end the connections of NAME.
+    """
+    _require_cryptography()
+    from hub.security.certs import revoke as ban
+    from hub.security.revoked import FILE
+
+    place = _directory(directory)
+    common_name = ban(place, name)
+    console.print(
+        f"wrote '{common_name}' to {place / FILE}: hubs on this machine reject it from now on", soft_wrap=True
+    )
+    console.print(f"for a new certificate: trocar certs issue {name}", soft_wrap=True)
+
+
+@app.command()
 def show(*, directory: Directory = None) -> None:
     """List the certificates of this machine, with their purpose and date of expiry."""
     from hub.security.credentials import CONSOLE, HUB, OBSERVER, examine, load
+    from hub.security.revoked import FILE, read
 
     place = _directory(directory)
+    revoked = read(place / FILE)
     rows: list[tuple[str, str, str]] = []
     for file in sorted(place.glob("*.pem")):
         if file.name == "ca.pem":
@@ -154,6 +180,9 @@ def show(*, directory: Directory = None) -> None:
             certificate = examine(load(file.stem, place))
         except ConnectError as error:
             rows.append((file.stem, "invalid", str(error)))
+            continue
+        if certificate.common_name in revoked:
+            rows.append((file.stem, "revoked", f"for a new one: trocar certs issue {certificate.name}"))
             continue
         role = {
             HUB: f"a hub at {', '.join(certificate.hosts)}",

@@ -48,7 +48,7 @@ def link(
     """
     from hub.devices.network_link_control import NetworkLinkReply, NetworkLinkRequest
     from hub.remote.live_sessions import ask_about
-    from hub.transport.endpoints import listening_endpoints
+    from hub.transport.hub_files import running_hubs
 
     given = {"preset": preset, "delay": delay, "jitter": jitter, "loss": loss, "outage": outage}
     try:
@@ -59,9 +59,8 @@ def link(
         problem = error.errors()[0]
         message, option = problem["msg"].removeprefix("Value error, "), f"--{problem['loc'][0]}"
         raise typer.BadParameter(message, param_hint=option) from error
-    reply = ask_about(
-        device, connect or listening_endpoints(), "link", request, NetworkLinkReply, session=session
-    )
+    endpoints = connect or [hub.endpoint for hub in running_hubs()]
+    reply = ask_about(device, endpoints, "link", request, NetworkLinkReply, session=session)
     if as_json:
         show(reply.model_dump(mode="json"), as_json=True)
     else:

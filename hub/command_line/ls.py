@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import typer
 from rich.console import Console
@@ -16,23 +17,29 @@ from schemas.trocar_msgs import SessionStatus
 
 __all__ = ["ls"]
 
+_SESSION_COLUMNS = ("session", "state", "listens at", "pid", "run")
 _PARTICIPANT_COLUMNS = ("session", "state", "name", "role", "host", "pid", "step")
 _DEVICE_COLUMNS = ("session", "device", "clock offset", "within", "network link")
 
 
 def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Json = False) -> None:
-    """List the running sessions: participants, clocks and network links of devices, latencies."""
-    from hub.remote.live_sessions import live_sessions
-    from hub.transport.endpoints import listening_endpoints
-
-    sessions = live_sessions(connect or listening_endpoints(), certs)
+    """List the running sessions: where, participants, clocks and network links of devices, latencies."""
+    found = _found(connect, certs)
     if as_json:
-        typer.echo(json.dumps([_session_row(status) for status in sessions], indent=2))
+        typer.echo(json.dumps([_session_row(session) for session in found], indent=2))
         return
     out = Console(highlight=False)
-    if not sessions:
+    if not found:
         out.print("no session is running")
         return
+    out.print(
+        table(
+            ((s.session, s.state, ", ".join(endpoints), pid or "-", s.run) for s, endpoints, pid in found),
+            *_SESSION_COLUMNS,
+        )
+    )
+    out.print()
+    sessions = [session.status for session in found]
     rows = [
         (s.session, s.state, p.name, p.role, p.host, p.pid, p.step) for s in sessions for p in s.participants
     ]
@@ -48,11 +55,44 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
         out.print(table(latencies, "session", *LATENCY_COLUMNS))
 
 
-def _session_row(status: SessionStatus) -> dict[str, Any]:
-    shown = {"participants": status.participants, "devices": status.devices, "latency": status.latencies}
-    return {"session": status.session} | {
-        name: [one.model_dump() for one in found] for name, found in shown.items()
+class _Found(NamedTuple):
+    """A session that answered."""
+
+    status: SessionStatus
+    endpoints: tuple[str, ...]
+    """Where its hub listens, as far as is known here."""
+    pid: int | None
+    """The hub's process, if it is one of this user on this machine."""
+
+
+def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
+    """Return the sessions at the endpoints `connect`, by default all of this machine, sorted by name."""
+    from hub.remote.live_sessions import live_sessions
+    from hub.transport.hub_files import running_hubs
+
+    at = {
+        endpoint: live_sessions([endpoint], certificates)
+        for endpoint in connect or [hub.endpoint for hub in running_hubs()]
     }
+    hubs = {hub.endpoint: hub for hub in running_hubs()}  # again, as some may have begun in between
+    found: dict[tuple[str, int], _Found] = {}
+    for endpoint, statuses in at.items():
+        hub = hubs.get(endpoint)
+        outside, pid = (hub.outside, hub.pid) if hub else ((), None)
+        for status in statuses:
+            found.setdefault((status.session, status.run), _Found(status, (endpoint, *outside), pid))
+    return [found[key] for key in sorted(found)]
+
+
+def _session_row(session: _Found) -> dict[str, Any]:
+    status = session.status
+    shown = {"participants": status.participants, "devices": status.devices, "latency": status.latencies}
+    where = {"endpoints": session.endpoints, "pid": session.pid, "run": status.run, "state": status.state}
+    return (
+        {"session": status.session}
+        | where
+        | {name: [one.model_dump() for one in rows] for name, rows in shown.items()}
+    )
 
 
 def _device_rows(status: SessionStatus) -> Iterator[tuple[str, ...]]:

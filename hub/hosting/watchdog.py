@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from time import monotonic_ns
+from time import monotonic_ns, process_time_ns
 
 from hub.hosting.host_processes import HostProcesses
 from hub.planning.plan import Plan
@@ -16,6 +16,9 @@ log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.02
 """Between two looks at the answers; the end of a process is noticed at once."""
+
+_STOPPED_NS = 1_000_000_000
+"""Between two looks, if this process was stopped: by Ctrl-Z, by a debugger, or with its virtual machine."""
 
 
 class Watchdog:
@@ -54,8 +57,18 @@ class Watchdog:
         self._waiting = participants
 
     def _run(self) -> None:
+        looked_ns, used_ns = monotonic_ns(), process_time_ns()
         while not self._ending:
             self._processes.wait(_PERIOD_S)
+            # time in which this process computed is not silent: a participant may have kept the interpreter
+            silent_ns = monotonic_ns() - looked_ns - (process_time_ns() - used_ns)
+            looked_ns, used_ns = monotonic_ns(), process_time_ns()
+            if silent_ns > _STOPPED_NS:
+                log.warning(
+                    "the hub did not run for %.1f s: it was stopped, or the machine is too busy",
+                    silent_ns / 1e9,
+                )
+                self._since_ns += silent_ns  # no answer could be received
             failure = self._ended_process() or self._late_answer()
             if failure is not None and not self._ending:
                 # at once: the main thread may be in a call that nothing interrupts

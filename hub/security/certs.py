@@ -26,11 +26,12 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from hub.security import revoked
 from hub.security.credentials import CONSOLE, HUB, OBSERVER, examine, load
 from schemas.errors import ConnectError, ScenarioError
 from schemas.keys import valid_name
 
-__all__ = ["found", "issue", "names_of_this_machine", "renew"]
+__all__ = ["found", "issue", "names_of_this_machine", "renew", "revoke"]
 
 _AUTHORITY_DAYS = 3650
 _SKEW = timedelta(hours=1)
@@ -93,12 +94,23 @@ def issue(directory: Path, name: str, days: float) -> Path:
     The file is all that the other machine needs; it replaces an older one. Raises ScenarioError if the name
     is invalid, ConnectError if `directory` has no authority.
     """
-    if not valid_name(name) or name in (HUB, "ca"):
-        raise ScenarioError(
-            f"'{name}' cannot have a certificate: give the name of a participant with 'host: remote' in the"
-            f" scenario, '{OBSERVER}', or '{CONSOLE}' for ROS programs"
-        )
+    _check_holder(name)
     return _issue(directory, name, days)
+
+
+def revoke(directory: Path, name: str) -> str:
+    """Revoke every certificate that `name` has, and return their common name; hubs read the list as they run.
+
+    Raises ScenarioError if the name is invalid, ConnectError if `directory` has no authority.
+    """
+    if name == HUB:
+        raise ScenarioError(
+            "the hub's certificate cannot be revoked, as other machines read no list: if its file was stolen,"
+            f" move {directory} away and start afresh with trocar certs init"
+        )
+    _check_holder(name)
+    _authority(directory)
+    return revoked.add(directory / revoked.FILE, name)
 
 
 def names_of_this_machine() -> list[str]:
@@ -114,12 +126,21 @@ def names_of_this_machine() -> list[str]:
     return sorted(name for name in names if "%" not in name)
 
 
+def _check_holder(name: str) -> None:
+    if not valid_name(name) or name in (HUB, "ca"):
+        raise ScenarioError(
+            f"'{name}' cannot have a certificate: give the name of a participant with 'host: remote' in the"
+            f" scenario, '{OBSERVER}', or '{CONSOLE}' for ROS programs"
+        )
+
+
 def _issue(directory: Path, name: str, days: float, hosts: Sequence[str] = ()) -> Path:
     authority_key, authority = _authority(directory)
     key = ec.generate_private_key(ec.SECP256R1())
     until = min(datetime.now(UTC) + timedelta(days=days), authority.not_valid_after_utc)
     purpose = ExtendedKeyUsageOID.SERVER_AUTH if name == HUB else ExtendedKeyUsageOID.CLIENT_AUTH
-    builder = _builder(_named(name), authority.subject, key, until)
+    common_name = revoked.common_name(name, revoked.read(directory / revoked.FILE))
+    builder = _builder(_named(common_name), authority.subject, key, until)
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
     builder = builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
     if hosts:

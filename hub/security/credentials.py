@@ -13,6 +13,7 @@ from typing import Any
 
 import typer
 
+from hub.security.revoked import holder
 from schemas.errors import ConnectError
 
 __all__ = ["CONSOLE", "HUB", "OBSERVER", "Certificate", "Credentials", "default_directory", "examine", "load"]
@@ -75,10 +76,15 @@ class Credentials:
 class Certificate:
     """The contents of a valid certificate."""
 
-    name: str
+    common_name: str
     until: datetime
     hosts: tuple[str, ...]
     """The names and addresses at which a hub may be reached."""
+
+    @property
+    def name(self) -> str:
+        """The holder: a participant, `hub`, `observer` or `console`."""
+        return holder(self.common_name)
 
 
 def default_directory() -> Path:

@@ -14,6 +14,7 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import IO, Any
 
 from schemas.errors import ConnectError
@@ -32,15 +33,19 @@ _RETRY_S = 1.0
 class Gate:
     """The gate, from the side of its hub."""
 
-    def __init__(self, endpoints: Sequence[str], security: Mapping[str, Any]) -> None:
+    def __init__(
+        self, endpoints: Sequence[str], security: Mapping[str, Any], revoked: Path | None = None
+    ) -> None:
         """Prepare a gate.
 
         Args:
             endpoints: Where to listen, such as tls/0.0.0.0:7447.
             security: Zenoh's settings of TLS and of access.
+            revoked: The list of revoked certificates; when it changes, the process starts again with it.
         """
         self.endpoints = list(endpoints)
         self._security = dict(security)
+        self._revoked = revoked
         self._closing = threading.Event()
         self._starting = threading.Lock()
         self._reader: threading.Thread | None = None
@@ -59,9 +64,13 @@ class Gate:
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )
         orders, answers = _pipes(process)
-        orders.write(
-            json.dumps({"listen": self.endpoints, "connect": [self._hub], "security": self._security}) + "\n"
-        )
+        settings = {
+            "listen": self.endpoints,
+            "connect": [self._hub],
+            "security": self._security,
+            "revoked": None if self._revoked is None else str(self._revoked),
+        }
+        orders.write(json.dumps(settings) + "\n")
         orders.flush()
         answer = answers.readline().strip()
         if answer != OPEN:
@@ -80,7 +89,10 @@ class Gate:
                 log.log(int(level), "gate: %s", message)
             if self._closing.is_set():
                 return
-            log.error("the gate ended with exit code %s; restarting it", _stop(self._process))
+            if code := _stop(self._process):
+                log.error("the gate ended with exit code %s; restarting it", code)
+            else:
+                log.warning("the list of revoked certificates has changed: restarting the gate with it")
             answers.close()
             while not self._restart():
                 if self._closing.wait(_RETRY_S):

@@ -62,9 +62,15 @@ class _List:
 class GateLog:
     """Turns the lines of Zenoh's log into reports."""
 
-    def __init__(self, known: Collection[str]) -> None:
-        """Start reading; `known` are the names in certificates that have access rules."""
+    def __init__(self, known: Collection[str], revoked: Collection[str] = ()) -> None:
+        """Start reading.
+
+        Args:
+            known: The common names of certificates that have access rules.
+            revoked: Those that had them.
+        """
         self._known = known
+        self._revoked = revoked
         self._addresses: dict[str, str] = {}
         self._accepted: set[str] = set()
         self._names: dict[str, str] = {}
@@ -103,6 +109,11 @@ class GateLog:
         self._reported.pop(name, None)
         if name in self._known:
             return logging.INFO, f"'{name}' connects from {address}"
+        if name in self._revoked:
+            return (
+                logging.WARNING,
+                f"'{name}' connects from {address} with a revoked certificate: it has no rights",
+            )
         return (
             logging.WARNING,
             (

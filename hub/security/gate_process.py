@@ -1,6 +1,7 @@
 """The process of a gate, `python -P -m hub.security.gate_process`.
 
-It reads its settings from the first line of its input, and ends when the input is closed.
+It reads its settings from the first line of its input, and ends when the input is closed, or when the list of
+revoked certificates changes: started again, it has other rules, and all its connections are new ones.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from pathlib import Path
 from time import monotonic
 from typing import Any, TextIO
 
 import zenoh
 
+from hub.security import revoked
 from hub.security.closed_connections import closed_connections
 from hub.security.gate import OPEN
 from hub.security.gate_log import LOG_FILTER, GateLog
@@ -33,9 +36,12 @@ _MOST_PER_SECOND = 200
 _LATER_S = 0.3
 """The report that a connection has closed may be read before the log line that it was accepted."""
 
+_LIST_S = 1.0
+"""How often the list of revoked certificates is read."""
+
 
 def main() -> None:
-    """Run a gate until the input is closed; exit code 1 if it cannot listen."""
+    """Run a gate until it has to end; exit code 1 if it cannot listen."""
     first = sys.stdin.readline()
     if not first:  # the hub has ended before it could send it
         sys.exit(1)
@@ -44,7 +50,10 @@ def main() -> None:
     os.environ["RUST_LOG"] = LOG_FILTER
     zenoh.init_log_from_env_or("error")
     security = orders["security"]
+    file = orders["revoked"] and Path(orders["revoked"])
     try:
+        banned = _revoked(file)
+        known = _accept_others(security, banned)
         session = open_session(
             "router", listen=orders["listen"], connect=orders["connect"], security=security
         )
@@ -52,17 +61,44 @@ def main() -> None:
         answers.write(f"{error}\n")
         sys.exit(1)
     answers.write(f"{OPEN}\n")
-    known = [
-        name
-        for subject in security["access_control"]["subjects"]
-        for name in subject.get("cert_common_names", ())
-    ]
-    gate_log, report = GateLog(known), _Reporter(answers)
+    gate_log, report = GateLog(known, banned), _Reporter(answers)
     ports = {address(endpoint)[1] for endpoint in orders["listen"]}
     for task in (lambda: _read(zenohs_log, gate_log, report), lambda: _watch(ports, gate_log, report)):
         threading.Thread(target=task, daemon=True).start()
     with session:
-        sys.stdin.read()
+        _wait_for_end(file, banned)
+
+
+def _revoked(file: Path | None) -> list[str]:
+    return [] if file is None else revoked.read(file)
+
+
+def _accept_others(security: dict[str, Any], banned: list[str]) -> list[str]:
+    """Apply the rules for each name to its certificates that are not revoked; return their common names."""
+    known: list[str] = []
+    for subject in security["access_control"]["subjects"]:
+        if names := subject.get("cert_common_names"):
+            subject["cert_common_names"] = [revoked.common_name(name, banned) for name in names]
+            known += subject["cert_common_names"]
+    return known
+
+
+def _wait_for_end(file: Path | None, banned: list[str]) -> None:
+    """Return when the input is closed, or other certificates are revoked than those of `banned`."""
+    closed = threading.Event()
+
+    def wait_for_close() -> None:
+        while os.read(sys.stdin.fileno(), 1024):
+            pass
+        closed.set()
+
+    threading.Thread(target=wait_for_close, daemon=True).start()
+    while not closed.wait(_LIST_S):
+        try:
+            if _revoked(file) != banned:
+                return
+        except ConnectError:  # no list, no gate: the next process says why
+            return
 
 
 def _split_outputs() -> tuple[TextIO, TextIO]:

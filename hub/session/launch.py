@@ -16,6 +16,7 @@ from hub.planning.plan import Plan
 from hub.planning.scenario_file import ScenarioFile
 from hub.planning.wiring import make_plan
 from hub.recording.file_hashes import file_hashes
+from hub.security import revoked
 from hub.security.access import access_settings
 from hub.security.credentials import HUB, examine, load
 from hub.security.gate import Gate
@@ -83,7 +84,7 @@ def _gate(endpoints: Sequence[str], certificates: Path | None, access: dict[str,
     """Return a gate with rules of `access`; raises ConnectError if the hub has no valid certificate."""
     credentials = load(HUB, certificates)
     examine(credentials)
-    return Gate(endpoints, credentials.listening() | access)
+    return Gate(endpoints, credentials.listening() | access, credentials.file.parent / revoked.FILE)
 
 
 def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:

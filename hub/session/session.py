@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from hub.hosting.interrupt import Interrupt
+from hub.hosting.open_files import allow_open_files
 from hub.observation.summary import Progress, Summary
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
@@ -18,6 +19,7 @@ from hub.session.run import Run, SessionSpec
 from hub.session.run_state import RunState
 from hub.session.startup import start
 from hub.session.step_loop import OnAck, StepLoop
+from hub.transport.hub_files import hub_file
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
 from schemas.errors import ScenarioError, SessionError
@@ -99,12 +101,14 @@ class Session:
         Raises ParticipantError or SessionError when the session fails (the recording is then closed and
         readable), ScenarioError if a bond's step is unstable, ConnectError if the endpoint is taken.
         """
+        allow_open_files(self.plan)
         recorder = Recorder(self._record, attachments=self._attachments) if self._record is not None else None
         with Interrupt() as interrupt:
             try:
                 with (
                     self._outer.opened(),
                     listen_with_secret(self._port, connect=self._outer.inside) as session,
+                    hub_file(self.endpoint, self.gate.endpoints if self.gate is not None else ()),
                     ExitStack() as stack,
                 ):
                     spec = SessionSpec(

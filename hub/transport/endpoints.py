@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from contextlib import suppress
 from ipaddress import ip_address
 
@@ -12,28 +11,11 @@ __all__ = [
     "PORTS",
     "address",
     "is_loopback",
-    "listening_endpoints",
     "require_loopback",
 ]
 
 PORTS = range(7447, 7467)
-"""Zenoh's own port, and the next ones for further hubs on the same machine."""
-
-
-def listening_endpoints() -> list[str]:
-    """Return the endpoints where a process listens on loopback alone.
-
-    One that listens on all addresses is the gate of a hub.
-    """
-    return [
-        _endpoint(port) for port in PORTS if _answers("127.0.0.1", port) and not _answers("127.0.0.2", port)
-    ]
-
-
-def _answers(address: str, port: int) -> bool:
-    with socket.socket() as probe:
-        probe.settimeout(0.2)
-        return probe.connect_ex((address, port)) == 0
+"""Zenoh's own port, and the next ones for further hubs on the same machine, before any free one."""
 
 
 def require_loopback(endpoint: str) -> str:
@@ -66,7 +48,3 @@ def address(endpoint: str) -> tuple[str, int]:
             " machine"
         )
     return host.strip("[]"), int(port)
-
-
-def _endpoint(port: int) -> str:
-    return f"tcp/127.0.0.1:{port}"

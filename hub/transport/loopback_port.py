@@ -22,12 +22,12 @@ class LoopbackPort:
     Of hubs that start in the same moment each holds a port of its own, by a socket that is bound to it.
     """
 
-    def __init__(self, endpoint: str | None = None, ports: Sequence[int] = PORTS) -> None:
+    def __init__(self, endpoint: str | None = None, ports: Sequence[int] = (*PORTS, 0)) -> None:
         """Hold a free port if `endpoint` is None or names port 0, which stands for any free one.
 
         Args:
             endpoint: such as tcp/127.0.0.1:7447.
-            ports: from which a free one is chosen if no endpoint is given.
+            ports: of which the first free one is taken if no endpoint is given; 0 for any free one.
 
         Raises ScenarioError if `endpoint` is not on loopback, ConnectError if no port is free.
         """
@@ -105,7 +105,7 @@ def listening_ports(endpoints: Iterable[str]) -> tuple[LoopbackPort, list[str]]:
     if len(inside) > 1:
         raise ScenarioError(f"{', '.join(inside)}: a hub listens once on loopback")
     taken = {address(endpoint)[1] for endpoint in outside}
-    free = [port for port in PORTS if port not in taken]
+    free = [*(port for port in PORTS if port not in taken), 0]
     return LoopbackPort(inside[0] if inside else None, free), outside
 
 

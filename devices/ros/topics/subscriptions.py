@@ -50,7 +50,7 @@ class SubscribedTopic:
         )
         self._model = message_type(row.type)
         self._signal = row.port if row.port is not None and row.port.variability == "signal" else None
-        self._opened_ns = time_ns()
+        self._opened_ns = monotonic_ns()
         self._repeated = RepeatedStateCommands()
         self._bucket = TokenBucket(_MOST_PER_S, _BURST)
 
@@ -87,8 +87,10 @@ class SubscribedTopic:
 
     def _latched(self, stamp_ns: int, client: str) -> str | None:
         """Return why a state command is an old one that a new connection has delivered; None if it is new."""
-        if stamp_ns < self._opened_ns:
-            ago = (time_ns() - stamp_ns) / 1e9
+        now_ns = time_ns()
+        # by the wall clock of now: it may have been set since then
+        if stamp_ns < now_ns - (monotonic_ns() - self._opened_ns):
+            ago = (now_ns - stamp_ns) / 1e9
             return (
                 f"published {ago:.1f} s ago by the clock of {client}, before this gateway was open: if it is"
                 " still meant, publish it again"

@@ -202,6 +202,9 @@ def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
             )
         )
         assert rows[0]["session"] == "away"
+        assert (rows[0]["endpoints"], rows[0]["pid"]) == ([endpoint], hub.pid)
+        shown = subprocess.check_output([*command, "ls"], text=True)  # which is not given the port
+        assert endpoint in shown
         assert (
             rows[0]["participants"][0].items()
             >= {

@@ -220,6 +220,24 @@ def test_a_host_that_is_cut_off_joins_again(prepare, tmp_path, caplog):
     assert (tmp_path / "player.log").read_text().count("takes part") == 2
 
 
+def test_a_host_outlives_a_network_that_is_gone_for_long(prepare, tmp_path):
+    """Packets are lost and no connection is closed, until both sides have given the other one up."""
+    running = Running(prepare(SCENARIO))
+    until(lambda: running.status)
+    log = tmp_path / "player.log"
+    with (
+        Proxy(port(running.session.endpoint)) as proxy,
+        player(f"tcp/127.0.0.1:{proxy.port}", log),
+    ):
+        until(lambda: running.is_followed(), limit_s=60)
+        proxy.hold()
+        until(lambda: "waits for the hub" in log.read_text(), limit_s=60)
+        proxy.go_on()
+        until(lambda: running.is_followed(), limit_s=60)
+        running.end()
+    assert log.read_text().count("takes part") == 2
+
+
 def test_a_host_outlives_a_hub_that_is_killed(toys, tmp_path):
     (tmp_path / "session.yaml").write_text(SCENARIO)
     endpoint = free_endpoint()

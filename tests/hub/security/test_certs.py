@@ -150,6 +150,35 @@ def test_the_command_line_makes_and_shows_them(tmp_path):
     assert "invalid" in run(app, ["show", *place]).output
 
 
+def test_a_revoked_certificate_is_followed_by_one_with_another_common_name(authority):
+    assert examine(authority.issued("touch")).common_name == "touch"
+    assert certs.revoke(authority.directory, "touch") == "touch"
+    again = examine(authority.issued("touch"))
+    assert (again.name, again.common_name) == ("touch", "touch.2")
+    assert certs.revoke(authority.directory, "touch") == "touch.2"
+    assert examine(authority.issued("touch")).common_name == "touch.3"
+    assert examine(authority.issued("head")).common_name == "head"
+
+
+def test_only_what_an_authority_can_issue_is_revoked(authority, tmp_path):
+    with pytest.raises(ScenarioError, match=r"hub's certificate cannot be revoked.*trocar certs init"):
+        certs.revoke(authority.directory, "hub")
+    with pytest.raises(ScenarioError, match="cannot have a certificate"):
+        certs.revoke(authority.directory, "touch.2")
+    with pytest.raises(ConnectError, match="has no authority that can be read"):
+        certs.revoke(tmp_path, "touch")
+
+
+def test_the_command_line_revokes(authority):
+    place = ["--dir", str(authority.directory)]
+    run = CliRunner().invoke
+    authority.issued("touch")
+    assert run(app, ["revoke", "touch", *place]).exit_code == 0
+    assert "revoked" in run(app, ["show", *place]).output
+    assert run(app, ["issue", "touch", *place]).exit_code == 0
+    assert "revoked" not in run(app, ["show", *place]).output
+
+
 def test_doctor_tells_until_when_they_are_valid(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor, "_checks", lambda: iter(()))
     monkeypatch.setattr(credentials, "default_directory", lambda: tmp_path / "certs")

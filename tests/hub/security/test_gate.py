@@ -22,6 +22,7 @@ from hub.planning.plan import (
     PlannedConnection,
     PlannedParticipant,
 )
+from hub.security import certs, revoked
 from hub.security.access import access_settings
 from hub.security.credentials import Credentials
 from hub.security.gate import Gate
@@ -104,7 +105,10 @@ class Hub:
         self.endpoint = f"tls/127.0.0.1:{self.port}"
         self.heard: list[str] = []
         self.router = open_session("router", listen=[inside])
-        self.gate = Gate([self.endpoint], self.authority.hub.listening() | access_settings(PLAN, "s"))
+        self.revoked = self.authority.directory / revoked.FILE
+        self.gate = Gate(
+            [self.endpoint], self.authority.hub.listening() | access_settings(PLAN, "s"), self.revoked
+        )
         self.router.declare_subscriber(
             "**", Callback(lambda sample: self.heard.append(str(sample.key_expr)), indirect=False)
         )
@@ -173,8 +177,8 @@ def told(caplog):
     return wait
 
 
-def wait_for(true):
-    until = monotonic() + 5
+def wait_for(true, limit_s=5):
+    until = monotonic() + limit_s
     while not true():
         assert monotonic() < until
         sleep(0.01)
@@ -406,6 +410,28 @@ def test_nobody_without_a_certificate_gets_in(hub, told):
     told("refused a connection: it shows no certificate")
 
 
+def test_connections_that_say_nothing_cost_those_who_are_in_nothing_and_others_a_while(tmp_path):
+    hub = Hub(tmp_path)
+    pose = KEYS.output("device", "touch", "pose")
+    try:
+        with hub.client(hub.authority.issued("touch")) as touch:
+            silent = [socket.create_connection(("127.0.0.1", hub.port)) for _ in range(50)]
+            for one in silent:
+                one.sendall(b"\x16\x03\x01")  # the beginning of a hello
+            hub.heard.clear()
+            wait_for(lambda: touch.put(pose, b"x") or pose in hub.heard)
+            assert _opens(hub)
+            for one in silent:
+                one.close()
+            hub.heard.clear()
+            wait_for(lambda: touch.put(pose, b"x") or pose in hub.heard)
+        # Zenoh waits 0.1 s for each of them
+        wait_for(lambda: _opens(hub), limit_s=60)
+        assert hub.gate._process.poll() is None
+    finally:
+        hub.close()
+
+
 def test_a_connection_ends_when_its_certificate_does(hub):
     short = hub.authority.issued("touch", days=2.0 / 86400)
     with hub.client(short) as touch:
@@ -436,7 +462,7 @@ def test_a_gate_whose_hub_is_killed_ends_without_a_traceback(tmp_path, listens):
     """A connection that it would report closes meanwhile."""
     port, inside = free_port(), free_endpoint()
     security = Authority.founded(tmp_path).hub.listening() | access_settings(PLAN, "s")
-    orders = {"listen": [f"tls/127.0.0.1:{port}"], "connect": [inside], "security": security}
+    orders = {"listen": [f"tls/127.0.0.1:{port}"], "connect": [inside], "security": security, "revoked": None}
     with (
         open_session("router", listen=[inside]),
         subprocess.Popen(
@@ -461,6 +487,43 @@ def test_a_gate_whose_hub_is_killed_ends_without_a_traceback(tmp_path, listens):
         gate.stdin.close()
         assert gate.stderr.read() == b""
         gate.wait(10)
+
+
+def test_a_revoked_certificate_loses_its_connection_and_its_rights(tmp_path, told):
+    hub = Hub(tmp_path)
+    pose, others = (KEYS.output("device", name, "pose") for name in ("touch", "head"))
+    try:
+        stolen = hub.authority.issued("touch")
+        with hub.client(stolen) as thief, hub.client(hub.authority.issued("head")) as head:
+            thief.put(pose, b"x")
+            wait_for(lambda: pose in hub.heard)
+            certs.revoke(hub.authority.directory, "touch")
+            told("the list of revoked certificates has changed")
+            told("'touch' connects from 127.0.0.1:", "with a revoked certificate: it has no rights")
+            hub.heard.clear()
+            thief.put(pose, b"x")
+            wait_for(lambda: head.put(others, b"x") or others in hub.heard)
+            assert pose not in hub.heard
+            assert asks(thief, Keys("*").join("remote/touch")) == []
+            with hub.client(hub.authority.issued("touch")) as touch:
+                told("'touch.2' connects from 127.0.0.1:")
+                touch.put(pose, b"x")
+                wait_for(lambda: pose in hub.heard)
+                assert asks(touch, Keys("*").join("remote/touch")) == [KEYS.join("remote/touch")]
+    finally:
+        hub.close()
+
+
+def test_a_gate_whose_list_cannot_be_read_stays_closed_until_it_can(tmp_path, told):
+    hub = Hub(tmp_path)
+    try:
+        hub.revoked.write_text("touch, lost on Monday\n")
+        told("revoked.txt:1: 'touch, lost on Monday' is no name of a certificate")
+        assert not _opens(hub)
+        hub.revoked.write_text("observer\n")
+        wait_for(lambda: _opens(hub))
+    finally:
+        hub.close()
 
 
 def test_a_gate_that_cannot_listen_says_so(tmp_path):

@@ -1,32 +1,8 @@
-import socket
-
 import pytest
 
 from hub.transport import endpoints as endpoint
 from hub.transport.endpoints import require_loopback
 from schemas.errors import ScenarioError
-
-
-@pytest.fixture
-def taken():
-    """A port on which a process listens."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        listener.listen()
-        yield listener.getsockname()[1]
-
-
-def test_listeners_are_found(taken, monkeypatch):
-    with socket.socket() as silent:
-        silent.bind(("127.0.0.1", 0))
-        monkeypatch.setattr(endpoint, "PORTS", [taken, silent.getsockname()[1]])
-        assert endpoint.listening_endpoints() == [f"tcp/127.0.0.1:{taken}"]
-
-
-def test_a_gate_is_not_taken_for_a_hub(monkeypatch):
-    with socket.create_server(("0.0.0.0", 0)) as gate:
-        monkeypatch.setattr(endpoint, "PORTS", [gate.getsockname()[1]])
-        assert endpoint.listening_endpoints() == []
 
 
 @pytest.mark.parametrize(

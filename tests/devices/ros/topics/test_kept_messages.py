@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from devices.ros.params import GatewayParams
+from devices.ros.topics import subscriptions
 from schemas.codec import encode
 from schemas.crtk import OperatingState, StringStamped
 from schemas.ros import EmptyMessage, Header, JointState, StringMessage, Time
@@ -64,3 +65,14 @@ def test_what_a_real_arm_has_kept_is_its_state(gateway):
         OperatingState(header=stamped(SECOND), state="ENABLED"),
         time.time_ns(),
     )
+
+
+def test_a_wall_clock_that_is_set_back_does_not_make_a_new_command_an_old_one(gateway, monkeypatch):
+    def corrected_ns():
+        return time.time_ns() - 3600 * SECOND
+
+    monkeypatch.setattr(subscriptions, "time_ns", corrected_ns)
+    old = StringStamped(header=stamped(corrected_ns() - 60 * SECOND), string="home")
+    assert not accepts(gateway, "/PSM1/state_command", old, 0)
+    new = StringStamped(header=stamped(corrected_ns()), string="disable")
+    assert accepts(gateway, "/PSM1/state_command", new, 0)

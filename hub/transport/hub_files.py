@@ -1,0 +1,63 @@
+"""Where the hubs of this user listen on this machine: a file for each, while it runs.
+
+By them `trocar ls` finds hubs at any port. The file of a hub that was killed stays until the next look, which
+finds that no process listens there.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+
+from hub.transport.endpoints import address
+from hub.transport.session_secret import private_directory
+
+__all__ = ["HubFile", "hub_file", "running_hubs"]
+
+_PROBE_S = 1.0
+
+
+@dataclass(frozen=True)
+class HubFile:
+    """What the file of a hub says."""
+
+    endpoint: str
+    """Where the hub listens on loopback."""
+    outside: tuple[str, ...]
+    """Where its gate listens to other machines."""
+    pid: int
+
+
+@contextmanager
+def hub_file(endpoint: str, outside: Sequence[str]) -> Generator[None]:
+    """Keep the file of a hub of this process, which listens at `endpoint` and at `outside`."""
+    file = private_directory() / f"{address(endpoint)[1]}.json"
+    file.write_text(json.dumps(asdict(HubFile(endpoint, tuple(outside), os.getpid()))), encoding="utf-8")
+    try:
+        yield
+    finally:
+        file.unlink(missing_ok=True)
+
+
+def running_hubs() -> list[HubFile]:
+    """Return what the files of hubs say at whose endpoint a process listens; delete the other files."""
+    found: list[HubFile] = []
+    for file in sorted(private_directory().glob("*.json")):
+        try:
+            said = json.loads(file.read_text(encoding="utf-8"))
+            hub = HubFile(said["endpoint"], tuple(said["outside"]), said["pid"])
+        except (OSError, ValueError, KeyError, TypeError):  # being written, or just deleted, or not ours
+            continue
+        try:
+            socket.create_connection(address(hub.endpoint), _PROBE_S).close()
+        except ConnectionRefusedError:
+            file.unlink(missing_ok=True)
+        except TimeoutError:  # it listens, and is busy or stopped
+            found.append(hub)
+        else:
+            found.append(hub)
+    return found
