@@ -1,6 +1,6 @@
 """The secret of a session: without it no process of this machine can connect to the hub or to its hosts.
 
-Loopback is open to every user of a machine. Zenoh demands a user name and a password of each that connects; the
+Loopback is open to every user of a machine. Zenoh demands user name and password from each that connects; the
 password is random and lasts as long as the hub. It lies in a file that this user alone can read, from where
 hosts and commands take it (docs/decisions/0038-secret-of-a-session.md).
 """
