@@ -20,6 +20,9 @@ INFO_TOPIC, INFO_TYPE = "ros_discovery_info", "rmw_dds_common/msg/ParticipantEnt
 
 _CDR_LE = b"\x00\x01\x00\x00"
 
+_MOST_NAMES = 1000
+"""Senders whose names are kept, those that are gone included."""
+
 
 def entities_info(participant: bytes, node: str, readers: Sequence[bytes], writers: Sequence[bytes]) -> bytes:
     """Return the message (CDR) that assigns all readers and writers of a participant to one node.
@@ -68,12 +71,14 @@ class Graph:
                 self._endpoints[endpoint] = participant, topic
 
     def remove_endpoint(self, endpoint: bytes) -> None:
-        """Remove a reader or a writer, and its participant with the last one."""
+        """Remove a reader or a writer, and the nodes of its participant with the last one.
+
+        Its name is kept: on a busy machine a program counts as gone for a while, and goes on.
+        """
         with self._changing:
             participant, _ = self._endpoints.pop(endpoint, (b"", ""))
-            if all(other != participant for other, _ in self._endpoints.values()):
+            if participant not in self._present():
                 self._nodes.pop(participant, None)
-                self._names.pop(participant, None)
 
     def set_nodes(self, info: bytes) -> None:
         """Set the nodes of a participant from its ParticipantEntitiesInfo (CDR).
@@ -98,15 +103,22 @@ class Graph:
         So a program that commands an arm does not become another one when the name of its node is discovered.
         """
         with self._changing:
-            return self._names.setdefault(participant, self._name(participant))
+            if participant not in self._names:
+                self._names[participant] = self._name(participant)
+                if len(self._names) > _MOST_NAMES:
+                    del self._names[next(iter(self._names))]
+            return self._names[participant]
 
     def _name(self, participant: bytes) -> str:
         """Return the name of its first node, with its id where another participant has the same name."""
         identity, node = participant[:12].hex(), self._nodes.get(participant)
         if node is None:
             return f"participant {identity}"
-        is_taken = any(name == node for other, name in self._names.items() if other != participant)
-        return f"{node} ({identity})" if is_taken else node
+        others = self._present() - {participant}
+        return f"{node} ({identity})" if any(self._names.get(other) == node for other in others) else node
+
+    def _present(self) -> set[bytes]:
+        return {participant for participant, _ in self._endpoints.values()}
 
     def clients(self, topics: Collection[str]) -> tuple[Client, ...]:
         """Return the programs that read or write any of `topics`, which are names of DDS topics."""

@@ -253,6 +253,32 @@ class TestGraph:
         graph.remove_endpoint(struct.pack("<QQ", 0, 1))
         assert graph.clients({"rt/PSM1/servo_jp"}) == ()
 
+    def test_who_counts_as_gone_for_a_while_and_goes_on_keeps_its_name(self):
+        # it leads an arm: under another name its own commands would be refused in favour of itself
+        graph = self.graph(self.OTHER)
+        before = graph.sender(self.OTHER)
+        graph.remove_endpoint(struct.pack("<QQ", 0, 1))
+        graph.add_endpoint(struct.pack("<QQ", 0, 1), self.OTHER, "rt/PSM1/servo_jp")
+        graph.set_nodes(entities_info(self.OTHER, "/console", [], []))
+        assert graph.sender(self.OTHER) == before
+
+    def test_a_program_that_is_started_again_has_its_name_again(self):
+        graph = self.graph(self.OTHER)
+        graph.set_nodes(entities_info(self.OTHER, "/console", [], []))
+        assert graph.sender(self.OTHER) == "/console"
+        graph.remove_endpoint(struct.pack("<QQ", 0, 1))
+        graph.add_endpoint(struct.pack("<QQ", 1, 1), self.THIRD, "rt/PSM1/servo_jp")
+        graph.set_nodes(entities_info(self.THIRD, "/console", [], []))
+        assert graph.sender(self.THIRD) == "/console"
+
+    def test_names_of_programs_that_are_gone_are_not_kept_without_limit(self):
+        graph = self.graph(self.OTHER)
+        graph.sender(self.OTHER)
+        graph.set_nodes(entities_info(self.OTHER, "/console", [], []))
+        for number in range(1000):
+            graph.sender(struct.pack("<QQ", number, 1))
+        assert graph.sender(self.OTHER) == "/console", "its first name is forgotten"
+
     def test_bytes_that_are_no_such_message_are_refused(self):
         with pytest.raises(MessageError, match="ParticipantEntitiesInfo"):
             self.graph().set_nodes(b"\x00\x01\x00\x00\xff")
