@@ -31,10 +31,11 @@ from devices.ros.zenoh.layout import VOLATILE, Attachment, GraphToken
 from hub.planning import registry
 from schemas.codec import decode, message_type
 from schemas.errors import MessageError, TrocarError
-from tests.devices.ros.bags import test_player as bags
+from tests.devices.ros.bags import test_player
 from tests.fuzz.byte_mutations import NUMBERS, mutated, mutated_text
 from tests.fuzz.harness import Note, Target, search
 from tests.fuzz.wire import cdr
+from tests.hub.recording import ros_bags as bags
 
 PREFIX = b"\x01\x0f" + b"peer567890"
 SERVICE, TYPE = "/PSM1/query_fk", "crtk_msgs/srv/QueryForwardKinematics"
@@ -226,9 +227,9 @@ def _bag(source: random.Random, directory: Path) -> str:
 @cache
 def _bags(directory: Path) -> list[Path]:
     if not (directory / "one.bag").exists():
-        bags.write1(directory / "one.bag", bags.SAID)
-        bags.write(directory / "mcap", bags.SAID)
-        bags.write(directory / "db3", bags.SAID, bags.StoragePlugin.SQLITE3)
+        bags.write1(directory / "one.bag", test_player.SAID)
+        bags.write(directory / "mcap", test_player.SAID)
+        bags.write(directory / "db3", test_player.SAID, bags.StoragePlugin.SQLITE3)
     return [directory / "one.bag", *(directory / "mcap").glob("*.mcap"), *(directory / "db3").glob("*.db3")]
 
 

@@ -4,9 +4,11 @@ import json
 import re
 import secrets
 import shutil
+import socket
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from time import monotonic, sleep
 
 import pytest
@@ -14,6 +16,7 @@ import pytest
 from hub.planning.scenario_file import load as load_scenario
 from hub.remote.live_sessions import live_sessions
 from hub.session.launch import launch
+from hub.transport.endpoints import address
 from tests.hub.authorities import Authority, free_port
 
 pytestmark = pytest.mark.xdist_group("network")  # its hosts have fixed addresses
@@ -81,6 +84,15 @@ class Site:
             certificates=self.authority.directory,
         )
 
+    def await_gate(self):
+        """Wait until the hub listens to the other machine: a device host that comes earlier gives up."""
+        _, port = address(self.endpoint)
+        until = monotonic() + 60
+        while monotonic() < until:
+            with suppress(OSError), socket.create_connection((HUB_ADDRESS, port)):
+                return
+            sleep(0.1)
+
     def cut(self):
         """Take the network between both machines away."""
         ip("-n", self._namespace, "link", "set", f"{self._namespace[7:]}-in", "down")
@@ -118,7 +130,7 @@ def site(toys, other_machine, tmp_path):
 
 
 def test_a_stylus_of_another_machine_moves_the_simulation_is_told_of_it_and_outlives_the_network(site):
-    fresh_steps, outcome, hosts = [0.0], [], [site.device("player"), site.device("pad")]
+    fresh_steps, outcome, hosts = [0.0], [], []
 
     def gains():
         before = fresh_steps[-1]
@@ -137,6 +149,8 @@ def test_a_stylus_of_another_machine_moves_the_simulation_is_told_of_it_and_outl
 
     def cut_and_mend():
         try:
+            site.await_gate()
+            hosts.extend([site.device("player"), site.device("pad")])
             wait_for(lambda: gains() and told() > 20)
             site.cut()
             wait_for(lambda: not gains())
@@ -173,7 +187,7 @@ from hub.security.credentials import load
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
 endpoint, file, bare, keys, asked = json.loads(sys.argv[1])
-security = load("", Path(file)).connecting() | {"connect/timeout_ms": 1500}
+security = load("", Path(file)).connecting() | {"connect/timeout_ms": 4000}
 if bare:
     security = {key: value for key, value in security.items() if "/connect_" not in key}
     security["transport/link/tls/enable_mtls"] = False
@@ -211,6 +225,7 @@ def test_strangers_of_another_machine_get_nothing_in_or_out_and_the_log_tells(si
 
     def try_all():
         try:
+            site.await_gate()
             hosts = [site.device("player"), site.device("pad")]
             until = monotonic() + 120
             while monotonic() < until and not [
