@@ -59,11 +59,9 @@ class RunningSession:
         endpoint = free_endpoint()
         self.hub = self._start("run", *self._scenario(), *self._gate(), "--listen", endpoint)
         if fault.concerns(REMOTE, LINK):
-            self._proxy = stack.enter_context(Proxy(address(endpoint)[1]))
             self._until(lambda: self._find(ENGINE))  # the hub listens
-            secret = self.temporary / private_directory().name / str(self._proxy.port)
-            secret.symlink_to(str(address(endpoint)[1]))  # which is the secret at the hub's port
-            stack.callback(secret.unlink)
+            secrets = self.temporary / private_directory().name
+            self._proxy = stack.enter_context(Proxy(address(endpoint)[1], secrets))
             self.remote = self._start("device", "hand", "--connect", f"tcp/127.0.0.1:{self._proxy.port}")
 
     def _scenario(self) -> list[str]:

@@ -11,7 +11,8 @@ from hub.transport.session_secret import private_directory
 class Proxy:
     """Forwards TCP connections to a port of this machine."""
 
-    def __init__(self, port):
+    def __init__(self, port, secrets=None):
+        """`secrets`: the directory with the secret of the hub at `port`, if not that of this process."""
         self._target = port
         self._flowing = threading.Event()
         self._flowing.set()
@@ -19,8 +20,9 @@ class Proxy:
         self._pairs = []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
-        self._secret = private_directory() / str(self.port)
-        shutil.copy(private_directory() / str(port), self._secret)
+        secrets = private_directory() if secrets is None else secrets
+        self._secret = secrets / str(self.port)
+        shutil.copy(secrets / str(port), self._secret)
         self._start(self._accept)
 
     def __enter__(self):
