@@ -40,7 +40,7 @@ def received_by_gateway(kind: str, count: int) -> list[str]:
             return [sample.message.header.frame_id for sample in gateway.read(0) if sample.port == TOPIC[1:]]
 
         received: list[str] = []
-        program = [python(), PROGRAM, TOPIC, kind, str(count)]
+        program = [python(), PROGRAM, TOPIC, kind, str(count), "6"]
         with subprocess.Popen(program, env=environment(domain)) as running:
             try:
                 while running.poll() is None:

@@ -11,6 +11,7 @@ from hub.planning import registry
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.recording import Recording
 from hub.recording.trust import require_trust
+from hub.session.clock import most_steps
 from hub.session.session import Session
 from schemas.errors import RecordingError
 from schemas.lockstep import Ack
@@ -58,9 +59,9 @@ def verify(
     Raises RecordingError if the recording is not of a session, and what `require_trust` and `Session.run`
     raise.
     """
-    scenario = recording.scenario().model_copy(update={"pace": "fast"})
+    scenario = recording.scenario().model_copy(update={"pace": "fast", "measure": {}})
     plan, directory = _plan(recording), directory or recording.directory()
-    stepped = {name: planned for name, planned in plan.participants.items() if planned.role != "device"}
+    stepped = {name: planned for name, planned in plan.participants.items() if planned.in_step}
     require_trust(recording, stepped, directory, trust=trust)
     made = {
         name: registry.make(planned.kind, name, scenario.participants[name].params, directory)
@@ -74,7 +75,7 @@ def verify(
         made,
         directory,
         endpoint=endpoint,
-        grants=_grants(recording, plan),
+        grants=_grants(recording, plan, most_steps(plan, scenario.window)),
         on_ack=comparison.take,
     )
     comparison.stop = session.state.shutdown
@@ -126,15 +127,20 @@ class _Comparison:
         self.stop()
 
 
-def _grants(recording: Recording, plan: Plan) -> Iterator[GrantMessage]:
-    """Yield the recorded grants; raises RecordingError at one that does not follow the one before."""
+def _grants(recording: Recording, plan: Plan, most: int) -> Iterator[GrantMessage]:
+    """Yield the recorded grants, of at most `most` steps.
+
+    Raises RecordingError at one that does not follow the one before, or covers more: nothing ends it.
+    """
     step = 0
     for grant in recording.grants():
         end, rest = divmod(grant.horizon_ns, plan.step_ns)
-        if (grant.step, grant.start_ns) != (step, step * plan.step_ns) or end <= step or rest:
+        follows = (grant.step, grant.start_ns) == (step, step * plan.step_ns) and not rest
+        if not follows or not step < end <= step + most:
             raise RecordingError(
                 f"'{recording.file}' cannot be simulated again: the grant of step {step} should follow, and"
-                f" there is one of step {grant.step}, from {grant.start_ns} to {grant.horizon_ns} ns"
+                f" there is one of step {grant.step}, from {grant.start_ns} to {grant.horizon_ns} ns; a grant"
+                f" of this session covers at most {most} steps"
             )
         yield grant
         step = end
@@ -144,6 +150,7 @@ def _plan(recording: Recording) -> Plan:
     """Return the recorded plan, with remote participants in processes here and without outputs to devices.
 
     Devices are in the hub's process, which makes none in a re-simulation; a host process would open them.
+    Observers have no hashes and are left out.
     """
     plan = recording.plan()
     participants = {
@@ -151,6 +158,7 @@ def _plan(recording: Recording) -> Plan:
             update={"host": "hub" if planned.role == "device" else planned.host.replace("/", "_")}
         )
         for name, planned in plan.participants.items()
+        if not planned.observer
     }
     connections = tuple(k for k in plan.connections if plan.participants[k.target].role != "device")
     return plan.model_copy(

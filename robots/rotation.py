@@ -11,10 +11,17 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["conjugate", "exp", "from_matrix", "log", "matrix", "product"]
+__all__ = ["conjugate", "exp", "from_matrices", "from_matrix", "log", "matrix", "product"]
 
 _SMALL_ANGLE = 1e-6
 """Below this (rad) the next term of the sine's series is under the rounding error of a double."""
+
+# Of the rows 4 q_i q of `from_matrix`: signs of the diagonal in the four squares 4 q_i^2, entries and signs
+# in the six products 4 q_i q_j, and which of these ten make row i.
+_SQUARES = np.array([[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0], [1.0, 1.0, 1.0]])
+_FIRST, _SECOND = np.array([1, 2, 7, 5, 2, 3]), np.array([3, 6, 5, 7, 6, 1])
+_SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
+_ROWS = np.array([[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]])
 
 
 def product(a: Vector, b: Vector) -> Vector:
@@ -82,3 +89,18 @@ def from_matrix(r: Vector) -> Vector:
     x, y, z, w = rows[largest]
     length = sqrt(x * x + y * y + z * z + w * w)
     return np.array([x / length, y / length, z / length, w / length])
+
+
+def from_matrices(r: Vector) -> Vector:
+    """Return the unit quaternions, shape (m, 4), of many matrices at once, shape (m, 3, 3) or (m, 4, 4).
+
+    They are those of `from_matrix` to the bit: the same operations in the same order.
+    """
+    entries = r[:, :3, :3].reshape(-1, 9)
+    x, y, z = np.moveaxis(_SQUARES * entries[:, None, ::4], -1, 0)
+    squares = 1.0 + x + y + z  # (m, 4)
+    products = entries.take(_FIRST, -1) + _SIGNS * entries.take(_SECOND, -1)  # (m, 6)
+    parts = np.concatenate([squares, products], axis=-1)
+    rows = np.take_along_axis(parts, _ROWS.take(squares.argmax(axis=-1), 0), -1)
+    x, y, z, w = (rows * rows).T
+    return rows / np.sqrt(x + y + z + w)[:, None]

@@ -20,8 +20,10 @@ from robots.limits import ANGLE_TOLERANCE, TOLERANCE, distinct
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Joint", "SerialChain", "jerk_limit"]
+__all__ = ["Joint", "SerialChain", "SerialChains", "jerk_limit"]
 
+_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Whose products are those of a cross product."""
 _RISE = 0.1
 """Time (s) in which a trajectory's acceleration grows from 0 to its limit.
 
@@ -103,6 +105,8 @@ class SerialChain:
         self.tip = tip
         self.lower = np.array([joint.lower for joint in joints])  # (n,)
         self.upper = np.array([joint.upper for joint in joints])  # (n,)
+        self._ranges = [(joint.lower, joint.upper) for joint in joints]
+        self.names = [joint.name for joint in joints]
         self.velocity = np.array([joint.velocity for joint in joints])  # (n,)
         self.acceleration = np.array([joint.acceleration for joint in joints])  # (n,)
         self.jerk = np.array([joint.jerk for joint in joints])  # (n,)
@@ -110,7 +114,8 @@ class SerialChain:
         self.tolerance = np.array(
             [ANGLE_TOLERANCE if joint.kind == "revolute" else TOLERANCE for joint in joints]
         )  # (n,), by which a position may be outside its range and is clamped
-        self._prismatic = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
+        self.prismatic = [i for i, joint in enumerate(joints) if joint.kind == "prismatic"]
+        """Their indices."""
         # A link's transform is affine in (cos q, sin q) or in q: all of them come from one multiplication.
         zero = np.array([joint.transform(0.0) for joint in joints])
         quarter = np.array(
@@ -124,7 +129,8 @@ class SerialChain:
         basis = np.stack([constant, cosine, other], axis=1)  # (n, 3, 4, 4)
         if base is not None:
             basis[0] = base @ basis[0]
-        self._basis = basis.reshape(len(self.joints), 3, 16)
+        self.basis = basis.reshape(len(self.joints), 3, 16)
+        """Of the links' transforms, whose factors are 1, cos q or 0, and sin q or q."""
         self._factors = np.ones((len(self.joints), 1, 3))
 
     @classmethod
@@ -158,8 +164,9 @@ class SerialChain:
         factors = self._factors
         np.cos(q, out=factors[:, 0, 1])
         np.sin(q, out=factors[:, 0, 2])
-        factors[self._prismatic, 0, 2] = q[self._prismatic]
-        links = (self._factors @ self._basis).reshape(n, 4, 4)
+        for joint in self.prismatic:
+            factors[joint, 0, 2] = q[joint]
+        links = (self._factors @ self.basis).reshape(n, 4, 4)
         poses = np.empty((n + 1, 4, 4))
         pose = poses[0] = links[0]
         for i in range(1, n):
@@ -170,8 +177,8 @@ class SerialChain:
     def _frames_of_many(self, q: Vector) -> Vector:
         n = len(self.joints)
         factors = np.stack([np.ones_like(q), np.cos(q), np.sin(q)], axis=-1)[..., None, :]  # (..., n, 1, 3)
-        factors[..., self._prismatic, 0, 2] = q[..., self._prismatic]
-        links = (factors @ self._basis).reshape(*q.shape, 4, 4)
+        factors[..., self.prismatic, 0, 2] = q[..., self.prismatic]
+        links = (factors @ self.basis).reshape(*q.shape, 4, 4)
         poses = np.empty((*q.shape[:-1], n + 1, 4, 4))
         poses[..., 0, :, :] = links[..., 0, :, :]
         for i in range(1, n):
@@ -207,9 +214,20 @@ class SerialChain:
             raise MotionError("; ".join(wrong))
 
     def within(self, q: Vector) -> Vector:
-        """Return `q`, shape (n,), clamped to the joint ranges. Raises MotionError as `check` does."""
+        """Return `q`, shape (n,), clamped to the joint ranges: itself where all are inside.
+
+        Raises MotionError as `check` does.
+        """
+        if q.shape == self.lower.shape and self._is_inside(q):
+            return q
         self.check(q)
         return np.clip(q, self.lower, self.upper)
+
+    def _is_inside(self, q: Vector) -> bool:
+        """Say whether each position is a number inside its range, not at an end of it."""
+        return all(
+            lower < value < upper for value, (lower, upper) in zip(q.tolist(), self._ranges, strict=True)
+        )
 
     def forward(self, q: Vector) -> Vector:
         """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n).
@@ -234,18 +252,47 @@ class SerialChain:
         """
         axes = frames[..., :-1, :3, 2]  # (..., n, 3)
         arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]  # (..., n, 3)
-        zx, zy, zz = axes[..., 0], axes[..., 1], axes[..., 2]
-        rx, ry, rz = arms[..., 0], arms[..., 1], arms[..., 2]
+        across = axes.take(_YZX, -1) * arms.take(_ZXY, -1) - axes.take(_ZXY, -1) * arms.take(_YZX, -1)
         jacobian = np.empty((*frames.shape[:-3], 6, len(self.joints)))
-        jacobian[..., 0, :] = zy * rz - zz * ry
-        jacobian[..., 1, :] = zz * rx - zx * rz
-        jacobian[..., 2, :] = zx * ry - zy * rx
-        turned = axes.swapaxes(-1, -2)  # (..., 3, n)
-        jacobian[..., 3:, :] = turned
-        jacobian[..., :3, self._prismatic] = turned[..., self._prismatic]
-        jacobian[..., 3:, self._prismatic] = 0.0
+        jacobian[..., :3, :] = across.swapaxes(-1, -2)
+        jacobian[..., 3:, :] = axes.swapaxes(-1, -2)
+        for joint in self.prismatic:
+            jacobian[..., :3, joint] = axes[..., joint, :]
+            jacobian[..., 3:, joint] = 0.0
         if frame == "tip":
             to_tip = frames[..., -1, :3, :3].swapaxes(-1, -2)
             jacobian[..., :3, :] = to_tip @ jacobian[..., :3, :]
             jacobian[..., 3:, :] = to_tip @ jacobian[..., 3:, :]
         return jacobian
+
+
+class SerialChains:
+    """Several chains of n joints of the same kinds, for which numpy is called as often as for one.
+
+    Their frames are those of each `SerialChain.frames` to the bit; Jacobians come from any of the chains.
+    """
+
+    def __init__(self, chains: Sequence[SerialChain]) -> None:
+        """Take k chains."""
+        self._n, self.prismatic = len(chains[0].joints), chains[0].prismatic
+        self.basis = np.stack([chain.basis for chain in chains])[:, None]  # (k, 1, n, 3, 16)
+        self._tips = np.stack([chain.tip for chain in chains])[:, None]  # (k, 1, 4, 4)
+
+    def frames(self, q: Vector) -> Vector:
+        """Return the poses of all links and tips in the base frames, shape (k, m, n + 1, 4, 4).
+
+        Positions `q` have shape (k, m, n): m configurations of each chain.
+        """
+        n = self._n
+        factors = np.ones((*q.shape, 1, 3))
+        np.cos(q, out=factors[..., 0, 1])
+        np.sin(q, out=factors[..., 0, 2])
+        for joint in self.prismatic:
+            factors[..., joint, 0, 2] = q[..., joint]
+        links = (factors @ self.basis).reshape(*q.shape, 4, 4)
+        poses = np.empty((*q.shape[:-1], n + 1, 4, 4))
+        poses[..., 0, :, :] = links[..., 0, :, :]
+        for i in range(1, n):
+            np.matmul(poses[..., i - 1, :, :], links[..., i, :, :], out=poses[..., i, :, :])
+        np.matmul(poses[..., n - 1, :, :], self._tips, out=poses[..., n, :, :])
+        return poses

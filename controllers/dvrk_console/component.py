@@ -117,7 +117,8 @@ class Component:
             clutched: whether the clutch is pressed.
         """
         state = self.state
-        self._receive(inputs)
+        if not inputs.quiet:
+            self._receive(inputs)
         if requested is not state.requested:
             state.requested = requested
             self._desire(requested)
@@ -226,13 +227,13 @@ class Component:
 
     def _command_master(self, inputs: Inputs, now_ns: int, *, floats: bool, clutched: bool) -> None:
         state = self.state
-        master, tip = inputs[f"{self.master}/measured_cp"], inputs[f"{self.arm}/setpoint_cp"]
         if floats:
             locked = state.rotation_locked or (clutched and state.align)
-            self._commands.float(master[3:] if locked else None)
+            self._commands.float(inputs[f"{self.master}/measured_cp"][3:] if locked else None)
         aligns = state.current is State.ALIGNING_MTM and state.align and not clutched
         if aligns and now_ns - state.aligned_ns >= _ALIGN_NS:
             state.aligned_ns = now_ns
+            master, tip = inputs[f"{self.master}/measured_cp"], inputs[f"{self.arm}/setpoint_cp"]
             self._commands.turn(master, tip[3:])
             header = Header(stamp=Time.from_ns(now_ns))
             offset_to_tip = offset(master[3:], tip[3:])

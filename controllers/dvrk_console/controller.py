@@ -94,9 +94,10 @@ class DvrkConsole(Controller):
             self._state.published = True
             self._publish_all()
         self._readiness.receive(inputs)
-        self._execute_system_commands(inputs)
-        self._execute_commands(inputs)
-        self._read_pedals(inputs)
+        if not inputs.quiet:
+            self._execute_system_commands(inputs)
+            self._execute_commands(inputs)
+            self._read_pedals(inputs)
         self._lead_camera()
         for component in self._components.values():
             component.step(

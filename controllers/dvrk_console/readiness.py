@@ -27,6 +27,9 @@ class Readiness:
 
     def receive(self, inputs: Inputs) -> None:
         """Read what they have published."""
+        if inputs.quiet:
+            self.lost = self.new = frozenset()
+            return
         lost: set[str] = set()
         silent = {name for name, row in self._rows.items() if not self.state[row, 0]}
         for name, row in self._rows.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, cast
 
 import numpy as np
@@ -17,10 +17,12 @@ from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
-from controllers.motion.telemetry import KnownWeight, Telemetry
+from controllers.motion.setpoint import Setpoint
+from controllers.motion.telemetry import KnownWeight, TelemetryRow
 from hub.participant import Inputs, Record, flag
 from robots.dvrk import crtk
 from robots.dvrk.setup_joints import CartArm
+from robots.serial_chain import SerialChain
 from schemas.crtk import StringStamped
 from schemas.errors import MotionError
 from schemas.message import Message
@@ -44,7 +46,12 @@ class Arm:
     """One arm. All that changes is in `state`."""
 
     def __init__(
-        self, name: CartArm, params: MotionParams, camera: Callable[[], Vector | None], period: float
+        self,
+        name: CartArm,
+        params: MotionParams,
+        camera: Callable[[], Vector | None],
+        period: float,
+        outputs: dict[str, Any],
     ) -> None:
         """Build the arm as the scenario states it.
 
@@ -53,16 +60,17 @@ class Arm:
             params: parameters of the controller.
             camera: returns the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
             period: the controller's step, s.
+            outputs: those of the controller; the arm puts its own among them, whose arrays stay the same.
         """
         arm = params.arms.driven[name]
-        self._name, self._period = name, period
+        self._period = period
         held = arm.equipment
-        self._messages = Messages(name, event_names(arm))
+        self._messages = Messages(name, event_names(arm), outputs)
         self._equipment = Equipment(*held, self._messages)
         self._base = BaseFrame(name, params, camera)
         self._drives = Drives(arm, self._messages, lambda: self._base.pose)
-        self._telemetry = Telemetry(name, arm.chain)
-        self._weight = KnownWeight(name, arm.chain, base_in_world(name, params))
+        self.weight = KnownWeight(name, arm.chain, base_in_world(name, params))
+        """That the real controller carries."""
         self._commands = Commands(self._drives, period)
         self._cartesian = CartesianCommands(
             name, self._drives, self._base, self._commands.settings.ratio, period
@@ -75,22 +83,22 @@ class Arm:
             homed=params.initial_state == "homed",
         )
         handlers = {**self._equipment.handlers, **self._commands.handlers, **self._cartesian.handlers}
-        self._state_port = f"{name}/state_command"
-        commands = (*crtk.COMMANDS, *self._equipment.handlers)
-        self._ports = [
-            (command, f"{name}/{command}", handlers[command])
-            for command in commands
-            if command != "state_command"
+        commands = [
+            (command, handlers.get(command)) for command in (*crtk.COMMANDS, *self._equipment.handlers)
         ]
-        self._prefixes = [name]
+        prefixes = [name]
         if (gripper := arm.gripper) is not None:
-            self._prefixes.append(f"{name}/{gripper.name}")
-            grasping = [
-                (f"{gripper.name}/{command}", handlers[f"gripper/{command}"])
-                for command in crtk.GRIPPER_COMMANDS
+            prefixes.append(f"{name}/{gripper.name}")
+            commands += [
+                (f"{gripper.name}/{word}", handlers[f"gripper/{word}"]) for word in crtk.GRIPPER_COMMANDS
             ]
-            self._ports += [(command, f"{name}/{command}", handler) for command, handler in grasping]
+        self._commanded = {
+            f"{name}/{command}": (order, command, handler)
+            for order, (command, handler) in enumerate(commands)
+        }
         self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
+        self._rests = False
+        """Whether a step without commands changes nothing but the setpoint, while the joints keep to that."""
         self.state = (
             self._now,
             self._commands.settings,
@@ -101,73 +109,73 @@ class Arm:
         )
         self._sensed = [
             (f"sense/{prefix}/measured_js", axes)
-            for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True)
+            for prefix, axes in zip(prefixes, self._drives.groups, strict=True)
         ]
         self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
-        self.events = self._messages.outputs
-        """Event outputs of the last step."""
-
-    @property
-    def outputs(self) -> dict[str, Any]:
-        """All outputs; the arrays stay the same ones."""
-        outputs: dict[str, Any] = {
-            **self.events,
-            **self._telemetry.outputs,
-            f"drive/{self._name}/control_mode": self._modes,
-        }
-        for prefix, axes in zip(self._prefixes, self._drives.groups, strict=True):
+        outputs[f"drive/{name}/control_mode"] = self._modes
+        for prefix, axes in zip(prefixes, self._drives.groups, strict=True):
             outputs |= {
                 f"drive/{prefix}/servo_jp": axes.setpoint.position,
                 f"drive/{prefix}/servo_jf": axes.effort,
             }
         if self._drives.gripper is not None:
-            prefix = self._prefixes[1]
             outputs |= {
-                f"{prefix}/measured_js": self._drives.gripper.measured,
-                f"{prefix}/setpoint_js": self._gripper_setpoint,
+                f"{prefixes[1]}/measured_js": self._drives.gripper.measured,
+                f"{prefixes[1]}/setpoint_js": self._gripper_setpoint,
             }
-        return outputs
 
     @property
-    def tip(self) -> Vector:
-        """Pose of the tip as measured, in the arm's base frame, shape (4, 4)."""
-        return self._drives.joints.chain.forward(self._drives.joints.position)
+    def chain(self) -> SerialChain:
+        """Its kinematics."""
+        return self._drives.joints.chain
+
+    @property
+    def position(self) -> Vector:
+        """Of the joints as measured, shape (n,)."""
+        return self._drives.joints.position
 
     def sense(self, inputs: Inputs) -> None:
         """Read what is measured; the setpoint starts from there."""
         for port, axes in self._sensed:
             axes.measured[:] = inputs[port]
-            if not self._now.started:
+        if not self._now.started:
+            for axes in self._drives.groups:
                 axes.setpoint.reset(axes.position)
 
-    def step(self, t: int, h: int, inputs: Inputs) -> None:
-        """Execute the commands that have arrived, and advance from `t` to `t + h` (ns)."""
+    def step(self, t: int, h: int, inputs: Inputs) -> list[Setpoint]:
+        """Execute the commands that have arrived, and advance from `t` to `t + h` (ns).
+
+        Except the setpoints that follow a stream: they are returned, and follow together with those of other
+        arms.
+        """
         self._messages.begin(t + h)
+        arrived = () if inputs.quiet else inputs.event_ports & self._commanded.keys()
+        if self._rests and not arrived and not self._lifecycle.is_lost:
+            return self._drives.step(self._period)
         before = self._condition() if self._now.started else None
         if before is None:
             self._now.started = True
             self._messages.desired_state(self._lifecycle.desired_state)
             self._equipment.publish()
         self._lifecycle.watch(self._period)
-        awaited = self._execute(inputs)
+        awaited = self._execute(inputs, arrived)
         self._lifecycle.step(self._period)
-        self._drives.step(self._period)
-        if awaited or self._condition() != before:
-            state, homed, busy = self._condition()
+        following = self._drives.step(self._period)
+        state, homed, busy = condition = self._condition()
+        if awaited or condition != before:
             self._messages.operating_state(state, homed=homed, busy=busy)
         self._update_modes()
+        self._rests = not busy
+        return following
 
-    def publish(self) -> None:
-        """Update the states that are not published at every step."""
-        drives, commands = self._drives, self._commands
+    def publish(self, row: TelemetryRow) -> None:
+        """Write to `row` what the states are computed from that are not published at every step."""
+        drives, settings = self._drives, self._commands.settings
         joints = drives.joints
-        self._telemetry.update(
-            joints.measured, joints.commanded, self._base.pose, absolute=drives.control.absolute
-        )
-        carries = joints.mode is not Mode.OFF and commands.settings.gravity_compensation
-        self._telemetry.update_settings(
-            commands.settings.ratio, carries * self._weight.effort(joints.position)
-        )
+        row.setpoint[:], row.measured[:] = joints.commanded, joints.measured
+        row.base[:], row.ratio[:] = self._base.pose, settings.ratio
+        row.switches[0] = drives.control.absolute
+        row.switches[1] = joints.mode is not Mode.OFF and settings.gravity_compensation
         if drives.gripper is not None:
             self._gripper_setpoint[:] = drives.gripper.commanded
 
@@ -176,6 +184,7 @@ class Arm:
         for axes in self._drives.groups:
             axes.setpoint.restored()
         self._update_modes()
+        self._rests = False
 
     def _update_modes(self) -> None:
         self._modes[:] = self._drives.modes
@@ -185,18 +194,21 @@ class Arm:
     def _condition(self) -> tuple[Any, bool, bool]:
         return self._lifecycle.state, self._lifecycle.is_homed, self._lifecycle.is_busy
 
-    def _execute(self, inputs: Inputs) -> bool:
-        """Execute what has arrived; return whether clients now wait for the operating state."""
-        if inputs.quiet:  # nearly always, and an arm has 35 ports
-            return False
+    def _execute(self, inputs: Inputs, ports: Collection[str]) -> bool:
+        """Execute what has arrived on `ports`; return whether clients now wait for the operating state."""
         awaited = False
-        for message in inputs.events(self._state_port):
-            awaited |= self._lifecycle.command(cast("StringStamped", message))
-        for command, port, handler in self._ports:
+        for port in sorted(ports, key=self._order):
+            _, command, handler = self._commanded[port]
             for message in inputs.events(port):
-                self._execute_one(command, handler, message)
-                awaited |= crtk.is_move(command)
+                if handler is None:
+                    awaited |= self._lifecycle.command(cast("StringStamped", message))
+                else:
+                    self._execute_one(command, handler, message)
+                    awaited |= crtk.is_move(command)
         return awaited
+
+    def _order(self, port: str) -> int:
+        return self._commanded[port][0]
 
     def _execute_one(self, command: str, handler: Callable[[Any], None], message: Message) -> None:
         if reason := self._not_ready(command):

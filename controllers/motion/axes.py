@@ -122,6 +122,11 @@ class Axes:
         self.effort[:] = 0.0
         self.setpoint.reset(self.position)
 
+    @property
+    def is_following(self) -> bool:
+        """Whether the setpoint follows a stream of goals."""
+        return self._state.mode is Mode.POSITION and self.setpoint.activity is Activity.FOLLOW
+
     def step(self, h: float) -> None:
         """Advance the setpoint by `h` seconds."""
         if self._state.mode is Mode.POSITION:

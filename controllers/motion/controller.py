@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
+from controllers.motion.following import follow
 from controllers.motion.frames import base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
 from controllers.motion.setup_joints import SetupJoints
+from controllers.motion.telemetry import Telemetry
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
 from robots.dvrk.crtk import CART_FRAME
 from schemas.errors import MissingExtraError
@@ -33,9 +38,12 @@ class MotionController(Controller):
     def __init__(self, name: str, params: MotionParams) -> None:
         super().__init__(name, params)
         self._arms: dict[str, Arm] = {}
-        self._setup_joints = SetupJoints(params)
+        self._sets: list[tuple[Telemetry, list[Arm]]] = []
+        self._period = 0.0
         self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
+        self._camera_pose, self._camera_seen = np.eye(4), b""
         self._outputs: dict[str, Any] = {}
+        self._setup_joints = SetupJoints(params, self._outputs)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -62,42 +70,71 @@ class MotionController(Controller):
             raise MissingExtraError(f"participant '{self.name}' (kind motion)", "motion", "ruckig")
         from controllers.motion.arm import Arm
 
-        period = setup.period_ns * 1e-9
-        self._setup_joints = SetupJoints(self.params)
-        self._arms = {name: Arm(name, self.params, self._camera, period) for name in self.params.arms.driven}
-        for arm in self._arms.values():
-            arm.publish()
-            self._outputs |= arm.outputs
-        self._outputs |= self._setup_joints.outputs
+        period = self._period = setup.period_ns * 1e-9
+        self._arms = {
+            name: Arm(name, self.params, self._camera, period, self._outputs)
+            for name in self.params.arms.driven
+        }
+        self._sets = _sets(self._arms)
+        self._publish()
+        for telemetry, _ in self._sets:
+            self._outputs |= telemetry.outputs
         self.keep(*(part for arm in self._arms.values() for part in arm.state), *self._setup_joints.state)
         return self._outputs
 
     def _camera(self) -> Vector | None:
-        """Return the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM."""
-        return None if self._camera_stand is None else self._camera_stand @ self._arms["ECM"].tip
+        """Return the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+
+        It is the same array until the ECM moves.
+        """
+        if self._camera_stand is None:
+            return None
+        position = self._arms["ECM"].position
+        if (seen := position.tobytes()) != self._camera_seen:
+            self._camera_seen = seen
+            self._camera_pose = self._camera_stand @ self._arms["ECM"].chain.forward(position)
+        return self._camera_pose
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Execute commands and advance all setpoints by `h` nanoseconds."""
         arms = self._arms.values()
         for arm in arms:
             arm.sense(inputs)
-        due = not (t + h) % self.params.publish_period
-        for arm in arms:
-            arm.step(t, h, inputs)
-            if due:
-                arm.publish()
-            self._outputs |= arm.events
+        following = [setpoint for arm in arms for setpoint in arm.step(t, h, inputs)]
+        if following:
+            follow(following, self._period)
+        if not (t + h) % self.params.publish_period:
+            self._publish()
         self._setup_joints.step(t, h, inputs)
-        self._outputs |= self._setup_joints.outputs
         return self._outputs
+
+    def _publish(self) -> None:
+        """Update the states that are not published at every step."""
+        for telemetry, arms in self._sets:
+            for arm, row in zip(arms, telemetry.rows, strict=True):
+                arm.publish(row)
+            telemetry.update()
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state, of trajectories from their start, goal and age."""
         super().restore(state)
         for arm in self._arms.values():
             arm.restored()
+        self._setup_joints.restored()
 
     def close(self) -> None:
         """Release the arms."""
         self._arms.clear()
+        self._sets.clear()
         self._outputs.clear()
+
+
+def _sets(arms: Mapping[str, Arm]) -> list[tuple[Telemetry, list[Arm]]]:
+    """Return the arms whose states are computed together: those with joints of the same kinds."""
+    sets: dict[tuple[str, ...], dict[str, Arm]] = {}
+    for name, arm in arms.items():
+        sets.setdefault(tuple(joint.kind for joint in arm.chain.joints), {})[name] = arm
+    return [
+        (Telemetry([(name, arm.chain, arm.weight) for name, arm in alike.items()]), list(alike.values()))
+        for alike in sets.values()
+    ]

@@ -12,6 +12,7 @@ from controllers.motion.frames import turned
 from controllers.motion.impedance import Impedance
 from controllers.motion.messages import Messages
 from controllers.motion.params import EcmParams, PsmParams
+from controllers.motion.setpoint import Setpoint
 from controllers.motion.telemetry import body_to_spatial
 from hub.participant import Record, array, choice, flag
 from robots.serial_chain import SerialChain
@@ -141,12 +142,17 @@ class Drives:
         self.control.frame = WrenchFrame.IMPEDANCE
         self._balance()
 
-    def step(self, h: float) -> None:
-        """Advance by `h` seconds."""
+    def step(self, h: float) -> list[Setpoint]:
+        """Advance by `h` seconds, except the setpoints that follow a stream: return those."""
         if self.control.frame is not WrenchFrame.NONE:
             self._balance()
+        following: list[Setpoint] = []
         for axes in self.groups:
-            axes.step(h)
+            if axes.is_following:
+                following.append(axes.setpoint)
+            else:
+                axes.step(h)
+        return following
 
     def report_arrivals(self, *, silent: bool) -> None:
         """Report moves that have arrived since the last step; `silent`: not the arm's, which homes."""

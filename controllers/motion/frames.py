@@ -58,6 +58,9 @@ def reference_frame(arm: CartArm, params: MotionParams) -> str:
     return crtk.reference_frame(arm, params.arms.driven, params.mounting, params.reference)
 
 
+_ORIGIN = np.eye(4)
+
+
 class BaseFrame:
     """The base frame of one arm in the frame that its Cartesian ports refer to."""
 
@@ -73,15 +76,20 @@ class BaseFrame:
         """`frame_id` of ports that are not `local/`, and of those that are."""
         self._camera, self._carried = camera, params.mounting == "cart"
         self._world = base_in_world(arm, params)
+        self._seen_by, self._in_camera = np.eye(4), np.eye(4)
         self.state = (self._world,)
 
     @property
     def pose(self) -> Vector:
         """The base frame in its reference, shape (4, 4)."""
         if self.reference == self.local:
-            return np.eye(4)
+            return _ORIGIN
         camera = self._camera() if self.reference == crtk.CAMERA_FRAME else None
-        return self._world if camera is None else inverse_pose(camera) @ self._world
+        if camera is None:
+            return self._world
+        if camera is not self._seen_by:  # beside a camera no client sets where an arm stands
+            self._seen_by, self._in_camera = camera, inverse_pose(camera) @ self._world
+        return self._in_camera
 
     def place(self, base: Vector) -> None:
         """Let the base frame stand at `base`, shape (4, 4), in the world; the arm itself does not move."""

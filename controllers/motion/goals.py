@@ -5,7 +5,7 @@ An invalid message raises MotionError, which states what is allowed.
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, isfinite
 from typing import Literal
 
 import numpy as np
@@ -42,7 +42,7 @@ def joint_values(
 
     A message that names its joints may have them in any order.
     """
-    names = [joint.name for joint in chain.joints]
+    names = chain.names
     values: Vector = getattr(message, part)
     if values.shape != (len(names),):
         raise MotionError(f"{values.size} values of {part}, expected {len(names)}: {', '.join(names)}")
@@ -127,5 +127,5 @@ def vector(message: Point | Vector3, part: str) -> Vector:
 
 
 def _check_finite(values: Vector, part: str) -> None:
-    if not np.isfinite(values).all():
+    if not all(map(isfinite, values.tolist())):
         raise MotionError(f"{part} {values.tolist()}: every number must be finite")

@@ -74,7 +74,7 @@ class Lifecycle:
         self._drives, self._messages = drives, messages
         self._home, self._power_time = home, power_time
         n = len(home)
-        self._tolerance = np.array([*_TRACKING_TOLERANCE, *_TRACKING_TOLERANCE[-1:] * n][:n])
+        self._tolerance = [*_TRACKING_TOLERANCE, *_TRACKING_TOLERANCE[-1:] * n][:n]
         self._now = LifecycleState()
         self._repeats = Repeats()
         self.records = (self._now, self._repeats.state)
@@ -114,6 +114,17 @@ class Lifecycle:
         """The state that was commanded: CRTK's `desired_state`."""
         return self.state.name if self.state in (State.PAUSED, State.FAULT) else self._now.desired.name
 
+    @property
+    def is_lost(self) -> bool:
+        """Whether the drives hold a position and a joint is too far from its own."""
+        joints = self._drives.joints
+        return joints.mode is Mode.POSITION and any(
+            abs(goal - position) > most
+            for goal, position, most in zip(
+                joints.setpoint.position.tolist(), joints.position.tolist(), self._tolerance, strict=True
+            )
+        )
+
     def not_ready(self) -> str:
         """Return why the arm refuses motion commands; empty if it does not."""
         if self.state is not State.ENABLED:
@@ -140,8 +151,8 @@ class Lifecycle:
 
     def watch(self, h: float) -> None:
         """Check what has ended or gone wrong in the last step, of `h` seconds."""
-        if self._drives.joints.mode is Mode.POSITION and (reason := self._lost()):
-            self._fault(reason)
+        if self.is_lost:
+            self._fault(self._loss())
         self._drives.report_arrivals(silent=self._now.homing)
         if self._now.homing and self.state is State.ENABLED and not self._drives.joints.is_moving:
             self._check_home(h)
@@ -205,13 +216,11 @@ class Lifecycle:
         self._switch_off(State.FAULT)
         self._messages.desired_state(self.desired_state)
 
-    def _lost(self) -> str:
-        """Return which joints are too far from their setpoint; empty if all are near enough."""
+    def _loss(self) -> str:
+        """Return which joints are too far from their setpoint."""
         joints = self._drives.joints
         away = np.abs(joints.setpoint.position - joints.position)
-        if not (away > self._tolerance).any():
-            return ""
-        rows = zip(joints.chain.joints, away.tolist(), self._tolerance.tolist(), strict=True)
+        rows = zip(joints.chain.joints, away.tolist(), self._tolerance, strict=True)
         return "tracking error, " + "; ".join(
             _astray(joint, distance, most) for joint, distance, most in rows if distance > most
         )

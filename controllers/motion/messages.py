@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +26,14 @@ _STREAMS = tuple(filter(crtk.is_stream, crtk.COMMANDS)) + tuple(
 class Messages:
     """The event outputs of one arm in the present step."""
 
-    def __init__(self, arm: str, events: Iterable[str]) -> None:
-        """Take the arm's name and those of its event outputs."""
-        self._arm = arm
+    def __init__(self, arm: str, events: Iterable[str], outputs: dict[str, Any]) -> None:
+        """Take the arm's name, those of its event outputs, and the outputs in which they stand."""
+        self._arm, self._outputs = arm, outputs
         self._ports = {name: f"{arm}/{name}" for name in events}
-        self.outputs: dict[str, tuple[Message, ...]] = dict.fromkeys(self._ports.values(), ())
-        self._quiet = True
+        self._silence = dict.fromkeys(self._ports.values(), ())
+        outputs |= self._silence
+        self.quiet = True
+        """Whether the present step has no events."""
         self._now_ns = 0
         self.state = np.zeros((len(_STREAMS), 3))
         """Per stream: checksum of the last refusal, when it was reported (s), how often it recurred since."""
@@ -38,9 +41,9 @@ class Messages:
     def begin(self, now_ns: int) -> None:
         """Clear the events of the last step; the new one ends at `now_ns`."""
         self._now_ns = now_ns
-        if not self._quiet:
-            self.outputs.update(dict.fromkeys(self._ports.values(), ()))
-            self._quiet = True
+        if not self.quiet:
+            self._outputs |= self._silence
+            self.quiet = True
 
     def operating_state(self, state: State, *, homed: bool, busy: bool) -> None:
         """Publish the operating state."""
@@ -92,5 +95,5 @@ class Messages:
             self.state[_STREAMS.index(command)] = 0.0
 
     def _put(self, name: str, message: Message) -> None:
-        self.outputs[self._ports[name]] += (message,)
-        self._quiet = False
+        self._outputs[self._ports[name]] += (message,)
+        self.quiet = False

@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
+from controllers.motion.following import clip, fastest, follow, steer
 from hub.participant import Record, array, choice, flag, number
 from robots.serial_chain import Joint
 from schemas.vectors import Vector
@@ -92,7 +93,11 @@ class Setpoint:
             [(joint.lower, joint.upper, joint.velocity, joint.acceleration, joint.jerk) for joint in joints]
         ).T.copy()
         self._most = FOLLOWING_ACCELERATION * self._acceleration
+        self.limits = np.array([self._lower, self._upper, self._velocity, self._most])
+        """Of position to either side, velocity, and acceleration while following, shape (4, n)."""
         self.state = SetpointState(n=n)
+        self.course = self.state.values[: 5 * n].reshape(5, n)
+        """The first five parts of `state`: position, velocity, acceleration, goal, velocity at the goal."""
         self.position, self.velocity, self.goal = self.state.position, self.state.velocity, self.state.goal
         self._arrival, self._origin = self.state.arrival, self.state.origin
         self._ruckig, self._trajectory = Ruckig(n), Trajectory(n)
@@ -109,7 +114,7 @@ class Setpoint:
 
     def reset(self, position: Vector) -> None:
         """Stand at `position`, shape (n,), or as near to it as the ranges allow."""
-        self.position[:] = _clip(position, self._lower, self._upper)
+        self.position[:] = clip(position, self._lower, self._upper)
         self.goal[:] = self.position
         self._rest()
 
@@ -134,8 +139,8 @@ class Setpoint:
         if velocity is None and streaming:
             velocity = (goal - self.goal) / max(state.since, h)
             if early:
-                velocity = _clip(velocity, -np.abs(self._arrival), np.abs(self._arrival))
-        self._arrival[:] = 0.0 if velocity is None else _clip(velocity, -self._velocity, self._velocity)
+                velocity = clip(velocity, -np.abs(self._arrival), np.abs(self._arrival))
+        self._arrival[:] = 0.0 if velocity is None else clip(velocity, -self._velocity, self._velocity)
         self.goal[:] = goal
         state.waiting, state.since, state.pending = interval, 0.0, False
         state.activity = Activity.FOLLOW
@@ -145,7 +150,7 @@ class Setpoint:
 
         Afterwards, and at a range's end, the setpoint comes to rest.
         """
-        self._arrival[:] = _clip(velocity, -self._velocity, self._velocity)
+        self._arrival[:] = clip(velocity, -self._velocity, self._velocity)
         self.state.since, self.state.pending = 0.0, False
         self.state.activity = Activity.DRIFT
 
@@ -176,13 +181,16 @@ class Setpoint:
         if activity is Activity.MOVE:
             return self._go_on(h)
         if activity is Activity.FOLLOW:
-            self._follow(h)
+            follow((self,), h)
             return False
         if activity is Activity.DRIFT and self.state.since <= STREAM_GAP:
-            most_down, most_up = self._fastest(
-                np.array([self.position - self._lower, self._upper - self.position]), h
+            most_down, most_up = fastest(
+                np.array([self.position - self._lower, self._upper - self.position]), self._most, h
             )
-            self._steer(self._arrival, most_down, most_up, h)
+            self.course[:3] = steer(
+                self.position, self.velocity, self._arrival, self.limits, most_down, most_up, h
+            )
+            self.state.since += h
             return False
         return self._slow_down(h)
 
@@ -231,69 +239,14 @@ class Setpoint:
             self._rest()
             return True
         position, self.velocity[:], self.state.acceleration[:] = self._trajectory.at_time(elapsed)
-        self.position[:] = _clip(np.array(position), self._lower, self._upper)
+        self.position[:] = clip(np.array(position), self._lower, self._upper)
         return False
-
-    def _follow(self, h: float) -> None:
-        state = self.state
-        wait = max(state.waiting, h)
-        # from where a setpoint that is in time would be now
-        away = self.goal - self.position - wait * self._arrival
-        way = np.abs(self.goal - self.position)
-        most, most_to_goal, most_down, most_up = self._fastest(
-            np.array([np.abs(away), way, self.position - self._lower, self._upper - self.position]), h
-        )
-        faster = self._bend(wait, h) if state.stated else away / wait
-        target = self._arrival + _clip(faster, -most, most)
-        if not state.stated:
-            # while it catches up: the next goal may be late or turn back, so it must be able to come to rest
-            # as near to this one as from the velocity of arrival there, and what a step adds to that
-            most = np.hypot(most_to_goal, np.abs(self._arrival) + h * self._most)
-            target = _clip(target, -most, most)
-        self._steer(target, most_down, most_up, h)
-        state.waiting = max(wait - h, 0.0)
-        if not state.waiting:
-            self._arrival[:] = 0.0
-            state.stated = False
-
-    def _bend(self, wait: float, h: float) -> Vector:
-        """Return the next step's velocity less that of arrival, shape (n,), on a cubic of `wait` seconds."""
-        mean = (self.goal - self.position) / wait
-        now, then = self.velocity - mean, self._arrival - mean  # the cubic less the straight line
-        share = h / wait
-        return mean + now - share * (2.0 * now + then) + share * share * (now + then) - self._arrival
-
-    def _steer(self, target: Vector, most_down: Vector, most_up: Vector, h: float) -> None:
-        """Take a step with the allowed velocity nearest to `target`, shape (n,).
-
-        Allowed is what the limits and the way left to either side permit.
-        """
-        room = h * self._most
-        target = _clip(
-            _clip(target, -self._velocity, self._velocity), self.velocity - room, self.velocity + room
-        )
-        self.velocity[:] = _clip(target, -most_down, most_up)
-        self.position += h * self.velocity
-        self.position[:] = _clip(self.position, self._lower, self._upper)
-        self.state.acceleration[:] = 0.0
-        self.state.since += h
-
-    def _fastest(self, distance: Vector, h: float) -> Vector:
-        """Return the largest velocity from which steps of `h` come to rest within `distance`, both (..., n).
-
-        With the velocity falling by A h a step from n A h, m = floor(n) + 1 steps go A h^2 (m n - m (m - 1) /
-        2) far; solved for n.
-        """
-        room = h * self._most
-        steps = np.maximum(distance, 0.0) / (h * room)
-        whole = np.floor((np.sqrt(1.0 + 8.0 * steps) - 1.0) / 2.0)
-        return room * (steps / (whole + 1.0) + whole / 2.0)
 
     def _slow_down(self, h: float) -> bool:
         room = h * self._most
-        self.velocity -= _clip(self.velocity, -room, room)
+        self.velocity -= clip(self.velocity, -room, room)
         self.position += h * self.velocity
-        self.position[:] = _clip(self.position, self._lower, self._upper)
+        self.position[:] = clip(self.position, self._lower, self._upper)
         if self.velocity.any():
             return False
         if self.state.pending:
@@ -303,7 +256,3 @@ class Setpoint:
         self.goal[:] = self.position
         self._rest()
         return True
-
-
-def _clip(value: Vector, lower: Vector, upper: Vector) -> Vector:
-    return np.minimum(np.maximum(value, lower), upper)  # a third of the cost of np.clip

@@ -38,14 +38,17 @@ class SetupJointState(Record):
 class SetupJoints:
     """The setup joints of all driven arms; without a cart there are none."""
 
-    def __init__(self, params: MotionParams) -> None:
+    def __init__(self, params: MotionParams, outputs: dict[str, Any]) -> None:
+        """Take the controller's parameters, and the outputs among which those of the setup joints stand."""
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
-        self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names()) for arm in arms}
+        self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names(), outputs) for arm in arms}
         self._now = SetupJointState()
         if params.initial_state == "homed":
             self._now.state = State.ENABLED
         self._repeats = Repeats()
+        self._rests = False
+        """Whether a step without commands changes nothing."""
         self.state: tuple[Record | Vector, ...] = ()
         if arms:
             self.state = (
@@ -53,17 +56,17 @@ class SetupJoints:
                 self._repeats.state,
                 *(messages.state for messages in self._messages.values()),
             )
-        self.outputs: dict[str, Any] = {}
         for arm in arms:
             positions = setup_positions(arm, params)
-            self.outputs |= {
+            outputs |= {
                 f"SUJ/{arm}/measured_js": positions,
                 f"SUJ/{arm}/local/measured_cp": pose(setup_joints.base_pose(arm, positions)),
             }
-            self.outputs |= self._messages[arm].outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:
         """Execute the commands that have arrived, from `t` to `t + h` (ns)."""
+        if self._rests and inputs.quiet:
+            return
         news = not self._now.published
         for arm, messages in self._messages.items():
             messages.begin(t + h)
@@ -80,8 +83,11 @@ class SetupJoints:
                 messages.operating_state(
                     self._now.state, homed=self._now.homed, busy=self._now.powering > 0.0
                 )
-        for messages in self._messages.values():
-            self.outputs |= messages.outputs
+        self._rests = not self._now.powering and all(messages.quiet for messages in self._messages.values())
+
+    def restored(self) -> None:
+        """Note that the state was restored."""
+        self._rests = False
 
     def _command(self, messages: Messages, message: StringStamped) -> bool:
         """Execute a `state_command`; return whether it was accepted."""

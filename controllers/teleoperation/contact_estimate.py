@@ -9,9 +9,7 @@ Why a loop through it is stable, whatever the delay, stands in docs/decisions/00
 
 from __future__ import annotations
 
-from math import copysign, exp
-
-import numpy as np
+from math import copysign, exp, sqrt
 
 from hub.participant import Record, array, flag, number
 from schemas.vectors import Vector
@@ -81,17 +79,17 @@ class ContactEstimate(Record):
         self.force += share * (force - self.force)
         if self.known:
             self._follow(move)
-        size = float(np.linalg.norm(self.force))
+        size = _length(self.force)
         if size < _TOUCH:
             self.tip_depth = min(self.tip_depth, 0.0)
-            if np.linalg.norm(self.tip - self.touched) > _REACH * scale:
+            if _length(self.tip - self.touched) > _REACH * scale:
                 self.known, self.stiffness, self.friction = False, 0.0, 0.0
             return
         self._turn(self.force / size)
         self.touched[:], self.known = self.tip, True
         push = float(self.normal @ self.force)
         depth = self.tip_depth = max(self.tip_depth, push / _STIFFEST)
-        across = float(np.linalg.norm(self.force - push * self.normal))
+        across = _length(self.force - push * self.normal)
         self.stiffness += _approach(self.stiffness, push / depth, elapsed)
         self.friction += _approach(self.friction, across / push, elapsed)
 
@@ -101,19 +99,23 @@ class ContactEstimate(Record):
         Less what sliding may seem to add where friction has tilted the normal.
         """
         along = float(self.normal @ move)
-        across = float(np.linalg.norm(move - along * self.normal))
+        across = _length(move - along * self.normal)
         self.tip_depth -= copysign(max(0.0, abs(along) - _CONE * across), along)
 
     def _turn(self, direction: Vector) -> None:
         """Turn the normal just enough to have `direction` (3,) in the friction cone; keep the depth."""
         along = float(self.normal @ direction)
         aside = self.normal - along * direction
-        size = float(np.linalg.norm(aside))
+        size = _length(aside)
         if not self.known or not size:
             self.normal[:] = direction
         elif size > _CONE * along:
             turned = direction + _CONE / size * aside
-            self.normal[:] = turned / np.linalg.norm(turned)
+            self.normal[:] = turned / _length(turned)
+
+
+def _length(vector: Vector) -> float:
+    return sqrt(vector.dot(vector))  # np.linalg.norm's own way, at a fifth of its cost
 
 
 def _approach(value: float, target: float, elapsed: float) -> float:

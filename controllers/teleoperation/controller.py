@@ -85,6 +85,8 @@ class Teleoperation(Controller):
             *(() if self._law is None else (self._law.state,)),
             *(() if self._ghost is None else (self._ghost.state,)),
         )
+        self._found = b""
+        """The command of which `tip` is the pose."""
         self._outputs: dict[str, Any] = {"servo_jp": self._command, "goal_cp": self._goal}
         self._streams = {f"{params.arm}/servo_jp": self._command}
         if self._ghost is not None:
@@ -122,9 +124,9 @@ class Teleoperation(Controller):
             float(inputs["gripper"][0]),
             h * 1e-9,
         )
-        turned = rotation.product(to_base, inputs["master"][3:])
+        hand = inputs["master"][3:]
         fresh = not inputs.stale("master") and (self._law is not None or not inputs.stale("master_twist"))
-        self._engagement.step(turned, self._tip[3:], gripper, seconds, fresh=fresh)
+        self._engagement.step(to_base, hand, self._tip[3:], gripper, seconds, fresh=fresh)
         if self._engagement.phase is Phase.ENABLED:
             self._lead(inputs, to_base, seconds)
         self._lead_jaw(gripper, seconds)
@@ -134,6 +136,11 @@ class Teleoperation(Controller):
         if not (t + h) % period:
             self._outputs["contact"] = self._feel(inputs, to_base, Time.from_ns(t + h), period * 1e-9)
         return self._outputs
+
+    def restore(self, state: bytes) -> None:
+        """Return to a saved state, whose pose of the tip is that of its command."""
+        super().restore(state)
+        self._found = self._command.tobytes()
 
     @property
     def _holds_command(self) -> bool:
@@ -146,6 +153,8 @@ class Teleoperation(Controller):
 
     def _receive(self, inputs: Inputs) -> None:
         """Read the state of the arm, locks and buttons."""
+        if inputs.quiet:
+            return
         for message in inputs.events("operating_state"):
             self._engagement.receive_state(cast("OperatingState", message))
             self._now.shared = True
@@ -172,7 +181,10 @@ class Teleoperation(Controller):
             self._jaw[:1] = self._ghost.angle
 
     def _find_tip(self) -> None:
-        """Compute the pose of the tip from the command."""
+        """Compute the pose of the tip from the command, unless that has the bits of the last time."""
+        if (command := self._command.tobytes()) == self._found:
+            return
+        self._found = command
         tip = self._chain.forward(self._command)
         self._tip[:3], self._tip[3:] = tip[:3, 3], rotation.from_matrix(tip)
 
@@ -225,7 +237,9 @@ class Teleoperation(Controller):
         self._outputs["state"] = (
             () if phase == self._now.published_phase else (StringMessage(data=phase.name),)
         )
-        self._outputs["warning"] = tuple(StringMessage(data=warning) for warning in warnings)
+        self._outputs["warning"] = (
+            tuple(StringMessage(data=warning) for warning in warnings) if warnings else ()
+        )
         self._now.published_phase = phase
 
     def _stream(self, stamp: Time) -> None:
@@ -249,14 +263,18 @@ class Teleoperation(Controller):
             rigid_wrench=inputs["rigid_wrench"],
             elapsed=elapsed,
         )
-        return ContactModel(header=Header(stamp=stamp), planes=planes)
+        return ContactModel.model_construct(header=_header(stamp), planes=planes)
+
+
+def _header(stamp: Time) -> Header:
+    return Header.model_construct(stamp=stamp, frame_id="")
 
 
 def _positions(values: Vector, stamp: Time) -> JointState:
     """Return joint positions as a message, without validation: they are within the joints' ranges."""
     none = np.zeros(0)
     return JointState.model_construct(
-        header=Header.model_construct(stamp=stamp, frame_id=""),
+        header=_header(stamp),
         name=[],
         position=values.copy(),
         velocity=none,

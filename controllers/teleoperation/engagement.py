@@ -12,6 +12,7 @@ from enum import IntEnum
 from controllers.teleoperation.alignment import AlignmentGate
 from controllers.teleoperation.params import TeleoperationParams
 from hub.participant import Record, choice, flag
+from robots import rotation
 from robots.dvrk.crtk import is_ready
 from schemas.crtk import OperatingState
 from schemas.ros import Joy
@@ -90,17 +91,25 @@ class Engagement:
     def _is_free(self) -> bool:
         return self._now.pressed is not self._must_hold
 
-    def step(self, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool) -> None:
-        """Decide on this step, of `h` seconds; `fresh`: the hand's pose is.
+    def step(
+        self, to_base: Vector, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool
+    ) -> None:
+        """Decide on this step.
 
-        The other arguments are those of `AlignmentGate.check`.
+        Args:
+            to_base: orientation of the master's base frame in the arm's, quaternion (x, y, z, w).
+            hand: orientation of the master in its base frame, likewise.
+            tip: orientation of the tip in the arm's base frame, likewise.
+            gripper: of the master, 0 closed .. 1 open; negative without one.
+            h: the step, s.
+            fresh: whether the hand's pose is.
         """
         self.warnings = []
         before = self.phase
         if self._must_hold and not fresh and not self._now.lost:
             self._now.pressed = False  # until the button is received again
         self._now.lost = not fresh
-        self._now.phase = self._decide(hand, tip, gripper, h, fresh=fresh)
+        self._now.phase = self._decide(to_base, hand, tip, gripper, h, fresh=fresh)
         if self.phase is Phase.DISABLED and before is not Phase.DISABLED:
             reason = (
                 f"its master has been silent for more than {self._max_age / 1e6:g} ms"
@@ -113,7 +122,9 @@ class Engagement:
         )
         self._now.interrupted = False
 
-    def _decide(self, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool) -> Phase:
+    def _decide(
+        self, to_base: Vector, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool
+    ) -> Phase:
         gate = self._gate
         if not (fresh and self.arm_is_ready):
             if gate is not None:
@@ -126,7 +137,7 @@ class Engagement:
         if (
             gate is None
             or (self.phase is Phase.ENABLED and not self._now.interrupted)
-            or gate.check(hand, tip, gripper, h)
+            or gate.check(rotation.product(to_base, hand), tip, gripper, h)
         ):
             return Phase.ENABLED
         if warning := gate.warning():

@@ -14,9 +14,7 @@ past half a turn the nearest way there is the other way round.
 
 from __future__ import annotations
 
-from math import radians
-
-import numpy as np
+from math import radians, sqrt
 
 from hub.participant import Record, array, number
 from robots import rotation
@@ -86,9 +84,9 @@ class PoseLaw:
                 rotation.conjugate(rotation.product(to_base, self._hand0[3:])), self._tip0[3:]
             )
             goal = rotation.product(rotation.product(to_base, hand[3:]), offset)
-            self.goal[3:] = goal / np.linalg.norm(goal)
+            self.goal[3:] = goal / sqrt(goal.dot(goal))
             lag = rotation.log(rotation.product(self.goal[3:], rotation.conjugate(tip[3:])))
-            if (angle := float(np.linalg.norm(lag))) > _MOST_LAG:
+            if (angle := sqrt(lag.dot(lag))) > _MOST_LAG:
                 self.goal[3:] = rotation.product(rotation.exp(lag * (_MOST_LAG / angle)), tip[3:])
                 self.engage(hand, self.goal.copy(), to_base, scale)
         return pursue(self._chain, command, self.goal[:3], self.goal[3:], largest_move)

@@ -34,6 +34,7 @@ class View:
 
     def __init__(self, params: TeleoperationParams) -> None:
         self._registration = np.array(params.registration)
+        self._hand_in_base, self._seen = self._registration, b""
         self._hand_in_camera: Vector | None = self._registration if params.view == "display" else None
         if params.view == "camera":
             # both in the roll link
@@ -51,5 +52,9 @@ class View:
         """
         if self._hand_in_camera is None:
             return self._registration
+        if (seen := base_in_view.tobytes()) == self._seen:
+            return self._hand_in_base
+        self._seen = seen
         orientation = rotation.product(rotation.conjugate(base_in_view[3:]), self._hand_in_camera)
-        return orientation / np.linalg.norm(orientation)
+        self._hand_in_base = orientation / np.linalg.norm(orientation)
+        return self._hand_in_base

@@ -399,7 +399,7 @@ def messages() -> str:
         "| Zenoh key | |",
         "|---|---|",
         "| `trocar/<session>/hub/grant`, `hub/status` | grants and state of the session |",
-        "| `trocar/<session>/engine/<name>/ack` | acks of an engine or controller |",
+        "| `trocar/<session>/engine/<name>/ack` | acks of those on other machines; a recording has all |",
         "| `trocar/<session>/engine/<name>/out/<port>` | values of its outputs |",
         "| `trocar/<session>/device/<name>/out/<port>` | samples of a device |",
         "| `trocar/<session>/control/<verb>` | queries: join, pause, step, set, shutdown |",

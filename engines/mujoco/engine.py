@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from engines.mujoco.params import MujocoParams, PsmParams
+from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.opengl import import_mujoco
 from engines.mujoco.ports import bond_sides, scene_ports
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from robots.dvrk.mounted import MountedPsm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port
 from schemas.vectors import Vector
@@ -107,7 +108,7 @@ class MujocoEngine(Stepped):
         self._holding = holding.Holding(
             self._model, self._data, self.params, self.params.publish_period * 1e-9
         )
-        psms = (arm for arm, params in self.params.arms.items() if isinstance(params, PsmParams))
+        psms = (arm for arm, params in self.params.arms.items() if isinstance(params, MountedPsm))
         self._rigid = RigidContact(self._model, self._data, psms)
         self._outputs.update({**self._readings.outputs, **self._holding.outputs, **self._rigid.outputs})
         self._couple(setup)

@@ -20,9 +20,7 @@ from schemas.keys import valid_name
 from schemas.quantity import Duration
 
 __all__ = [
-    "EcmParams",
     "MujocoParams",
-    "PsmParams",
     "SceneParams",
     "has_hand",
     "has_jaw",
@@ -31,19 +29,12 @@ __all__ = [
 ]
 
 
-PsmParams = MountedPsm
-"""A patient-side manipulator: what it holds and where it starts."""
-
-EcmParams = MountedEcm
-"""The endoscope camera manipulator."""
-
-
 @with_config(ConfigDict(extra="forbid"))
 class _Arms(TypedDict, total=False):
-    PSM1: PsmParams
-    PSM2: PsmParams
-    PSM3: PsmParams
-    ECM: EcmParams
+    PSM1: MountedPsm
+    PSM2: MountedPsm
+    PSM3: MountedPsm
+    ECM: MountedEcm
 
 
 @with_config(ConfigDict(extra="forbid"))
@@ -73,7 +64,7 @@ class SceneParams(Params):
     """What stands where: arms of a da Vinci Research Kit, a table and things to hold."""
 
     model: Literal["dvrk"] = "dvrk"
-    arms: Annotated[dict[CartArm, PsmParams | EcmParams], _validated_as(_Arms), Field(min_length=1)]
+    arms: Annotated[dict[CartArm, MountedPsm | MountedEcm], _validated_as(_Arms), Field(min_length=1)]
     mounting: Literal["free", "cart"] = Field(
         default="free",
         description=(
@@ -120,7 +111,7 @@ class SceneParams(Params):
         rolling = [
             name
             for name, arm in self.arms.items()
-            if isinstance(arm, PsmParams) and arm.tool.roller is not None
+            if isinstance(arm, MountedPsm) and arm.tool.roller is not None
         ]
         if rolling and self.objects and self.grasp == "weld":
             raise ValueError(
@@ -146,21 +137,21 @@ class MujocoParams(SceneParams):
     )
 
 
-def has_jaw(params: PsmParams | EcmParams) -> bool:
+def has_jaw(params: MountedPsm | MountedEcm) -> bool:
     """Return whether the arm holds an instrument that opens and closes."""
-    return isinstance(params, PsmParams) and params.tool.jaw is not None
+    return isinstance(params, MountedPsm) and params.tool.jaw is not None
 
 
-def has_hand(params: PsmParams | EcmParams) -> bool:
+def has_hand(params: MountedPsm | MountedEcm) -> bool:
     """Return whether the arm holds a hand."""
-    return isinstance(params, PsmParams) and params.tool.hand is not None
+    return isinstance(params, MountedPsm) and params.tool.hand is not None
 
 
-def has_spheres(params: PsmParams | EcmParams) -> bool:
+def has_spheres(params: MountedPsm | MountedEcm) -> bool:
     """Return whether the arm holds an instrument with contact spheres."""
-    return isinstance(params, PsmParams) and bool(params.tool.spheres)
+    return isinstance(params, MountedPsm) and bool(params.tool.spheres)
 
 
-def has_probe(params: PsmParams | EcmParams) -> bool:
+def has_probe(params: MountedPsm | MountedEcm) -> bool:
     """Return whether the arm holds a palpation probe."""
-    return isinstance(params, PsmParams) and params.tool.name == "palpation-probe"
+    return isinstance(params, MountedPsm) and params.tool.name == "palpation-probe"

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from engines.mujoco.params import (
-    EcmParams,
-    MujocoParams,
-    PsmParams,
-    SceneParams,
-    has_jaw,
-    has_probe,
-    has_spheres,
-)
+from engines.mujoco.params import MujocoParams, SceneParams, has_jaw, has_probe, has_spheres
 from robots.dvrk import ecm
 from robots.dvrk.linkage import LINKAGES
+from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.rolling_needle_driver import PADS
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
@@ -60,14 +53,14 @@ def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
     return tuple(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm))
 
 
-def _arm_bonds(name: str, arm: PsmParams | EcmParams) -> Iterator[BondSide]:
+def _arm_bonds(name: str, arm: MountedPsm | MountedEcm) -> Iterator[BondSide]:
     if has_probe(arm):
         yield BondSide(name=f"{name}/probe", side="motion", frame="world")
-    if isinstance(arm, PsmParams) and (spheres := arm.tool.spheres):
+    if isinstance(arm, MountedPsm) and (spheres := arm.tool.spheres):
         yield BondSide(name=f"{name}/contact", side="motion", dof=3, points=len(spheres), frame="world")
 
 
-def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[Port]:
+def _arm_ports(arm: str, params: MountedPsm | MountedEcm, slow: int) -> Iterator[Port]:
     names = tuple(joint.name for joint in params.chain.joints)
     still = (0.0,) * len(names)
     yield Port(
@@ -99,7 +92,7 @@ def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[P
         yield Port(
             name=f"{arm}/tip_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt
         )
-    if isinstance(params, PsmParams):
+    if isinstance(params, MountedPsm):
         felt = (
             "the same of rigid contacts: table, objects, cart, other arms; an object in the jaws pulls with"
             " its weight"
@@ -113,8 +106,8 @@ def _arm_ports(arm: str, params: PsmParams | EcmParams, slow: int) -> Iterator[P
         )
 
 
-def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
-    if isinstance(params, PsmParams) and has_jaw(params):
+def _jaw_ports(arm: str, params: MountedPsm | MountedEcm) -> Iterator[Port]:
+    if isinstance(params, MountedPsm) and has_jaw(params):
         names = tuple(joint.name for joint in params.tool.jaw_joints)
         start, still = (params.jaw, 0.0)[: len(names)], (0.0,) * len(names)
         goal = "goal of the jaw's servo" + (
@@ -144,8 +137,8 @@ def _jaw_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
         )
 
 
-def _hand_ports(arm: str, params: PsmParams | EcmParams) -> Iterator[Port]:
-    if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+def _hand_ports(arm: str, params: MountedPsm | MountedEcm) -> Iterator[Port]:
+    if isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
         names, still = tuple(motor.name for motor in hand.joints), (0.0,) * len(hand.joints)
         goal = "goal of closings and spreads"
         yield Port(
@@ -230,7 +223,7 @@ def position_count(scene: SceneParams) -> int:
     """
     count = _FREE_BODY * len(scene.objects)
     for name, arm in scene.arms.items():
-        if isinstance(arm, EcmParams):
+        if isinstance(arm, MountedEcm):
             count += len(ecm.JOINT_NAMES)
         else:
             tool = arm.tool

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from hub.command_line.display import console
 from hub.command_line.options import Json, Overrides, ScenarioName, with_places
-from hub.planning.plan import Plan
+from hub.planning.plan import Plan, PlannedParticipant
 from hub.planning.scenario_file import load
 from hub.planning.scenario_schema import scenario_schema
 from hub.session.launch import plan_of
@@ -40,7 +40,8 @@ def _print_plan(plan: Plan) -> None:
         sources[connection.target, connection.target_port].append(source)
     for planned in plan.participants.values():
         console.print(
-            f"[bold]{planned.name}[/] ({planned.role} of kind {planned.kind}) on host {planned.host}",
+            f"[bold]{planned.name}[/] ({planned.role} of kind {planned.kind}) on host"
+            f" {planned.host}{escape(_time(planned))}",
             soft_wrap=True,
         )
         for port in planned.ports:
@@ -54,6 +55,13 @@ def _print_plan(plan: Plan) -> None:
             )
     if plan.order:
         console.print(f"order of stepping: {', '.join(plan.order)}", soft_wrap=True)
+
+
+def _time(planned: PlannedParticipant) -> str:
+    """Return whether a participant that only looks has a time of its own; empty for any other one."""
+    if planned.observer:
+        return ", an observer: it looks in its own time, and the session does not wait for it"
+    return f", in lock-step: {planned.lock_step}" if planned.lock_step else ""
 
 
 def schema() -> None:

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from hub.observation.summary import Progress
 from hub.planning.limits import shown
+from hub.recording.profiles import profile_tables
 from schemas.scenario import Scenario
 
 __all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]
@@ -51,9 +52,27 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
             if value is not None and not isinstance(value, dict)
         )
     )
+    if observers := result.get("observers"):
+        console.print()
+        console.print(table(_observer_rows(observers), *_OBSERVER_COLUMNS))
     if rows := list(latency_rows(result.get("latency", {}))):
         console.print()
         console.print(table(rows, *LATENCY_COLUMNS))
+    profile = result.get("profile")
+    for columns, cells in profile_tables(profile) if profile else ():
+        console.print()
+        console.print(table(cells, *columns))
+
+
+_OBSERVER_COLUMNS = ("observer", "states", "dropped", "per second", "attainable", "lost")
+
+
+def _observer_rows(observers: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[object, ...]]:
+    """Yield a row for each participant that looked on in its own time."""
+    for name, row in observers.items():
+        seen, dropped = row["states"], row["dropped"]
+        share = f"{dropped} ({dropped / max(seen + dropped, 1):.1%})"
+        yield name, seen, share, f"{row['rate']:.1f}", f"{row['attainable_rate']:.1f}", row["lost"] or ""
 
 
 LATENCY_COLUMNS = ("latency", "stream", "count", "p50", "p99", "largest")

@@ -13,6 +13,7 @@ from rich.console import Console
 from hub.command_line.display import LATENCY_COLUMNS, latency_rows, table
 from hub.command_line.options import Certificates, HubEndpoints, Json
 from hub.observation.latency import by_way
+from hub.recording.profiles import profile_numbers
 from schemas.trocar_msgs import SessionStatus
 
 __all__ = ["ls"]
@@ -20,10 +21,11 @@ __all__ = ["ls"]
 _SESSION_COLUMNS = ("session", "state", "listens at", "pid", "run")
 _PARTICIPANT_COLUMNS = ("session", "state", "name", "role", "host", "pid", "step")
 _DEVICE_COLUMNS = ("session", "device", "clock offset", "within", "network link")
+_PROFILE_COLUMNS = ("session", "core-seconds per simulated second", "most of it")
 
 
 def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Json = False) -> None:
-    """List the running sessions: where, participants, clocks and network links of devices, latencies."""
+    """List the running sessions: where, participants, devices, latencies, and what takes processor time."""
     found = _found(connect, certs)
     if as_json:
         typer.echo(json.dumps([_session_row(session) for session in found], indent=2))
@@ -34,7 +36,7 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
         return
     out.print(
         table(
-            ((s.session, s.state, ", ".join(endpoints), pid or "-", s.run) for s, endpoints, pid in found),
+            ((s.session, s.state, ", ".join(endpoints), pid or "-", s.run) for s, endpoints, pid, _ in found),
             *_SESSION_COLUMNS,
         )
     )
@@ -47,6 +49,9 @@ def ls(*, connect: HubEndpoints = None, certs: Certificates = None, as_json: Jso
     if devices := [row for status in sessions for row in _device_rows(status)]:
         out.print()
         out.print(table(devices, *_DEVICE_COLUMNS))
+    if profiles := [row for session in found for row in _profile_rows(session)]:
+        out.print()
+        out.print(table(profiles, *_PROFILE_COLUMNS))
     latencies = [
         (status.session, *row) for status in sessions for row in latency_rows(by_way(status.latencies))
     ]
@@ -63,24 +68,29 @@ class _Found(NamedTuple):
     """Where its hub listens, as far as is known here."""
     pid: int | None
     """The hub's process, if it is one of this user on this machine."""
+    profile: dict[str, Any] | None
+    """Where the time goes, if that is measured (`hub/recording/profiles.py`)."""
 
 
 def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Found]:
     """Return the sessions at the endpoints `connect`, by default all of this machine, sorted by name."""
-    from hub.remote.live_sessions import live_sessions
+    from hub.remote.live_sessions import live_profiles, live_sessions
     from hub.transport.hub_files import running_hubs
 
     at = {
         endpoint: live_sessions([endpoint], certificates)
         for endpoint in connect or [hub.endpoint for hub in running_hubs()]
     }
+    profiles = live_profiles(at, certificates)
     hubs = {hub.endpoint: hub for hub in running_hubs()}  # again, as some may have begun in between
     found: dict[tuple[str, int], _Found] = {}
     for endpoint, statuses in at.items():
         hub = hubs.get(endpoint)
         outside, pid = (hub.outside, hub.pid) if hub else ((), None)
         for status in statuses:
-            found.setdefault((status.session, status.run), _Found(status, (endpoint, *outside), pid))
+            profile = profiles.get(status.run)
+            numbers = None if profile is None else profile_numbers(profile)
+            found.setdefault((status.session, status.run), _Found(status, (endpoint, *outside), pid, numbers))
     return [found[key] for key in sorted(found)]
 
 
@@ -92,7 +102,15 @@ def _session_row(session: _Found) -> dict[str, Any]:
         {"session": status.session}
         | where
         | {name: [one.model_dump() for one in rows] for name, rows in shown.items()}
+        | {"profile": session.profile}
     )
+
+
+def _profile_rows(session: _Found) -> Iterator[tuple[str, ...]]:
+    """Yield the row of a session that keeps a profile: what it takes, and who takes the most of it."""
+    if session.profile is not None and session.profile["by_taker"]:
+        taker, core_s = next(iter(session.profile["by_taker"].items()))
+        yield session.status.session, f"{session.profile['core_s_per_sim_s']:.2f}", f"{taker} ({core_s:.2f})"
 
 
 def _device_rows(status: SessionStatus) -> Iterator[tuple[str, ...]]:

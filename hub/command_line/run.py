@@ -47,6 +47,9 @@ def run(
     one_host: Annotated[
         bool, typer.Option("--one-host", help="Run every participant in the hub's process.")
     ] = False,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Show where the time goes: by participant, process and phase.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Run a scenario, and show a summary."""
@@ -54,7 +57,13 @@ def run(
     inside, outside = listening_ports(listen or ())
     with with_places(file.source):
         session = launch(
-            file, endpoint=inside, outside=outside, certificates=certs, record=record, one_host=one_host
+            file,
+            endpoint=inside,
+            outside=outside,
+            certificates=certs,
+            record=record,
+            one_host=one_host,
+            profile=profile,
         )
         with RunProgress(session.scenario) as progress:
             summary = session.run(progress)

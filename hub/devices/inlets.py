@@ -31,6 +31,8 @@ class _Inlet:
     source: str
     port: str
     codec: PortCodec
+    number: int
+    """Its place among all inlets."""
     simulated: bool = False
     max_age_ns: int = 0
     queue: deque[tuple[bytes, int, int | None]] = field(default_factory=deque[tuple[bytes, int, int | None]])
@@ -80,6 +82,7 @@ class Inlets:
                 inlet.source,
                 inlet.source_port,
                 PortCodec(source.filled_from(port)),
+                len(self._inlets),
                 simulated=device.simulated_time,
             )
             known = self._inlets.setdefault((inlet.source, inlet.source_port), new)
@@ -89,14 +92,16 @@ class Inlets:
             (planned.name, port.name): port
             for planned in plan.participants.values()
             for port in planned.ports
-            if planned.role != "device"
-            and port.causality == "input"
-            and (planned.name, port.name) not in connected
+            if planned.in_step and port.causality == "input" and (planned.name, port.name) not in connected
         }
         for (name, port_name), port in self._settable.items():
             self._inlets[name, port_name] = _Inlet(
-                name, port_name, PortCodec(port), stale=port.max_age_ns > 0
+                name, port_name, PortCodec(port), len(self._inlets), stale=port.max_age_ns > 0
             )
+        self._all = list(self._inlets.values())
+        self._aging = {inlet.number for inlet in self._all if inlet.max_age_ns}
+        self._offered: set[int] = set()
+        """The inlets with samples that have not entered yet."""
 
     def settable(self, participant: str, port: str) -> Port:
         """Return the input that `set` may write; raises MessageError if it is connected or does not exist."""
@@ -130,6 +135,7 @@ class Inlets:
                 )
             inlet.queue.append((payload, now_ns, None if stamp is None else stamp.sent_ns))
             inlet.arrived_ns = now_ns
+            self._offered.add(inlet.number)
 
     def sample(self, time_ns: int, wall_ns: int) -> list[InletSample]:
         """Return what enters at a communication point: samples that are new, and changes of staleness.
@@ -138,7 +144,8 @@ class Inlets:
         """
         entering: list[InletSample] = []
         with self._lock:
-            for inlet in self._inlets.values():
+            for number in sorted(self._offered | self._aging):
+                inlet = self._all[number]
                 now_ns = time_ns if inlet.simulated else wall_ns
                 stale = inlet.stale
                 if inlet.arrived_ns is not None:
@@ -153,6 +160,7 @@ class Inlets:
                     entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
                 inlet.queue.clear()
                 inlet.stale = stale
+            self._offered.clear()
         return entering
 
 

@@ -13,15 +13,15 @@ from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
 
-from hub.hosting.host_layout import HostLayout, OutputListener
+from hub.hosting.host_layout import HostLayout, Listeners
 from hub.hosting.hosted_participant import HostedParticipant
 from hub.participant import Outputs, Setup, Stepped
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
+from hub.transport.host_link import IDLE
 from hub.transport.port_codec import PortCodec
-from hub.transport.port_publisher import PortPublisher
-from hub.transport.reader import Reader
+from hub.transport.reader import Queue, Reader
 from hub.transport.wire import Wire
 from schemas.errors import MessageError, ParticipantError, TrocarError
 from schemas.lockstep import Ack, Grant
@@ -43,7 +43,8 @@ class Host:
         plan: The plan of the session.
         participants: The host's participants by name, not yet configured.
         wire: Carries values to and from other processes; None if there are none.
-        listener: Is called with every output value.
+        listeners: Returns what is called with every value of an output.
+        place: Of one element, where `run` notes the place of the participant that it steps; IDLE after it.
     """
 
     def __init__(
@@ -53,14 +54,14 @@ class Host:
         participants: Mapping[str, Stepped],
         *,
         wire: Wire | None = None,
-        listener: OutputListener | None = None,
+        listeners: Listeners = lambda _participant, _port: None,
+        place: memoryview[int] | None = None,
     ) -> None:
         self.name = name
         self.plan = plan
         self._step_s = plan.step_ns / 1e9
         self._wire = wire
-        self._listener = listener
-        layout = HostLayout(name, plan, participants, wire, listener)
+        layout = HostLayout(name, plan, participants, wire, listeners)
         self._hosted = layout.participants
         self._remote_cells = layout.remote_cells
         self._seldom_read = layout.seldom_read
@@ -69,8 +70,7 @@ class Host:
         """The inputs of the devices here that live in simulated time."""
         self.step = INITIAL
         """The step in which it is or was last."""
-        self._stepping: str | None = None
-        self._initial: list[tuple[PortPublisher, Any]] = []
+        self._place: memoryview[int] | list[int] = [IDLE] if place is None else place
 
     @property
     def participants(self) -> Sequence[PlannedParticipant]:
@@ -81,7 +81,8 @@ class Host:
     def awaited(self) -> str | None:
         """The participant for which `run` waits: in its step, or in another process with its value."""
         waiting = (source for (source, _), cell in self._remote_cells.items() if cell.waiting)
-        return next(waiting, self._stepping)
+        place = self._place[0]
+        return next(waiting, None if place == IDLE else self._hosted[place].name)
 
     @property
     def ended(self) -> dict[str, str]:
@@ -111,9 +112,9 @@ class Host:
 
     def publish_initial(self) -> None:
         """Publish the outputs at time 0 once more, for hosts that did not yet listen."""
-        for publisher, value in self._initial:
-            publisher.put(INITIAL, 0, value)
         for one in self._hosted:
+            for _, outputs in one.outputs:
+                outputs.put_initial_again()
             self._send_bundles(one, INITIAL, 0)
 
     def linked(self) -> bool:
@@ -139,24 +140,28 @@ class Host:
             one.hashes, one.compute_ns, one.work_j = [], [], []
         for step in range(grant.step, end):
             self.step = step
-            for one in self._hosted:
-                period = one.planned.period
+            for place, one in enumerate(self._hosted):
+                period = one.period
                 if step % period:
                     continue
+                self._place[0] = place
                 self._step(one, step, step * step_ns)
                 if step + period >= end:
                     report = one.hashes, one.compute_ns, one.work_j
                     done(one.planned, Ack(grant.run, grant.epoch, grant.step, *report))
-        self._stepping = None
+        self._place[0] = IDLE
         for cell, readers in self._seldom_read:
             cell.take_until(
                 min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers)
             )
 
     def _step(self, one: HostedParticipant, step: int, t: int) -> None:
-        name = self._stepping = one.planned.name
+        name = one.name
         for reader in one.readers:
-            self._read(one, reader, step)
+            if isinstance(reader, Reader):
+                self._read(one, reader, step)
+            elif reader.arrived:
+                _take(one, reader)
         begun = perf_counter_ns()
         try:
             outputs = one.participant.step(t, one.h_ns, one.inputs)
@@ -193,36 +198,30 @@ class Host:
         one.values[reader.port] = value
 
     def _publish(self, one: HostedParticipant, step: int, time_ns: int, returned: Outputs) -> None:
-        """Check the outputs that are due, and put them into their cells and on the wire."""
-        for stride, outputs in one.outputs.items():
-            if step > INITIAL and (step + one.planned.period) % stride:
-                continue
-            for output in outputs:
-                name = output.port.name
-                if name not in returned:
-                    cause = f"output '{name}' is missing from what step() returned"
-                    raise ParticipantError(one.planned.name, step, cause)
-                value: Any = returned[name]
-                if output.vector is not None and (
-                    value.shape != output.shape or not isfinite(value.dot(value)) or step == INITIAL
-                ):
-                    output.vector.checked(value)  # raises what is wrong, unless the numbers are only large
-                if output.cell is not None:
-                    output.cell.put(step, value)
-                if output.publisher is not None:
-                    output.publisher.put(step, time_ns, value)
-                    if step == INITIAL:
-                        kept = value if output.vector is None else value.copy()
-                        self._initial.append((output.publisher, kept))
-                if self._listener is not None:
-                    self._listener(one.planned, output.port, step, time_ns, value)
+        """Check the outputs that are due, and pass them on to readers here and elsewhere."""
+        for stride, outputs in one.outputs:
+            if step == INITIAL or not (step + one.period) % stride:
+                outputs.put(step, time_ns, returned)
         if one.bundles:
             self._send_bundles(one, step, time_ns)
 
     def _send_bundles(self, one: HostedParticipant, step: int, time_ns: int) -> None:
         if self._wire is not None:
             for bundle in one.bundles.values():
-                bundle.send(Tag.pack(self._wire.run, 0, step, time_ns))
+                if bundle.filled:
+                    bundle.send(Tag.pack(self._wire.run, 0, step, time_ns), first=step == INITIAL)
+
+    def observe(self, name: str, time_ns: int, values: Mapping[str, Any]) -> None:
+        """Step an observer from the communication point `time_ns` with `values` as its inputs.
+
+        Raises ParticipantError.
+        """
+        one = next(one for one in self._hosted if one.name == name)
+        one.values.update(values)
+        one.hashes.clear()
+        one.compute_ns.clear()
+        self.step = time_ns // self.plan.step_ns
+        self._step(one, self.step, time_ns)
 
     def drain(self) -> None:
         """Receive what has arrived from other hosts and was not read, for the listener."""
@@ -238,6 +237,12 @@ class Host:
                 log.exception("participant '%s' raised while it was closed", one.name)
         if self._wire is not None:
             self._wire.close()
+
+
+def _take(one: HostedParticipant, queue: Queue) -> None:
+    """Move what has arrived in a queue to the inputs of a participant."""
+    one.events[queue.port] = (*one.events.get(queue.port, ()), *queue.arrived)
+    queue.arrived.clear()
 
 
 def _enter(one: HostedParticipant, port: str, codec: PortCodec, payload: bytes, *, stale: bool) -> None:

@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from hub.hosting.hosted_participant import HostedParticipant, Output, hosted
+from hub.hosting.hosted_participant import HostedParticipant, hosted
+from hub.hosting.outputs import DueOutputs, Listener, Output
 from hub.participant import Stepped
-from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
 from hub.transport.bundle import Bundle, bundled
 from hub.transport.cells import INITIAL, Cell, RemoteCell
 from hub.transport.port_codec import PortCodec
-from hub.transport.reader import DeviceInputs, Reader, as_messages
+from hub.transport.reader import DeviceInputs, Queue, Reader, as_messages
 from hub.transport.wire import Wire
 from schemas.ports import Port
 
-__all__ = ["HostLayout", "OutputListener"]
+__all__ = ["HostLayout", "Listeners"]
 
-OutputListener = Callable[[PlannedParticipant, Port, int, int, Any], None]
-"""Is called with every output value: participant, port, step, time (ns) at which it is valid, value."""
+Listeners = Callable[[PlannedParticipant, Port], Listener | None]
+"""Returns what is called with every value of an output; None if nothing is."""
 
 _MANY = 32
 """Values of one port that may wait for their reader; the sender waits at some 160, a socket of Linux."""
@@ -27,8 +28,8 @@ _MANY = 32
 class HostLayout:
     """The participants of host `name`, connected as `plan` says.
 
-    The attributes are complete when it is made. `wire` carries values to and from other processes, `listener`
-    is called with every output value.
+    The attributes are complete when it is made. `wire` carries values to and from other processes,
+    `listeners` returns who listens to an output.
     """
 
     def __init__(
@@ -37,24 +38,26 @@ class HostLayout:
         plan: Plan,
         participants: Mapping[str, Stepped],
         wire: Wire | None,
-        listener: OutputListener | None,
+        listeners: Listeners,
     ) -> None:
-        self._name, self._plan, self._wire, self._listener = name, plan, wire, listener
+        self._name, self._plan, self._wire, self._listeners = name, plan, wire, listeners
         self.participants = [
             hosted(plan.participants[p], participants[p], plan.step_ns)
-            for p in plan.order
+            for p in (*plan.order, *(one.name for one in plan.observers()))
             if plan.participants[p].host == name
         ]
-        """In step order."""
+        """In step order, or observers alone."""
         self._by_name = {one.name: one for one in self.participants}
         self.remote_cells: dict[tuple[str, str], RemoteCell] = {}
         """The outputs of other hosts that are read here, by participant and port."""
+        self._outputs: dict[tuple[str, str], Output] = {}
+        by_stride = {one.name: self._add_outputs(one) for one in self.participants}
         for one in self.participants:
-            self._add_outputs(one)
+            one.readers = self._readers(one)
         for one in self.participants:
-            one.readers = self._readers(one.planned)
+            one.outputs = [(stride, DueOutputs(its, wire)) for stride, its in by_stride[one.name].items()]
         readers = {
-            planned.name: self._readers(planned)
+            planned.name: [self._reader(connection) for connection in self._feeding(planned.name)]
             for planned in plan.participants.values()
             if planned.simulated_time and planned.host == name
         }
@@ -65,8 +68,10 @@ class HostLayout:
         self.inlets = self._inlets()
         """Where a sample in a grant goes, by its source and port: participant, its port, and the codec."""
 
-    def _add_outputs(self, one: HostedParticipant) -> None:
+    def _add_outputs(self, one: HostedParticipant) -> dict[int, list[Output]]:
+        """Make the outputs of `one`, and return them by stride."""
         planned, plan = one.planned, self._plan
+        by_stride: dict[int, list[Output]] = {}
         indices = self._bundle_indices(one, self._wire) if self._wire is not None else {}
         for port in planned.ports:
             if port.causality == "input":
@@ -80,18 +85,25 @@ class HostLayout:
             publisher = None
             if self._wire is not None:
                 publisher = self._wire.publisher(
-                    planned, port, hosts, feeds=to_devices, bundles=indices.get(port.name, ())
+                    planned,
+                    port,
+                    hosts,
+                    feeds=to_devices,
+                    bundles=indices.get(port.name, ()),
+                    stride_ns=stride * plan.step_ns,
                 )
-            vector = PortCodec(port).vector
-            output = Output(
+            output = self._outputs[planned.name, port.name] = Output(
                 port,
-                vector,
-                () if vector is None else vector.neutral.shape,
+                PortCodec(port).vector,
+                stride > planned.period,
                 Cell(planned.period, stride, depth) if depth else None,
                 publisher,
+                self._listeners(planned, port),
             )
-            outputs = one.outputs.setdefault(stride, [])
+            # an observer misses steps: of each that it takes, all is published
+            outputs = by_stride.setdefault(1 if planned.observer else stride, [])
             outputs.insert(0 if hosts else len(outputs), output)  # first what another host waits for
+        return by_stride
 
     def _reading_hosts(self, source: str, port: str) -> list[str]:
         """Return the other hosts that read an output."""
@@ -112,7 +124,7 @@ class HostLayout:
             target = self._plan.participants[connection.target]
             if (connection.source, connection.source_port) != (source, port):
                 continue
-            if here and target.host != self._name:
+            if here and (target.host != self._name or self._is_direct(connection)):
                 continue
             is_event = target.port(connection.target_port).variability == "event"
             back = max(target.period // self._plan.stride(source, port), 1) if is_event else 0
@@ -120,39 +132,73 @@ class HostLayout:
         return depth
 
     def _bundle_indices(self, one: HostedParticipant, wire: Wire) -> dict[str, list[tuple[Bundle, int]]]:
-        """Make the bundles for devices; return for each output port its bundles and its index in them."""
+        """Make the bundles; return for each output port those that it goes into, and its index in them."""
         indices: dict[str, list[tuple[Bundle, int]]] = {}
         outlets = [outlet for outlet in self._plan.to_devices if outlet.source == one.name]
-        for device in dict.fromkeys(outlet.target for outlet in outlets):
-            bundle = one.bundles[device] = wire.bundle(one.name, device)
-            for index, outlet in enumerate(bundled(self._plan, one.name, device)):
+        for name in dict.fromkeys(outlet.target for outlet in outlets):
+            target = self._plan.participants[name]
+            period_ns = target.period * self._plan.step_ns if target.observer else 0
+            bundle = one.bundles[name] = wire.bundle(one.name, name, period_ns)
+            for index, outlet in enumerate(bundled(self._plan, one.name, name)):
                 indices.setdefault(outlet.source_port, []).append((bundle, index))
         return indices
 
-    def _readers(self, reading: PlannedParticipant) -> list[Reader]:
-        readers: list[Reader] = []
-        for connection in self._plan.connections:
-            if connection.target != reading.name:
+    def _feeding(self, target: str) -> list[PlannedConnection]:
+        return [connection for connection in self._plan.connections if connection.target == target]
+
+    def _ports(self, connection: PlannedConnection) -> tuple[Port, Port]:
+        participants = self._plan.participants
+        source = participants[connection.source].port(connection.source_port)
+        return source, participants[connection.target].port(connection.target_port)
+
+    def _is_direct(self, connection: PlannedConnection) -> bool:
+        """Return whether the target is to see in every step what the source has returned last.
+
+        Both are here; the source of a fresh value steps first, and that of an older one after its reader.
+        """
+        source, target = (self._by_name.get(name) for name in (connection.source, connection.target))
+        if source is None or target is None or source is target or connection.linear:
+            return False
+        output, into = self._ports(connection)
+        if into.variability == "event" and output.variability == "signal":
+            return False
+        is_first = self._plan.order.index(source.name) < self._plan.order.index(target.name)
+        if connection.fresh:
+            return is_first
+        return not is_first and target.period % source.period == 0
+
+    def _readers(self, one: HostedParticipant) -> list[Queue | Reader]:
+        """Let neighbours write to the inputs of `one` where that is enough; return what is to be read."""
+        readers: list[Queue | Reader] = []
+        for connection in self._feeding(one.name):
+            port = connection.target_port
+            if not self._is_direct(connection):
+                readers.append(self._reader(connection))
                 continue
-            source_name, source_port = connection.source, connection.source_port
-            source = self._plan.participants[source_name].port(source_port)
-            target = reading.port(connection.target_port)
-            readers.append(
-                Reader(
-                    target.name,
-                    self._cell(source_name, source_port),
-                    connection.fresh,
-                    connection.linear,
-                    as_messages(source, target),
-                    self._plan.stride(source_name, source_port) * (self._plan.step_ns / 1e9),
-                )
-            )
+            output = self._outputs[connection.source, connection.source_port]
+            if output.port.variability == "event":
+                readers.append(queue := Queue(port))
+                output.queues.append(queue)
+            else:
+                output.inputs.append((one.values, port))
         return readers
 
+    def _reader(self, connection: PlannedConnection) -> Reader:
+        source, target = self._ports(connection)
+        stride = self._plan.stride(connection.source, source.name)
+        return Reader(
+            target.name,
+            self._cell(connection.source, source.name),
+            connection.fresh,
+            connection.linear,
+            as_messages(source, target),
+            stride * (self._plan.step_ns / 1e9),
+        )
+
     def _cell(self, source: str, port: str) -> Cell:
-        if source in self._by_name:
-            outputs = self._by_name[source].outputs[self._plan.stride(source, port)]
-            return next(o.cell for o in outputs if o.port.name == port and o.cell is not None)
+        output = self._outputs.get((source, port))
+        if output is not None and output.cell is not None:
+            return output.cell
         if (source, port) not in self.remote_cells:
             if self._wire is None:
                 raise ValueError(f"'{source}' is in another process, and this host has no wire")
@@ -169,11 +215,11 @@ class HostLayout:
 
     def _remote_listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, Any], None] | None:
         """Return what calls the listener with the values of another host."""
-        listener, step_ns = self._listener, self._plan.step_ns
+        listener, step_ns = self._listeners(planned, port), self._plan.step_ns
         if listener is None:
             return None
         return lambda tag, value: listener(
-            planned, port, tag, (tag + planned.period) * step_ns if tag > INITIAL else 0, value
+            tag, (tag + planned.period) * step_ns if tag > INITIAL else 0, value
         )
 
     def _seldom_read(
@@ -186,8 +232,8 @@ class HostLayout:
         readers: dict[RemoteCell, list[tuple[int, bool]]] = {}
         for one in self.participants:
             for reader in one.readers:
-                if isinstance(reader.cell, RemoteCell):
-                    readers.setdefault(reader.cell, []).append((one.planned.period, reader.fresh))
+                if isinstance(reader, Reader) and isinstance(reader.cell, RemoteCell):
+                    readers.setdefault(reader.cell, []).append((one.period, reader.fresh))
         return [
             (cell, its)
             for cell, its in readers.items()
@@ -207,7 +253,8 @@ class HostLayout:
             entries.append((one, port.name, PortCodec(port.filled_from(source))))
             if port.variability == "signal":
                 one.stale.add(port.name)
-        connected = {(c.target, c.target_port) for c in (*plan.connections, *plan.from_devices)}
+        every = (*plan.connections, *plan.from_devices, *plan.to_devices)
+        connected = {(c.target, c.target_port) for c in every}
         for one in self.participants:
             for port in one.planned.ports:
                 if port.causality == "input" and (one.name, port.name) not in connected:

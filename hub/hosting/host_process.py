@@ -1,6 +1,6 @@
 """A process that runs one host of a session, and ends with the hub that has started it.
 
-`python -P -m hub.hosting.host_process --hub PID --connect ENDPOINT --session NAME --host NAME`
+`python -P -m hub.hosting.host_process --hub PID --connect ENDPOINT --session NAME --host NAME [--link FD FD]`
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
+from contextlib import ExitStack, closing
 
 from hub.hosting.end_with_parent import end_with_parent
 
@@ -24,17 +25,21 @@ def main() -> None:
     parser.add_argument("--hub", type=int, required=True)
     for option in ("--connect", "--session", "--host"):
         parser.add_argument(option, required=True)
+    parser.add_argument("--link", type=int, nargs=2)
     arguments = parser.parse_args()
     end_with_parent(arguments.hub)
     # what takes long to import comes after that
     from hub.hosting.joining import run_host
+    from hub.transport.host_link import HostLink
     from schemas.errors import TrocarError
 
     logging.basicConfig(
         level=logging.INFO, format=f"%(levelname)s [{arguments.host}] %(message)s", stream=sys.stderr
     )
     try:
-        run_host(arguments.connect, arguments.session, arguments.host)
+        with ExitStack() as stack:
+            link = stack.enter_context(closing(HostLink(*arguments.link))) if arguments.link else None
+            run_host(arguments.connect, arguments.session, arguments.host, link=link)
     except TrocarError as error:
         log.error("%s", error)  # the cause is in the message; the traceback was logged where it happened
         sys.exit(1)

@@ -8,10 +8,12 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Mapping
 from time import monotonic
 
 from hub.hosting.blas import pin_blas
 from hub.hosting.end_with_parent import NEEDS_INPUT
+from hub.transport.host_link import HubLink
 
 __all__ = ["HostProcesses"]
 
@@ -25,9 +27,13 @@ class HostProcesses:
     """The host processes that the hub has started.
 
     A thread waits for the end of each, so that it is known at once, on every system.
+
+    Args:
+        links: By host, its link; a host that has none answers over Zenoh.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, links: Mapping[str, HubLink] | None = None) -> None:
+        self.links = links or {}
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._waiting: dict[str, threading.Thread] = {}
         self._changed = threading.Event()
@@ -51,6 +57,10 @@ class HostProcesses:
             "--host",
             host,
         ]
+        link = self.links.get(host)
+        inherited = () if link is None else link.inherited
+        if inherited:
+            command += ["--link", *map(str, inherited)]
         environment = dict(os.environ)
         pin_blas(environment)
         process = subprocess.Popen(
@@ -59,7 +69,10 @@ class HostProcesses:
             stdout=sys.stderr.fileno(),
             env=environment,
             start_new_session=True,
+            pass_fds=inherited,
         )
+        if link is not None:
+            link.started()
         waiting = threading.Thread(target=self._wait, args=(process,), name=f"host {host}", daemon=True)
         waiting.start()
         self._waiting[host] = waiting
@@ -98,6 +111,8 @@ class HostProcesses:
                 self._waiting[host].join()
             if process.stdin is not None:
                 process.stdin.close()
+        for link in self.links.values():
+            link.close()
 
 
 def _how(code: int) -> str:

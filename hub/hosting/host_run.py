@@ -7,21 +7,24 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from time import sleep
+from typing import NoReturn
 
 import zenoh
-from zenoh.handlers import FifoChannel, Handler
 
 from hub.devices.clock_sync import ClockSync
 from hub.devices.device_thread import DeviceThread
 from hub.devices.run_info import RunInfo
 from hub.devices.uplink import DeviceUplink
 from hub.hosting.host import Host
+from hub.hosting.host_profile import HostProfile
+from hub.hosting.hub_channel import HubChannel, LinkChannel, ZenohChannel
+from hub.hosting.observing import Observing
 from hub.participant import Device, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.planning.registry import make
 from hub.transport.control_client import ask
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
-from hub.transport.envelope import signature
+from hub.transport.host_link import HostLink
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
@@ -30,7 +33,7 @@ from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
-from schemas.lockstep import Ack, Grant, pack_ack, unpack_grant
+from schemas.lockstep import Ack, Grant, unpack_grant
 from schemas.ros import StringMessage
 
 __all__ = ["HostRun"]
@@ -43,6 +46,7 @@ class HostRun:
     """The participants of this process in the run that the hub has described in its `reply`.
 
     `connect` opens another Zenoh session with the hub; relative paths of the scenario start at `directory`.
+    A host that the hub has started has a `link` to it.
     """
 
     def __init__(
@@ -52,10 +56,10 @@ class HostRun:
         reply: JoinReply,
         directory: Path,
         connect: Callable[[], zenoh.Session],
+        link: HostLink | None = None,
     ) -> None:
         self._session, self._request, self._directory = session, request, directory
         self._keys, self._run, self._step_ns = Keys(reply.session), reply.run, reply.plan.step_ns
-        self._ack_key = bytes.fromhex(reply.ack_key)
         self._next_step = 0
         self._ended: set[str] = set()
         plan, host, keys = reply.plan, request.host, self._keys
@@ -71,25 +75,34 @@ class HostRun:
         spin = may_spin(len(plan.hosts()))
         wire = Wire(session, keys, reply.run, self._refusals, host, spin=spin, watched=reply.watched)
         stepped = {name: p for name, p in made.items() if isinstance(p, Stepped)}
-        self._host = Host(host, plan, stepped, wire=wire)
-        self._acks = {
-            planned.name: session.declare_publisher(
-                keys.ack(planned.name),
-                encoding=zenoh.Encoding.APPLICATION_CDR,
-                congestion_control=zenoh.CongestionControl.BLOCK,
-                priority=zenoh.Priority.REAL_TIME,
-                express=True,
-            )
-            for planned in self._host.participants
-        }
-        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256)) if self._acks else None
+        self._profile = HostProfile(session, keys, host, plan, reply.run) if reply.profile else None
+        if self._profile is not None:
+            self._profile.process.prepare(stepped, wire)
+        self._host = Host(host, plan, stepped, wire=wire, place=None if link is None else link.place)
+        self._hub = self._channel(bytes.fromhex(reply.ack_key), link)
         self._stack = ExitStack()
+        if self._profile is not None:
+            self._stack.callback(self._profile.undeclare)
+            self._profile.attach(self._host, self._acknowledge)
         devices = {name: device for name, device in made.items() if isinstance(device, Device)}
         self._threads = self._attach_devices(reply, devices, connect)
+        self._observing: Observing | None = None
+        if any(planned.observer for planned in mine.values()):
+            self._observing = Observing(self._host, session, keys, reply.run, self._refusals)
+            self._stack.callback(self._observing.close)
         self._tokens = [
             session.liveliness().declare_token(keys.alive(planned.key_role, name))
             for name, planned in mine.items()
         ]
+
+    def _channel(self, ack_key: bytes, link: HostLink | None) -> HubChannel | None:
+        """Return what brings grants and takes acks; None for devices alone."""
+        names = [planned.name for planned in self._host.participants if planned.in_step]
+        if not names:
+            return None
+        if link is not None:
+            return LinkChannel(link, names, self._check)
+        return ZenohChannel(self._session, self._keys, names, ack_key, self._refusals, self._check)
 
     def _attach_devices(
         self, reply: JoinReply, devices: Mapping[str, Device], connect: Callable[[], zenoh.Session]
@@ -112,7 +125,7 @@ class HostRun:
         return threads
 
     def serve(self) -> None:
-        """Configure, report ready, and step as the hub grants until the process is interrupted."""
+        """Configure, report ready, and step as the hub grants, or look on, until interrupted."""
         try:
             bonds = self._host.configure(self._directory)
             for thread in self._threads:
@@ -120,21 +133,37 @@ class HostRun:
         except ParticipantError as error:
             self._report_failure(error.participant, error.cause)
             raise
-        self._send_to_hub(self._request.model_copy(update={"ready": True, "bonds": bonds}))
-        if self._grants is None:  # devices alone, which live in threads of their own
+        ready = self._request.model_copy(update={"ready": True, "bonds": bonds})
+        self._send_to_hub(ready)
+        if self._observing is not None:
+            self._observe(self._observing, ready)
+        if self._hub is None:  # devices alone, which live in threads of their own
             while True:
                 sleep(_IDLE_S)
-        grant = self._first_grant(self._grants)
+        self._step_as_granted(self._hub)
+
+    def _step_as_granted(self, hub: HubChannel) -> None:
+        done = partial(self._acknowledge, hub)
+        grant = self._first_grant(hub)
         while True:
             try:
-                self._host.run(grant, self._acknowledge)
+                self._host.run(grant, done)
             except ParticipantError as error:
-                failed = Ack(self._run, 0, error.step, (), (), (), error.cause)
-                self._send_ack(error.participant, failed)
+                hub.acknowledge(error.participant, Ack(self._run, 0, error.step, (), (), (), error.cause))
+                hub.flush()
                 raise
-            grant = self._next_grant(self._grants)
+            hub.flush()
+            grant = self._next_grant(hub)
 
-    def _first_grant(self, grants: zenoh.Subscriber[Handler[zenoh.Sample]]) -> Grant:
+    def _observe(self, observing: Observing, ready: JoinRequest) -> NoReturn:
+        """Look until the process is interrupted, and report when the state at time 0 was seen."""
+        try:
+            observing.serve(lambda: self._send_to_hub(ready.model_copy(update={"watching": True})))
+        except ParticipantError as error:
+            self._report_failure(error.participant, error.cause)
+            raise
+
+    def _first_grant(self, hub: HubChannel) -> Grant:
         """Repeat the values at time 0 until every connection has carried its own and a grant has arrived."""
         ready = False
         while True:
@@ -142,51 +171,42 @@ class HostRun:
             if not ready and self._host.linked():
                 ready = True
                 for planned in self._host.participants:
-                    self._acknowledge(planned, Ack(self._run, 0, -1, (), (), ()))
-            if ready and (sample := grants.try_recv()) is not None:
-                grant = self._accept(sample)
-                if grant is not None:
-                    return grant
+                    hub.acknowledge(planned.name, Ack(self._run, 0, -1, (), (), ()))
+                hub.flush()
+            if ready and (grant := hub.grant(wait=False)) is not None:
+                return grant
             sleep(_PRIME_S)
 
-    def _next_grant(self, grants: zenoh.Subscriber[Handler[zenoh.Sample]]) -> Grant:
+    def _next_grant(self, hub: HubChannel) -> Grant:
         while True:
-            grant = self._accept(grants.recv())
+            grant = hub.grant(wait=True)
             if grant is not None:
                 return grant
 
-    def _accept(self, sample: zenoh.Sample) -> Grant | None:
-        """Return the grant in `sample`; refuse it and return None if it is not the next one of this run."""
-        try:
-            grant = unpack_grant(sample.payload.to_bytes())
-            if grant.run != self._run:
-                raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
-            if (
-                grant.step != self._next_step
-                or grant.start_ns != grant.step * self._step_ns
-                or grant.horizon_ns <= grant.start_ns
-            ):
-                raise MessageError(
-                    f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step"
-                    f" {self._next_step} is next"
-                )
-        except MessageError as error:
-            self._refusals.refuse_sample(sample, error)
-            return None
+    def _check(self, payload: bytes) -> Grant:
+        """Return the grant in `payload`; raises MessageError if it is not the next one of this run."""
+        grant = unpack_grant(payload)
+        if grant.run != self._run:
+            raise MessageError(f"belongs to run {grant.run:x}, this is run {self._run:x}")
+        if (
+            grant.step != self._next_step
+            or grant.start_ns != grant.step * self._step_ns
+            or grant.horizon_ns <= grant.start_ns
+        ):
+            raise MessageError(
+                f"grants step {grant.step} at {grant.start_ns} to {grant.horizon_ns} ns, when step"
+                f" {self._next_step} is next"
+            )
         self._next_step = grant.horizon_ns // self._step_ns
         return grant
 
-    def _acknowledge(self, planned: PlannedParticipant, ack: Ack) -> None:
+    def _acknowledge(self, hub: HubChannel, planned: PlannedParticipant, ack: Ack) -> None:
         reason = self._host.ended.get(planned.name)
         if reason and planned.name not in self._ended:
             self._ended.add(planned.name)
             # before the ack: the hub gives no grant after it
             self._send_to_hub(self._request.model_copy(update={"ended": f"{planned.name}: {reason}"}))
-        self._send_ack(planned.name, ack)
-
-    def _send_ack(self, name: str, ack: Ack) -> None:
-        payload = pack_ack(ack)
-        self._acks[name].put(payload, attachment=signature(payload, self._ack_key))
+        hub.acknowledge(planned.name, ack)
 
     def _report_failure(self, name: str, cause: str) -> None:
         self._send_to_hub(self._request.model_copy(update={"failed": f"{name}: {cause}"}))

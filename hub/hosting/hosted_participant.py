@@ -7,31 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from hub.hosting.outputs import DueOutputs
 from hub.participant import Inputs, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
-from hub.transport.cells import Cell
 from hub.transport.port_codec import PortCodec
-from hub.transport.port_publisher import PortPublisher
-from hub.transport.reader import Reader
+from hub.transport.reader import Queue, Reader
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.vectors import Vector, VectorCodec
+from schemas.vectors import Vector
 
-__all__ = ["HostedParticipant", "Output", "hosted"]
-
-
-@dataclass(slots=True)
-class Output:
-    """An output port and everywhere its value goes."""
-
-    port: Port
-    vector: VectorCodec | None
-    shape: tuple[int, ...]
-    cell: Cell | None
-    """For readers in this process."""
-    publisher: PortPublisher | None
-    """For readers in other processes."""
+__all__ = ["HostedParticipant", "hosted"]
 
 
 @dataclass(slots=True)
@@ -40,6 +26,9 @@ class HostedParticipant:
 
     participant: Stepped
     planned: PlannedParticipant
+    name: str
+    period: int
+    """In communication steps."""
     h_ns: int
     """Its step."""
     inputs: Inputs
@@ -50,20 +39,16 @@ class HostedParticipant:
     stale: set[str]
     work_ports: tuple[str, ...]
     """The outputs that hold the work of its bonds."""
-    readers: list[Reader] = field(default_factory=list[Reader])
-    outputs: dict[int, list[Output]] = field(default_factory=dict[int, list[Output]])
-    """By stride, so that a step looks only at those that are due."""
+    readers: list[Queue | Reader] = field(default_factory=list[Queue | Reader])
+    """Those of its inputs that no neighbour sets, in the order of the connections."""
+    outputs: list[tuple[int, DueOutputs]] = field(default_factory=list[tuple[int, DueOutputs]])
+    """With their stride, so that a step looks only at those that are due."""
     bundles: dict[str, Bundle] = field(default_factory=dict[str, Bundle])
-    """By the device that they are for."""
+    """By the device or observer that they are for."""
     hashes: list[int] = field(default_factory=list[int])
     """Of its steps in the present grant, as are `compute_ns` and `work_j`."""
     compute_ns: list[int] = field(default_factory=list[int])
     work_j: list[float] = field(default_factory=list[float])
-
-    @property
-    def name(self) -> str:
-        """The participant's name."""
-        return self.planned.name
 
 
 def hosted(planned: PlannedParticipant, participant: Stepped, step_ns: int) -> HostedParticipant:
@@ -79,6 +64,8 @@ def hosted(planned: PlannedParticipant, participant: Stepped, step_ns: int) -> H
     return HostedParticipant(
         participant,
         planned,
+        planned.name,
+        planned.period,
         planned.period * step_ns,
         Inputs(values, rates=rates, events=events, stale=stale),
         values,

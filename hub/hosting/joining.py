@@ -22,6 +22,7 @@ from hub.remote.device_host import DeviceHost
 from hub.remote.hub_connection import reach
 from hub.transport.control_client import join_session
 from hub.transport.control_messages import JoinRequest
+from hub.transport.host_link import HostLink
 from schemas.keys import Keys
 
 __all__ = ["run_device", "run_host"]
@@ -39,6 +40,7 @@ def run_host(
     *,
     directory: Path | None = None,
     certificates: Path | None = None,
+    link: HostLink | None = None,
 ) -> None:
     """Join a session and run one of its hosts until the hub ends.
 
@@ -48,6 +50,7 @@ def run_host(
         host: The host; a participant with `host: remote` is a host of its own, `remote/<participant>`.
         directory: Where relative paths of the scenario start, by default where the hub has them.
         certificates: As for `hub.remote.hub_connection.reach`.
+        link: To the hub, if it has started this process with one.
 
     Raises ConnectError if there is no such hub, and ParticipantError if a participant of this host fails.
     """
@@ -56,7 +59,7 @@ def run_host(
     with connect(mode="peer") as session:
         reply = join_session(session, Keys(session_name), request)
         with _ending_with_hub(session, Keys(reply.session)):
-            run = HostRun(session, request, reply, directory or Path(reply.directory), connect)
+            run = HostRun(session, request, reply, directory or Path(reply.directory), connect, link)
             try:
                 run.serve()
             finally:

@@ -13,8 +13,8 @@ __all__ = ["allow_open_files"]
 _OF_ANY = 32
 """Python, Zenoh and the engines of one host; 25 were measured in the host of the cameras."""
 
-_OF_A_HOST = 2
-"""The connection with another host, and the pipes with which its process is started."""
+_OF_A_HOST = 6
+"""The connection with another host, the pipes with which its process is started, and the link to it."""
 
 
 def allow_open_files(plan: Plan) -> None:

@@ -24,12 +24,14 @@ _STOPPED_NS = 1_000_000_000
 class Watchdog:
     """Checks processes and answers in a thread of its own, until the first failure.
 
+    The end of a process of observers is reported once, and others are watched on.
+
     Args:
         plan: The plan of the session.
         processes: The processes to watch.
         answer_limit_ns: How long a participant may take to answer.
         awaited: Returns the participant for which this process waits, if it is known.
-        failed: Is called once, with a participant's name and the cause.
+        failed: Is called with a participant's name and the cause: once, and for each observer that ends.
     """
 
     def __init__(
@@ -45,6 +47,8 @@ class Watchdog:
         self._waiting: Sequence[str] = ()
         self._since_ns = 0
         self._ending = False
+        self._lost: set[str] = set()
+        """The hosts of observers that have ended."""
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         self._thread.start()
 
@@ -77,17 +81,24 @@ class Watchdog:
                 return
 
     def _ended_process(self) -> tuple[str, str] | None:
-        """Return a participant whose process has ended, and how."""
+        """Return a participant whose process has ended, and how; report observers here."""
         for host, how in self._processes.dead().items():
+            if host in self._lost:
+                continue
             names = [name for name in self._plan.participants if self._plan.participants[name].host == host]
-            missing = [name for name in self._waiting if name in names] or names
+            if self._plan.participants[names[0]].observer:  # it shares its process with observers alone
+                self._lost.add(host)
+                for name in names:
+                    self._failed(name, how)
+                continue
+            missing = [name for name in self._unanswered() if name in names] or names
             others = ", ".join(name for name in names if name != missing[0])
             return missing[0], f"{how} (host '{host}' also ran {others})" if others else how
         return None
 
     def _late_answer(self) -> tuple[str, str] | None:
         """Return a participant that has not answered in time, and the cause."""
-        since_ns, waiting = self._since_ns, tuple(self._waiting)
+        since_ns, waiting = self._since_ns, self._unanswered()
         if not waiting or monotonic_ns() - since_ns <= self._limit_ns:
             return None
         first, *others = waiting
@@ -96,6 +107,11 @@ class Watchdog:
         if awaited is None and others:
             cause += f"; nor have {', '.join(others)}, which may wait for it"
         return awaited or first, cause
+
+    def _unanswered(self) -> list[str]:
+        """Return the participants that are awaited, without those that a host with a link has stepped."""
+        passed = {name for link in self._processes.links.values() for name in link.passed}
+        return [name for name in tuple(self._waiting) if name not in passed]
 
     def end(self) -> None:
         """Stop watching."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,14 @@ from schemas.errors import MessageError
 from schemas.keys import Keys, topic
 from schemas.lockstep import Ack, Grant, pack_ack
 from schemas.ports import Port
-from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, InletSample, SessionStatus
+from schemas.trocar_msgs import (
+    AckMessage,
+    CouplingEnergy,
+    GrantMessage,
+    InletSample,
+    Profile,
+    SessionStatus,
+)
 
 __all__ = ["Observers"]
 
@@ -37,6 +45,8 @@ class _Watched:
     channel: int
     newest: tuple[int, int] = (INITIAL - 1, 0)
     """Step and place in its batch of the last value."""
+    complete: int = INITIAL - 1
+    """The last step of which all values have arrived."""
 
 
 class Observers:
@@ -54,6 +64,8 @@ class Observers:
         self._recorder = recorder
         self._watched: dict[str, _Watched] = {}
         self._channels: dict[str, int] = {}
+        self._values: list[tuple[int, int, bytes]] = []
+        """Values of this process that are not yet given to the recorder: channel, time (ns), and bytes."""
         self._next_energy_ns = 0
         for planned in plan.participants.values():
             for port in planned.ports:
@@ -69,11 +81,6 @@ class Observers:
         if key not in self._channels:
             self._channels[key] = self._recorder.channel(topic(key), type_name)
         return self._channels[key]
-
-    @property
-    def watches_values(self) -> bool:
-        """Whether any observer uses output values."""
-        return self._recorder is not None or bool(self.measures.by_port)
 
     @property
     def away(self) -> dict[str, tuple[str, str]]:
@@ -101,19 +108,49 @@ class Observers:
         return "hub" in readers and has_lane(port, watched.planned.host, "hub")
 
     def linked(self) -> bool:
-        """Return whether the value at time 0 of every watched output of another process was received."""
-        return all(self._watched[key].newest >= (INITIAL, 0) for key in self.away)
+        """Return whether the value at time 0 of every watched output of another process was received.
 
-    def value(self, planned: PlannedParticipant, port: Port, step: int, time_ns: int, value: Any) -> None:
-        """Receive an output value of a participant in this process, or one from a lane."""
-        items = value if port.variability == "event" else (value,)
-        if (planned.name, port.name) in self.measures.by_port and step > INITIAL:
-            for item in items:
-                self.measures.take(planned.name, port.name, item, time_ns)
-        if self._recorder is not None:
-            watched = self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
-            for item in items:
-                self._recorder.write(watched.channel, time_ns, watched.codec.encode(item, time_ns))
+        Those of participants that only look may come later.
+        """
+        return all(
+            self._watched[key].newest >= (INITIAL, 0)
+            for key in self.away
+            if self._watched[key].planned.in_step
+        )
+
+    def listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, int, Any], None] | None:
+        """Return what receives an output of a participant in this process, or one from a lane.
+
+        It is called with step, time (ns) at which the value is valid, and value. None: nothing receives it.
+        """
+        recorder, is_measured = self._recorder, (planned.name, port.name) in self.measures.by_port
+        if recorder is None and not is_measured:
+            return None
+        watched = self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
+
+        def receive(step: int, time_ns: int, value: Any) -> None:
+            for item in value if watched.codec.is_event else (value,):
+                if is_measured and step > INITIAL:
+                    self.measures.take(planned.name, port.name, item, time_ns)
+                if recorder is not None:
+                    self._values.append((watched.channel, time_ns, watched.codec.encode(item, time_ns)))
+
+        return receive
+
+    def received(self, end: int) -> bool:
+        """Return whether all values of the steps before `end` have arrived from other processes.
+
+        A host with a link may acknowledge a step before Zenoh has delivered its values.
+        """
+        watched = (self._watched[key] for key in self.away)
+        return all(one.complete >= self._last_due(one, end) for one in watched if one.planned.in_step)
+
+    def _last_due(self, watched: _Watched, end: int) -> int:
+        """Return the last step before `end` in which a watched output is published."""
+        period = watched.planned.period
+        stride = self._plan.stride(watched.planned.name, watched.port.name)
+        steps = range((end - 1) // period * period, -1, -period)
+        return next((step for step in steps if (step + period) % stride == 0), INITIAL)
 
     def sample(self, sample: zenoh.Sample) -> None:
         """Receive an output value of a participant in another process, from the wire."""
@@ -125,7 +162,7 @@ class Observers:
             if (tag.step, tag.index) <= watched.newest:
                 return
             if not tag.count:
-                watched.newest = (tag.step, 0)
+                watched.newest, watched.complete = (tag.step, 0), tag.step
                 return
             payload = sample.payload.to_bytes()
             value = watched.codec.decode(payload)
@@ -133,6 +170,8 @@ class Observers:
             self.refusals.refuse_sample(sample, error)
             return
         watched.newest = (tag.step, tag.index)
+        if tag.index + 1 == tag.count:
+            watched.complete = tag.step
         if tag.step > INITIAL:
             self.measures.take(watched.planned.name, watched.port.name, value, tag.time_ns)
         if self._recorder is not None:
@@ -177,7 +216,10 @@ class Observers:
             self._recorder.write(channel, time_ns, pack_ack(ack) if payload is None else payload)
 
     def books(self, time_ns: int) -> list[CouplingEnergy]:
-        """Return (and record) the energy books when they are due."""
+        """Record the values so far, and return (and record) the energy books when they are due."""
+        if self._recorder is not None and self._values:
+            self._recorder.write_all(self._values)
+            self._values = []
         if time_ns < self._next_energy_ns:
             return []
         self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
@@ -194,4 +236,11 @@ class Observers:
         if self._recorder is not None:
             self._recorder.write(
                 self._channel(self._keys.status, status.ros_type), status.sim_time_ns, encode(status)
+            )
+
+    def profile(self, profile: Profile) -> None:
+        """Record a profile of the session."""
+        if self._recorder is not None:
+            self._recorder.write(
+                self._channel(self._keys.profile, profile.ros_type), profile.sim_time_ns, encode(profile)
             )

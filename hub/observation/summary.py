@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-__all__ = ["Progress", "Summary"]
+__all__ = ["Observed", "Progress", "Summary"]
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,22 @@ class Progress:
     late_steps: int
     live: Mapping[str, tuple[float, str]]
     """Current value and unit of each measure that is shown live and has a value yet."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What one observer, such as a camera in real time, has seen of a run."""
+
+    states: int
+    """That it saw; a camera has drawn a picture of each."""
+    dropped: int
+    """States at its period that it did not see, because it was still busy."""
+    rate: float
+    """States per second of wall time that it saw."""
+    attainable_rate: float
+    """States per second that it could have seen, by the time that one took on this machine."""
+    lost: str | None
+    """Why it did not see the end; None if it did."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +64,16 @@ class Summary:
     latency: dict[str, dict[str, dict[str, float]]] = field(
         default_factory=dict[str, dict[str, dict[str, float]]]
     )
-    """By way (`device to grant`, `grant to state`, `state to force`) and stream: count, p50_s, p99_s,
-    largest_s. In the device's clock: one that follows simulated time has simulated latencies.
+    """By way (`device to grant`, `grant to state`, `state to force`, `state to picture`) and stream: count,
+    p50_s, p99_s, largest_s. In the device's clock: one that follows simulated time has simulated latencies.
     """
+    observers: dict[str, Observed] = field(default_factory=dict[str, Observed])
+    """By name, the participants that looked on in their own time."""
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
     ending: str | None = None
     """Which participant has ended the session, at what simulated time and why; None if none has."""
+    profile: dict[str, Any] | None = None
+    """Where the time went, if that was asked for (`hub/recording/profiles.py`)."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the summary as a flat mapping, with the measures beside the rest."""

@@ -34,6 +34,7 @@ class ForceSide:
     def __init__(self, bond: BondSide, plan: BondPlan) -> None:
         self._position, self._velocity, self.force_port = (port.name for port in bond_ports(bond))
         self._plan = plan
+        self._is_sloped = plan.prediction == "slope"
         self._size = bond.size
         self._linear = bond.linear
         self.work_port = f"{bond.name}/work"
@@ -56,7 +57,7 @@ class ForceSide:
         if self._started:
             jump = x - self.position(self._duration)
             self._work[0] += float(self._spring @ jump + 0.5 * self._stiffness * (jump @ jump))
-            if self._plan.prediction == "slope":
+            if self._is_sloped:
                 self._a = (v - self._v_before) / h
         self._x, self._v, self._v_before = x.copy(), v.copy(), v.copy()
         self._duration = h
@@ -68,11 +69,12 @@ class ForceSide:
         """Return the predicted position (m), shape (linear,), `tau` seconds into the step."""
         if self._plan.prediction == "hold":
             return self._x
-        return self._x + tau * (self._v[: self._linear] + 0.5 * tau * self._a[: self._linear])
+        v = self._v[: self._linear]
+        return self._x + tau * (v + 0.5 * tau * self._a[: self._linear] if self._is_sloped else v)
 
     def velocity(self, tau: float) -> Vector:
         """Return the predicted twist (m/s, rad/s), shape (size,), `tau` seconds into the step."""
-        return self._v + tau * self._a
+        return self._v + tau * self._a if self._is_sloped else self._v
 
     def add(self, spring: Vector, damper: Vector, tau: float, dt: float) -> None:
         """Add the forces of a sub-step of `dt` seconds around `tau`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import KeysView
 from typing import Any, cast
 
 from schemas.errors import SessionError, did_you_mean
@@ -71,6 +72,11 @@ class Inputs:
     def events(self, port: str) -> tuple[Message, ...]:
         """Return the messages that arrived on an event port since the last step, oldest first."""
         return self._events.get(port, ())
+
+    @property
+    def event_ports(self) -> KeysView[str]:
+        """The event ports that have a message in this step; a step must not depend on their order."""
+        return self._events.keys()
 
     @property
     def quiet(self) -> bool:

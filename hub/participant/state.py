@@ -24,7 +24,7 @@ from typing import ClassVar, TypeVar, cast
 import numpy as np
 
 from schemas.errors import StateError
-from schemas.vectors import Vector
+from schemas.vectors import Vector, joined
 
 __all__ = [
     "Record",
@@ -51,10 +51,7 @@ def state_hash(*parts: bytes | Vector) -> int:
     Examples:
         state_hash(self.position, self.velocity, b"grasped")
     """
-    digest = hashlib.blake2b(digest_size=8)
-    for part in parts:
-        digest.update(part if isinstance(part, bytes) else part.tobytes())
-    return int.from_bytes(digest.digest(), "little")
+    return int.from_bytes(hashlib.blake2b(joined(parts), digest_size=8).digest(), "little")
 
 
 def restore_arrays(participant: str, arrays: Iterable[Vector], state: bytes) -> None:

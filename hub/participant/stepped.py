@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from hub.participant.base import Outputs, Participant
 from hub.participant.inputs import Inputs
@@ -77,6 +78,14 @@ class Stepped(Participant):
                 pass
 
     Equal inputs must give equal bits: a step reads no clock and draws no random number without a seed.
+    """
+
+    observer: ClassVar[bool] = False
+    """The kind only looks, as a camera does: none of its outputs is part of the simulated world.
+
+    In pace `realtime` such a participant lives in its own time, unless one in simulated time reads it: it is
+    stepped with the newest inputs, `t` being theirs, may miss any but the first, and the session does not
+    wait for it.
     """
 
     @property

@@ -61,7 +61,7 @@ class Connections:
             self.from_devices.append(ConnectionFromDevice(**ends, max_age_ns=age))
         elif receiver.simulated_time:
             self.stepped.append(PlannedConnection(**ends, fresh=False, linear=False))
-        elif receiver.role == "device":
+        elif receiver.role == "device" or receiver.observer:
             self.to_devices.append(ConnectionToDevice(**ends))
         else:
             fresh = reads_this_step(self._scenario, self._rank, one.participant, other.participant)

@@ -45,6 +45,10 @@ class PlannedParticipant(_Part):
     """For a device: the emulated network between it and the hub."""
     rate_limit: float = 2000.0
     """For a device: messages per second that are accepted on each of its ports."""
+    observer: bool = False
+    """It only looks, in its own time: it is not in the order, and the session never waits for it."""
+    lock_step: str = ""
+    """Why one that only looks is in lock-step nevertheless, in words; empty for all others."""
     ports: tuple[Port, ...]
     bonds: tuple[BondSide, ...] = ()
     bond_plans: dict[str, BondPlan] = {}
@@ -57,6 +61,11 @@ class PlannedParticipant(_Part):
     def simulated_time(self) -> bool:
         """Whether this is a device that lives in simulated time; any other device lives in wall time."""
         return self.role == "device" and has_simulated_time(self.ports)
+
+    @property
+    def in_step(self) -> bool:
+        """Whether this is an engine or a controller in lock-step: all but devices and observers."""
+        return self.role != "device" and not self.observer
 
     @property
     def key_role(self) -> str:
@@ -88,7 +97,7 @@ class ConnectionFromDevice(_Part):
 
 
 class ConnectionToDevice(_Part):
-    """A connection from a stepped participant to a device in wall time."""
+    """A connection from a stepped participant to a device in wall time, or to an observer."""
 
     source: str
     source_port: str
@@ -109,7 +118,7 @@ class Plan(_Part):
 
     step_ns: int = Field(gt=0)
     order: tuple[str, ...]
-    """The stepped participants in the order in which they step."""
+    """The participants in lock-step, in the order in which they step."""
     participants: dict[str, PlannedParticipant]
     connections: tuple[PlannedConnection, ...]
     from_devices: tuple[ConnectionFromDevice, ...]
@@ -129,7 +138,9 @@ class Plan(_Part):
         """Return what in a plan of unknown origin refers to something that it lacks; empty if nothing."""
         if any(name != planned.name for name, planned in self.participants.items()):
             return "a participant has two names"
-        if sorted(self.order) != sorted(n for n, p in self.participants.items() if p.role != "device"):
+        if sorted(self.order) != sorted(
+            name for name, planned in self.participants.items() if planned.in_step
+        ):
             return "its order is not that of its engines and controllers"
         ports = {(name, port.name) for name, planned in self.participants.items() for port in planned.ports}
         for one in (*self.connections, *self.from_devices, *self.to_devices):
@@ -139,6 +150,10 @@ class Plan(_Part):
             if not {one.bond.motion.participant, one.bond.force.participant} <= self.participants.keys():
                 return "a bond has a side without a participant"
         return ""
+
+    def observers(self) -> tuple[PlannedParticipant, ...]:
+        """Return the participants that only look, in their own time."""
+        return tuple(planned for planned in self.participants.values() if planned.observer)
 
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""

@@ -76,7 +76,7 @@ def located(error: ScenarioError, source: Source) -> ScenarioError:
 
 def _find(name_or_path: str) -> Path:
     path = Path(name_or_path)
-    if path.suffix in {".yaml", ".yml"} or len(path.parts) > 1:
+    if path.suffix or len(path.parts) > 1:
         try:
             is_file = path.is_file()
         except (OSError, ValueError) as error:  # too long, or with a character that no path has

@@ -38,14 +38,14 @@ def step_order(
     participants: Mapping[str, PlannedParticipant],
     connections: Sequence[PlannedConnection],
 ) -> tuple[str, ...]:
-    """Return the stepped participants in an order in which every fresh connection leads forward.
+    """Return the participants in lock-step in an order in which every fresh connection leads forward.
 
     Where the connections leave a choice, the scenario's `order` decides, then the order of its participants.
     Raises ScenarioError if fresh connections form a cycle.
     """
     rank = {name: index for index, name in enumerate(scenario.order or ())}
     stepped = sorted(
-        (name for name, planned in participants.items() if planned.role != "device"),
+        (name for name, planned in participants.items() if planned.in_step),
         key=lambda name: rank.get(name, len(rank)),
     )
     place = {name: index for index, name in enumerate(stepped)}

@@ -9,6 +9,7 @@ from hub.participant import Device, Stepped
 from hub.planning.bonds import plan_bond
 from hub.planning.connections import Connections
 from hub.planning.measured import check_measures
+from hub.planning.observers import with_observers
 from hub.planning.participants import plan_participant
 from hub.planning.plan import Plan, PlannedBond
 from hub.planning.registry import Role
@@ -36,11 +37,16 @@ def make_plan(
         for name in scenario.participants
     }
     check_order(scenario, planned)
-    connections = Connections(scenario, planned)
     ports = {name: one.ports for name, one in planned.items()}
-    for index, connection in enumerate(scenario.connections):
-        for single in expand(connection, ports, ("connections", index)):
-            connections.connect(single, ("connections", index))
+    singles = [
+        (single, ("connections", index))
+        for index, connection in enumerate(scenario.connections)
+        for single in expand(connection, ports, ("connections", index))
+    ]
+    planned = with_observers(scenario, participants, planned, [single for single, _ in singles])
+    connections = Connections(scenario, planned)
+    for single, path in singles:
+        connections.connect(single, path)
     for index, bond in enumerate(bonds):
         connections.couple(index, bond)
     connections.check_inputs()

@@ -107,13 +107,18 @@ class Recorder:
 
     def write(self, channel: int, time_ns: int, payload: bytes) -> None:
         """Queue one message. Never waits for the disk; may be called from any thread."""
+        self.write_all([(channel, time_ns, payload)])
+
+    def write_all(self, messages: Sequence[tuple[int, int, bytes]]) -> None:
+        """Queue messages, each (channel, time in ns, payload), all or none of them, as `write` does one."""
+        size = sum(MESSAGE_HEADER_BYTES + len(payload) for _, _, payload in messages)
         with self._lock:
             before = self._queued_bytes
             if self._refusing or before > MAX_QUEUED_BYTES or len(self._queue) >= MAX_QUEUED_MESSAGES:
-                self._drop()
+                self._drop(len(messages))
                 return
-            self._queue.append((channel, time_ns, payload))
-            self._queued_bytes = after = before + MESSAGE_HEADER_BYTES + len(payload)
+            self._queue += messages
+            self._queued_bytes = after = before + size
         if before < CHUNK_BYTES <= after:
             self._wake.set()
 
@@ -181,9 +186,9 @@ class Recorder:
                 ),
             )
 
-    def _drop(self) -> None:
-        self._dropped += 1
-        if self._dropped == 1 and not self._error:
+    def _drop(self, count: int) -> None:
+        self._dropped += count
+        if self._dropped == count and not self._error:
             why = "it is closed" if self._closing else f"{len(self._queue)} messages wait for the disk"
             _log.error(
                 "recorder of '%s' drops messages, because %s: the recording is incomplete",

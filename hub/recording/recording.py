@@ -26,7 +26,7 @@ from schemas.keys import Keys, topic
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, SessionStatus
+from schemas.trocar_msgs import AckMessage, CouplingEnergy, GrantMessage, Profile, SessionStatus
 
 __all__ = ["ENERGY_PREFIX", "GRANT_TOPIC", "STATUS_TOPIC", "Recording"]
 
@@ -38,6 +38,7 @@ M = TypeVar("M", bound=Message)
 _KEYS = Keys("any")
 GRANT_TOPIC = topic(_KEYS.grant)
 STATUS_TOPIC = topic(_KEYS.status)
+_PROFILE_TOPIC = topic(_KEYS.profile)
 ENERGY_PREFIX = topic(_KEYS.energy(""))
 
 
@@ -219,6 +220,11 @@ class Recording(Bag):
     def statuses(self) -> Iterator[tuple[int, SessionStatus]]:
         """Yield the status that the session published, with the simulated time (ns)."""
         return self._decoded(STATUS_TOPIC, SessionStatus)
+
+    def profile(self) -> Profile | None:
+        """Return where the time of the whole run went; None if that was not measured."""
+        profiles = [profile for _, profile in self._decoded(_PROFILE_TOPIC, Profile)]
+        return profiles[-1] if profiles else None
 
     def _decoded(self, topic_name: str, model: type[M]) -> Iterator[tuple[int, M]]:
         if topic_name not in self.topics:

@@ -10,6 +10,7 @@ from string import Template
 
 import numpy as np
 
+from hub.recording.profiles import profile_numbers, profile_tables
 from hub.recording.recording import Recording
 from hub.recording.report_figures import (
     BondTrace,
@@ -47,6 +48,7 @@ def report(recording: Recording, output: Path) -> None:
         numbers=_numbers(recording, scenario, statuses[-1][1] if statuses else None, traces, books),
         bonds=_sections(_bond_figures(traces, books)),
         steps=_sections(_step_figures(recording, scenario, statuses)),
+        profile=_profile(recording),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
         versions=_table(("package", "version"), sorted(recording.versions().items())),
@@ -148,6 +150,15 @@ def _numbers(
         ("recording", f"{recording.file.stat().st_size / 1e6:.1f} MB"),
     ]
     return "\n".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in rows)
+
+
+def _profile(recording: Recording) -> str:
+    """Return the section about where the time went; empty if no profile was recorded."""
+    profile = recording.profile()
+    if profile is None:
+        return ""
+    tables = "\n".join(_table(heads, rows) for heads, rows in profile_tables(profile_numbers(profile)))
+    return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
 
 
 def _ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:

@@ -5,11 +5,14 @@ Their contents are untrusted: damaged bytes raise RecordingError, or are returne
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Collection, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, Self
 
+import zstandard
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 
@@ -17,6 +20,12 @@ from schemas.codec import typestore
 from schemas.errors import RecordingError
 
 __all__ = ["BagTopic", "RosBag"]
+
+_ZSTD = b"\x28\xb5\x2f\xfd"
+"""How a file compressed by Zstandard begins (RFC 8878, 3.1.1)."""
+_PIECE = 2**20
+_SHARE = 0.5
+"""Of the free space for temporary files: `rosbags` unpacks a bag of compressed files there."""
 
 
 class BagTopic(NamedTuple):
@@ -37,6 +46,7 @@ class RosBag:
         """Open a bag. Raises RecordingError if it cannot be read."""
         self.path = path
         with _reading(path):
+            _require_space(path)
             self._reader = AnyReader([path], default_typestore=typestore())
             self._reader.open()
         self.topics: dict[str, BagTopic] = {}
@@ -79,6 +89,26 @@ class RosBag:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _require_space(bag: Path) -> None:
+    """Raise RecordingError if the compressed files of a bag, which may be a bomb, do not fit on the disk."""
+    space = shutil.disk_usage(tempfile.gettempdir()).free * _SHARE
+    for file in sorted(bag.iterdir()) if bag.is_dir() else ():
+        if not file.is_file():
+            continue
+        with file.open("rb") as packed:
+            if packed.read(len(_ZSTD)) != _ZSTD:
+                continue
+            packed.seek(0)
+            with zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True) as unpacked:
+                while space >= 0 and (piece := unpacked.read(_PIECE)):
+                    space -= len(piece)
+        if space < 0:
+            raise RecordingError(
+                f"the bag '{bag}' is not unpacked: its compressed files need more than half of what is free"
+                f" in {tempfile.gettempdir()}. Set TMPDIR to a larger disk, or use compression by message"
+            )
 
 
 @contextmanager

@@ -17,11 +17,13 @@ from hub.transport.endpoints import is_loopback
 from schemas.codec import decode
 from schemas.errors import ConnectError, MessageError
 from schemas.keys import Keys
-from schemas.trocar_msgs import SessionStatus
+from schemas.message import Message
+from schemas.trocar_msgs import Profile, SessionStatus
 
-__all__ = ["ask_about", "live_sessions"]
+__all__ = ["ask_about", "live_profiles", "live_sessions"]
 
 R = TypeVar("R", bound=BaseModel)
+M = TypeVar("M", bound=Message)
 
 _NO_HUB = ConnectError, MessageError, zenoh.ZError
 """The errors of a query to a server that is no hub."""
@@ -36,14 +38,30 @@ def live_sessions(endpoints: Iterable[str], certificates: Path | None = None) ->
     A hub on another machine needs the certificate `observer`, which is read from `certificates`; raises
     ConnectError if there is no such hub. On this machine, endpoints without a hub are ignored.
     """
-    found: dict[str, SessionStatus] = {}
+    statuses = _answers(endpoints, certificates, Keys("*").status, SessionStatus)
+    found = {status.session: status for status in statuses}
+    return [found[name] for name in sorted(found)]
+
+
+def live_profiles(endpoints: Iterable[str], certificates: Path | None = None) -> dict[int, Profile]:
+    """Return the profiles of those of these sessions that keep one, by the numbers of their runs.
+
+    The arguments, and what is raised, are those of `live_sessions`.
+    """
+    profiles = _answers(endpoints, certificates, Keys("*").profile, Profile)
+    return {profile.run: profile for profile in profiles}
+
+
+def _answers(endpoints: Iterable[str], certificates: Path | None, key: str, model: type[M]) -> list[M]:
+    """Return what the sessions at `endpoints` answer on `key`."""
+    found: list[M] = []
     for endpoint in endpoints:
         with (
             suppress(*_NO_HUB) if is_loopback(endpoint) else nullcontext(),
             reach(endpoint, OBSERVER, certificates) as session,
         ):
-            found |= {status.session: status for status in _statuses(session)}
-    return [found[name] for name in sorted(found)]
+            found += _ask(session, key, model)
+    return found
 
 
 def ask_about(
@@ -98,6 +116,10 @@ def _hub_at(endpoint: str) -> zenoh.Session | None:
 
 
 def _statuses(session: zenoh.Session) -> Iterator[SessionStatus]:
-    for reply in session.get(Keys("*").status, timeout=ANSWER_S):
+    return _ask(session, Keys("*").status, SessionStatus)
+
+
+def _ask(session: zenoh.Session, key: str, model: type[M]) -> Iterator[M]:
+    for reply in session.get(key, timeout=ANSWER_S):
         if reply.ok is not None:
-            yield decode(SessionStatus, reply.ok.payload.to_bytes())
+            yield decode(model, reply.ok.payload.to_bytes())

@@ -51,7 +51,11 @@ def access_settings(
         if planned.host.startswith("remote/")
     }
     # all that `trocar ls` needs
-    rights[OBSERVER] = [*rights.get(OBSERVER, ()), *_query(Keys("*").status), *_subscribe(keys.status)]
+    rights[OBSERVER] = [
+        *rights.get(OBSERVER, ()),
+        *_query(Keys("*").status, Keys("*").profile),
+        *_subscribe(keys.status),
+    ]
     everything = ["**"]  # does not match chunks that begin with @, as in some foreign keys
     for name, shared in (foreign or {}).items():
         everything += shared
@@ -98,21 +102,22 @@ def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
         for connection in plan.connections
         if connection.target == name
     ] + [_to_device(plan, keys, connection) for connection in plan.to_devices if connection.target == name]
+    orders = [keys.link(name)] if role == "device" else [] if planned.observer else [keys.grant]
     # the hub subscribes to these of all participants at once
-    of_all = [keys.device_status("*"), keys.refused("*", "*"), keys.ack("*")]
+    of_all = [keys.device_status("*"), keys.observer_status("*"), keys.refused("*", "*"), keys.ack("*")]
     return [
         allow("ingress", ["put"], f"{keys.prefix}/{role}/{name}/**"),
         allow("egress", ["declare_subscriber"], f"{keys.prefix}/{role}/{name}/**", *of_all),
         allow("ingress", ["liveliness_token"], keys.alive(role, name)),
         *_query(Keys("*").join(planned.host), keys.control("clock")),
-        *_subscribe(*dict.fromkeys(inputs), keys.link(name) if role == "device" else keys.grant),
+        *_subscribe(*dict.fromkeys([*inputs, *orders])),
         allow("ingress", ["liveliness_query", "declare_liveliness_subscriber"], hub),
         allow("egress", ["liveliness_token"], hub),
     ]
 
 
 def _to_device(plan: Plan, keys: Keys, connection: ConnectionToDevice) -> str:
-    """Return the key on which a device receives the values of a connection."""
+    """Return the key on which a device or an observer receives the values of a connection."""
     if plan.participants[connection.source].port(connection.source_port).variability == "event":
         return keys.feed(connection.source, connection.source_port)
     return keys.signals(connection.source, connection.target)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from hmac import compare_digest
 
 import zenoh
 from zenoh.handlers import FifoChannel
 
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.transport.envelope import signature
+from hub.transport.host_link import HubLink
 from hub.transport.refusals import Refusals
 from schemas.errors import MessageError, ParticipantError
 from schemas.keys import Keys
@@ -20,14 +22,17 @@ __all__ = ["Accepted", "AckReceiver"]
 Accepted = tuple[PlannedParticipant, Ack, bytes]
 """The participant, its ack, and the bytes of it."""
 
+_READY = -1
+"""The step of the ack with which a participant reports to be ready."""
 _NO_STEPS: Mapping[str, int] = {}
 
 
 class AckReceiver:
     """Receives the acks of one run, one of each participant for each grant.
 
-    A second one, and one that the participant's host has not signed, end the run: of two acks, only one can
-    have the hashes of what was computed. All other messages are refused and counted.
+    A host with a link answers there alone; another one over Zenoh, signed. A second ack, and one that the
+    participant's host has not sent, end the run: of two acks, only one can have the hashes of what was
+    computed. All other messages are refused and counted.
 
     Args:
         session: The hub's Zenoh session.
@@ -36,6 +41,7 @@ class AckReceiver:
         run: The number of the run.
         refusals: Counts the messages that are refused.
         ack_keys: By host, the key with which it signs.
+        links: By host, its link.
     """
 
     def __init__(
@@ -46,69 +52,112 @@ class AckReceiver:
         run: int,
         refusals: Refusals,
         ack_keys: Mapping[str, bytes],
+        links: Mapping[str, HubLink],
     ) -> None:
-        self._session, self._key, self._run, self._refusals = session, keys.ack("hub"), run, refusals
+        self._session, self._keys, self._run, self._refusals = session, keys, run, refusals
+        self._wake_key = keys.ack("hub")
         self._planned = {keys.ack(name): plan.participants[name] for name in plan.order}
-        self._ack_keys = ack_keys
+        self._ack_keys, self._links = ack_keys, links
+        self._link_of = {
+            name: links[planned.host]
+            for name in plan.order
+            if (planned := plan.participants[name]).host in links
+        }
         self._last: dict[str, bytes] = {}
         """The last ack of each participant."""
+        self._step, self._steps = _READY, _NO_STEPS
+        """Of the grant whose acks are awaited."""
         self._subscriber = session.declare_subscriber(keys.ack("*"), FifoChannel(4096))
 
-    def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Accepted | None:
-        """Wait for a message, and return it if it is a valid ack of `grant` from one of `waiting`.
+    def receive(self, waiting: Sequence[str], grant: Grant, steps: Mapping[str, int]) -> Iterator[Accepted]:
+        """Wait a moment for messages, and yield the valid acks of `grant` from `waiting`, which may shrink.
 
-        `steps` are the numbers of steps that participants take in the grant. Returns None for any other
-        message, and when `wake` was called. Raises ParticipantError if the message reports a failure.
+        `steps` are the numbers of steps that participants take in the grant. Without an ack it returns after
+        20 ms or, if all of `waiting` answer over Zenoh, after a message or `wake`. Raises ParticipantError if
+        a message reports a failure.
         """
-        return self._accept(self._subscriber.recv(), waiting, grant.step, steps)
+        self._step, self._steps = grant.step, steps
+        links = list(dict.fromkeys(self._link_of[name] for name in waiting if name in self._link_of))
+        if not links:
+            yield from self._from_zenoh(self._subscriber.recv(), waiting)
+            return
+        yield from self.look(waiting)
+        # the last in step order first: when it has answered, most others have, and this process wakes up once
+        for link in reversed(links):
+            yield from self._from_link(link, waiting, wait=link is links[-1])
 
-    def ready(self, waiting: Sequence[str]) -> str | None:
-        """Return the one of `waiting` that reports to be ready, if its message has arrived.
+    def ready(self, waiting: Sequence[str]) -> Iterator[str]:
+        """Yield those of `waiting` that report to be ready; raises ParticipantError if one has failed."""
+        for link in self._links.values():
+            for planned, *_ in self._from_link(link, waiting, wait=False):
+                yield planned.name
+        for planned, *_ in self.look(waiting):
+            yield planned.name
 
-        Raises ParticipantError if it reports a failure.
-        """
-        sample = self._subscriber.try_recv()
-        accepted = None if sample is None else self._accept(sample, waiting, -1, _NO_STEPS)
-        return None if accepted is None else accepted[0].name
+    def look(self, waiting: Sequence[str] = ()) -> Iterator[Accepted]:
+        """Yield the acks of `waiting` that have arrived over Zenoh; raises ParticipantError for any other."""
+        while (sample := self._subscriber.try_recv()) is not None:
+            yield from self._from_zenoh(sample, waiting)
 
-    def _accept(
-        self, sample: zenoh.Sample, waiting: Sequence[str], step: int, steps: Mapping[str, int]
-    ) -> Accepted | None:
-        if str(sample.key_expr) == self._key and not sample.payload:
-            return None
+    def _from_link(self, link: HubLink, waiting: Sequence[str], *, wait: bool) -> Iterator[Accepted]:
+        for name, payload in link.acks(wait=wait):
+            key = self._keys.ack(name)
+            try:
+                accepted = self._accept(self._planned[key], payload, waiting, signed=True)
+            except MessageError as error:
+                self._refusals.refuse(key, error)
+            else:
+                yield accepted
+
+    def _from_zenoh(self, sample: zenoh.Sample, waiting: Sequence[str]) -> Iterator[Accepted]:
+        if str(sample.key_expr) == self._wake_key and not sample.payload:
+            return
         try:
             planned, payload, signed = self._opened(sample)
-            count = steps.get(planned.name, 0)
-            try:
-                ack = unpack_ack(payload, count, count * len(planned.bonds))
-            except MessageError as error:
-                if signed:
-                    raise ParticipantError(planned.name, step, f"its host has sent {error}") from error
-                raise
-            if ack.run != self._run:
-                raise MessageError(f"belongs to run {ack.run:x}, this is run {self._run:x}")
-            self._check(planned, ack, payload, signed=signed)
-            if planned.name not in waiting or ack.step != step:
-                raise ParticipantError(
-                    planned.name,
-                    ack.step,
-                    "a second ack of it has arrived, or one of a step that was not granted: is its host"
-                    f" '{planned.host}' running twice?",
-                )
+            accepted = self._accept(planned, payload, waiting, signed=signed)
         except MessageError as error:
             self._refusals.refuse_sample(sample, error)
-            return None
+        else:
+            yield accepted
+
+    def _accept(
+        self, planned: PlannedParticipant, payload: bytes, waiting: Sequence[str], *, signed: bool
+    ) -> Accepted:
+        """Return an ack that is awaited; raises ParticipantError, or MessageError if none of the run."""
+        count = self._steps.get(planned.name, 0)
+        try:
+            ack = unpack_ack(payload, count, count * len(planned.bonds))
+        except MessageError as error:
+            if signed:
+                raise ParticipantError(planned.name, self._step, f"its host has sent {error}") from error
+            raise
+        if ack.run != self._run:
+            raise MessageError(f"belongs to run {ack.run:x}, this is run {self._run:x}")
+        self._check(planned, ack, payload, signed=signed)
+        if planned.name not in waiting or ack.step != self._step:
+            raise ParticipantError(
+                planned.name,
+                ack.step,
+                "a second ack of it has arrived, or one of a step that was not granted: is its host"
+                f" '{planned.host}' running twice?",
+            )
         self._last[planned.name] = payload
         return planned, ack, payload
 
     def _opened(self, sample: zenoh.Sample) -> tuple[PlannedParticipant, bytes, bool]:
-        """Return the participant that a message is of, its payload, and whether its host has signed it."""
+        """Return the participant that a message is of, its payload, and whether its host has signed it.
+
+        A host with a link does not.
+        """
         planned = self._planned.get(str(sample.key_expr))
         if planned is None:
             raise MessageError("belongs to no participant of this run")
         payload = sample.payload.to_bytes()
         attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        return planned, payload, attached == signature(payload, self._ack_keys[planned.host])
+        signed = planned.host not in self._links and compare_digest(
+            attached, signature(payload, self._ack_keys[planned.host])
+        )
+        return planned, payload, signed
 
     def _check(self, planned: PlannedParticipant, ack: Ack, payload: bytes, *, signed: bool) -> None:
         """Raise ParticipantError if an ack of this run is not its host's, or reports a failure."""
@@ -126,21 +175,32 @@ class AckReceiver:
 
     def raise_failure(self) -> None:
         """Raise the failure that a participant itself has reported, if such a message has arrived."""
+        for name, payload in self._arrived():
+            with suppress(MessageError):
+                ack = unpack_ack(payload, 0, 0)
+                if ack.run == self._run and ack.error:
+                    raise ParticipantError(name, ack.step, ack.error)
+
+    def _arrived(self) -> Iterator[tuple[str, bytes]]:
+        """Yield the participant and the payload of every message of a host that has arrived."""
+        for link in self._links.values():
+            while acks := link.acks(wait=False):
+                yield from acks
         while (sample := self._subscriber.try_recv()) is not None:
             with suppress(MessageError):
                 planned, payload, signed = self._opened(sample)
-                ack = unpack_ack(payload, 0, 0)
-                if signed and ack.run == self._run and ack.error:
-                    raise ParticipantError(planned.name, ack.step, ack.error)
+                if signed:
+                    yield planned.name, payload
 
     def end(self, step: int) -> None:
         """Raise ParticipantError if an ack has arrived after the last grant's, which ended at `step`.
 
         It must be called when all have arrived.
         """
-        while (sample := self._subscriber.try_recv()) is not None:
-            self._accept(sample, (), step, _NO_STEPS)
+        self._step, self._steps = step, _NO_STEPS
+        for _ in self.ready(()):
+            pass
 
     def wake(self) -> None:
         """Make `receive` return."""
-        self._session.put(self._key, b"")
+        self._session.put(self._wake_key, b"")

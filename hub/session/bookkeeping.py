@@ -12,12 +12,14 @@ from hub.observation.latency import Histogram, by_way
 from hub.observation.observers import Observers
 from hub.observation.summary import Progress, Summary
 from hub.planning.plan import Plan, PlannedParticipant
+from hub.recording.profiles import profile_numbers
 from hub.recording.recorder import RecorderSummary
 from hub.session.clock import Clock
+from hub.session.observer_reports import ObserverReports
 from hub.transport.refusals import Refusals
 from schemas.lockstep import Ack
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import Latency, ParticipantStatus, SessionStatus
+from schemas.trocar_msgs import Latency, ParticipantStatus, Profile, SessionStatus
 
 __all__ = ["Bookkeeping"]
 
@@ -34,6 +36,7 @@ class Bookkeeping:
         refusals: Refusals,
         observers: Observers,
         devices: SessionDevices,
+        observer_reports: ObserverReports,
     ) -> None:
         self.phase = "starting"
         """`starting`, `running`, `paused`, `done` or `failed`."""
@@ -46,6 +49,7 @@ class Bookkeeping:
         self._refusals = refusals
         self._observers = observers
         self._devices = devices
+        self._observer_reports = observer_reports
         self._answers = Histogram()
         self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
         self._last_steps = dict.fromkeys(plan.order, -1)
@@ -93,7 +97,7 @@ class Bookkeeping:
                 role=planned.role,
                 host=planned.host,
                 pid=pid(planned.host),
-                step=self._last_steps.get(planned.name, self._clock.step),
+                step=self._last_step(planned),
             )
             for planned in self._plan.participants.values()
         ]
@@ -107,13 +111,19 @@ class Bookkeeping:
             real_time_factor=progress.real_time_factor,
             late_steps=progress.late_steps,
             dropped_messages=self._dropped,
-            detail=self.detail,
+            detail=self.detail or self._observer_reports.lost,
             participants=participants,
             devices=self._devices.statuses,
             latencies=self._latencies,
         )
 
-    def summary(self, recorded: RecorderSummary | None) -> Summary:
+    def _last_step(self, planned: PlannedParticipant) -> int:
+        """Return the last step of a participant that is known; of a device, that of the session."""
+        if planned.observer:
+            return self._observer_reports.step(planned.name)
+        return self._last_steps.get(planned.name, self._clock.step)
+
+    def summary(self, recorded: RecorderSummary | None, profile: Profile | None) -> Summary:
         """Return the summary of the run."""
         digest = hashlib.blake2b(digest_size=16)
         for name, part in sorted(self._digests.items()):
@@ -133,8 +143,10 @@ class Bookkeeping:
             recording_complete=None if recorded is None else recorded.complete,
             energy_residual_j=self._observers.energy.residual_j,
             latency=by_way(self._latencies),
+            observers=self._observer_reports.observed(),
             measures=self._observers.measures.results(),
             ending=self.detail or None,
+            profile=None if profile is None else profile_numbers(profile),
         )
 
     @property
@@ -146,7 +158,7 @@ class Bookkeeping:
     @property
     def _latencies(self) -> list[Latency]:
         answers = [self._answers.message("grant to state", "all participants")] if self._answers.count else []
-        return [*answers, *self._devices.latencies]
+        return [*answers, *self._devices.latencies, *self._observer_reports.latencies]
 
     @property
     def _dropped(self) -> int:

@@ -7,7 +7,7 @@ from time import monotonic_ns, sleep
 
 from hub.planning.plan import Plan
 
-__all__ = ["Clock"]
+__all__ = ["Clock", "most_steps"]
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class Clock:
         self.step = 0
         self.late_steps = 0
         alone = not realtime and len(plan.hosts()) == 1
-        self._window = window or (max(1, _WINDOW_NS // plan.step_ns) if alone else 1)
+        self._window = most_steps(plan, window) if window or alone else 1
         self.realtime = realtime
         """Whether steps follow the wall clock."""
         self.steps = steps
@@ -127,3 +127,8 @@ class Clock:
 
     def _observe_from(self, now_ns: int) -> None:
         self._observed_from_ns, self._slipped_ns = now_ns, 0
+
+
+def most_steps(plan: Plan, window: int | None) -> int:
+    """Return the most steps that one grant of a session covers; `window` is the scenario's."""
+    return window or max(1, _WINDOW_NS // plan.step_ns)

@@ -30,6 +30,7 @@ class JoinedHosts:
         ended: Is called with participant and reason when a host reports that one ends the session.
         ack_keys: By host, the key with which it signs its acks.
         programs_endpoint: Where programs outside Trocar connect, on this machine.
+        profile: The hosts of this machine keep a profile.
     """
 
     def __init__(
@@ -44,7 +45,9 @@ class JoinedHosts:
         *,
         ack_keys: Mapping[str, bytes],
         programs_endpoint: str = "",
+        profile: bool = False,
     ) -> None:
+        self._profile = profile
         self._ack_keys = ack_keys
         self._programs_endpoint = programs_endpoint
         self._watched = list(watched)
@@ -105,6 +108,7 @@ class JoinedHosts:
             watched=[output for output in self._watched if output[0] in names],
             ack_key=self._ack_keys[request.host].hex(),
             programs_endpoint="" if far else self._programs_endpoint,
+            profile=self._profile and not far,
         )
 
     def lose(self, host: str) -> None:
@@ -119,6 +123,10 @@ class JoinedHosts:
             if waiting:
                 self._changed.wait(0.05)
             return waiting
+
+    def watching(self, host: str) -> bool:
+        """Return whether the observers of `host` have seen the state at time 0."""
+        return host in self._hosts and self._hosts[host].watching
 
     def bonds(self) -> Mapping[str, tuple[BondSide, ...]]:
         """Return the bonds of all hosts' participants, with the numbers that `configure` has found."""

@@ -54,11 +54,12 @@ def launch(
     certificates: Path | None = None,
     record: Path | None = None,
     one_host: bool = False,
+    profile: bool = False,
 ) -> Session:
     """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
 
     `outside` are the endpoints where other machines may join by TLS, with the hub's certificate from
-    `certificates`, by default this user's directory.
+    `certificates`, by default this user's directory. `profile` measures where the time goes.
     """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
     plan, participants = plan_of(scenario, loaded.params)
@@ -77,6 +78,7 @@ def launch(
         foreign_keys=[key for keys in foreign.values() for key in keys],
         record=record,
         attachments=attachments,
+        profile=profile,
     )
 
 

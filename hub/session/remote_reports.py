@@ -12,6 +12,7 @@ from hub.planning.plan import Plan
 from hub.session.bookkeeping import Bookkeeping
 from hub.session.first_failure import FirstFailure
 from hub.session.joined_hosts import JoinedHosts
+from hub.session.observer_reports import ObserverReports
 from hub.transport.refusals import Refusals
 from schemas.codec import decode
 from schemas.errors import MessageError
@@ -26,7 +27,8 @@ log = logging.getLogger(__name__)
 class RemoteReports:
     """Subscribes to liveliness tokens and refusals of all hosts of a session.
 
-    A lost engine of another machine ends the run; with a lost device, what it leads holds.
+    A lost engine of another machine ends the run; with a lost device, what it leads holds; a lost observer
+    leads nothing.
     """
 
     def __init__(
@@ -38,8 +40,10 @@ class RemoteReports:
         joined_hosts: JoinedHosts,
         bookkeeping: Bookkeeping,
         failure: FirstFailure,
+        observer_reports: ObserverReports,
         refusals: Refusals,
     ) -> None:
+        self._observer_reports = observer_reports
         self._plan, self._devices, self._joined_hosts = plan, devices, joined_hosts
         self._bookkeeping, self._failure, self._refusals = bookkeeping, failure, refusals
         self._subscribers = [
@@ -56,11 +60,15 @@ class RemoteReports:
         if sample.kind != zenoh.SampleKind.DELETE:
             if planned.role == "device":
                 self._devices.network_links.repeat(name)
+            self._observer_reports.find(name)
             return
         self._joined_hosts.lose(planned.host)
         if planned.role == "device":
             self._devices.forget(name)
         if self._bookkeeping.phase not in ("starting", "running", "paused"):
+            return
+        if planned.observer:
+            self._observer_reports.lose(name, f"its host is gone; start 'trocar engine {name}' again")
             return
         if planned.role != "device":
             self._failure.report(name, "its host is gone")

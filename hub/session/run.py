@@ -30,9 +30,12 @@ from hub.session.clock import Clock
 from hub.session.control_server import ControlServer
 from hub.session.first_failure import FirstFailure
 from hub.session.joined_hosts import JoinedHosts
+from hub.session.observer_reports import ObserverReports
 from hub.session.remote_reports import RemoteReports
+from hub.session.run_profile import RunProfile
 from hub.session.run_state import RunState
 from hub.session.status_reporter import StatusReporter
+from hub.transport.host_link import HubLink, has_link
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
 from hub.transport.router_client import RouterClient
@@ -66,6 +69,8 @@ class SessionSpec:
     """Lets other machines in."""
     resimulated: bool
     """Grants come from a recording: no device is needed."""
+    profiled: bool = False
+    """Where the time goes is measured."""
 
     @property
     def stepped(self) -> dict[str, Stepped]:
@@ -102,21 +107,33 @@ class Run:
         """Tells the messages of this run from those of any other."""
         self.recorded = recorder is not None
         answering = stack.enter_context(ExitStack())
-        self.processes = HostProcesses()
+        self.processes = HostProcesses(_links(plan))
         stack.callback(self.processes.end)
         self.refusals = Refusals()
         self.clock = _clock(scenario, plan)
         self.observers = Observers(plan, keys, self.number, Measures(scenario, plan), recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
-        self.acks = AckReceiver(session, keys, plan, self.number, self.refusals, ack_keys)
+        self.acks = AckReceiver(
+            session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links
+        )
+        self.profile = self._profile() if spec.profiled else None
         self.host = self._host()
         """The stepped participants of this process."""
         stack.callback(self.host.close)
         self.failure = FirstFailure(plan, self.clock, self.host, self.acks, interrupt)
         self.devices = self._devices()
         stack.callback(self.devices.close)
+        self.observer_reports = ObserverReports(plan, keys, session, self.refusals)
+        answering.callback(self.observer_reports.undeclare)
         self.bookkeeping = Bookkeeping(
-            scenario, plan, self.number, self.clock, self.refusals, self.observers, self.devices
+            scenario,
+            plan,
+            self.number,
+            self.clock,
+            self.refusals,
+            self.observers,
+            self.devices,
+            self.observer_reports,
         )
         watched = list(self.observers.away.values())
         self.joined_hosts = JoinedHosts(
@@ -125,22 +142,35 @@ class Run:
             spec.directory,
             self.number,
             watched,
-            self.failure.report,
+            self.fail,
             self.end,
             ack_keys=ack_keys,
             programs_endpoint=spec.programs_endpoint,
+            profile=spec.profiled,
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.observers)
         answering.callback(self.status.undeclare)
+        if self.profile is not None:
+            answering.callback(self.profile.undeclare)
         self._answer(answering)
         if spec.gate is not None:
             stack.callback(spec.gate.close)
         token = session.liveliness().declare_token(keys.alive("hub", "hub"))
         stack.callback(token.undeclare)
         self.watchdog = Watchdog(
-            plan, self.processes, scenario.answer_limit, lambda: self.host.awaited, self.failure.report
+            plan, self.processes, scenario.answer_limit, lambda: self.host.awaited, self.fail
         )
         stack.callback(self.watchdog.end)
+
+    def fail(self, participant: str, cause: str) -> None:
+        """Report that `participant` has failed, which ends the run; from any thread.
+
+        An observer that fails after the start is only reported: the run never waits for it.
+        """
+        if self.spec.plan.participants[participant].observer and self.bookkeeping.phase != "starting":
+            self.observer_reports.lose(participant, cause)
+        else:
+            self.failure.report(participant, cause)
 
     def end(self, participant: str, reason: str) -> None:
         """End the session in good order when the present grant is done; from any thread.
@@ -152,12 +182,18 @@ class Run:
             log.info("%s", self.bookkeeping.detail)
         self.state.shutdown()
 
+    def _profile(self) -> RunProfile:
+        return RunProfile(
+            self.session, self.keys, self.spec.plan, self.number, self.clock, self.observers, self.refusals
+        )
+
     def _host(self) -> Host:
         """Return the host of this process, connected to the others over Zenoh."""
         spin = may_spin(len(self.spec.plan.hosts()))
         wire = Wire(self.session, self.keys, self.number, self.refusals, "hub", spin=spin)
-        listener = self.observers.value if self.observers.watches_values else None
-        return Host("hub", self.spec.plan, self.spec.stepped, wire=wire, listener=listener)
+        if self.profile is not None:
+            self.profile.prepare(self.spec.stepped, wire)
+        return Host("hub", self.spec.plan, self.spec.stepped, wire=wire, listeners=self.observers.listener)
 
     def _devices(self) -> SessionDevices:
         """Return the devices of the session, those of this process not yet open."""
@@ -186,6 +222,7 @@ class Run:
             self.joined_hosts,
             self.bookkeeping,
             self.failure,
+            self.observer_reports,
             self.refusals,
         )
         answering.callback(reports.undeclare)
@@ -207,3 +244,13 @@ class Run:
 def _clock(scenario: Scenario, plan: Plan) -> Clock:
     steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
     return Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
+
+
+def _links(plan: Plan) -> dict[str, HubLink]:
+    """Return a link to each host with stepped participants that can have one."""
+    names = dict[str, list[str]]()
+    for name in plan.order:
+        host = plan.participants[name].host
+        if has_link(host):
+            names.setdefault(host, []).append(name)
+    return {host: HubLink(its) for host, its in names.items()}

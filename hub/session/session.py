@@ -24,7 +24,7 @@ from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
 from schemas.errors import ScenarioError, SessionError
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import GrantMessage
+from schemas.trocar_msgs import GrantMessage, Profile
 
 __all__ = ["Session"]
 
@@ -46,6 +46,7 @@ class Session:
         attachments: What is kept in the recording beside the messages, by name.
         grants: Re-simulate these instead of reading devices.
         on_ack: Is called with every participant's ack of every grant.
+        profile: Measure where the time goes, for summary, recording and `trocar ls`.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class Session:
         attachments: Mapping[str, bytes] | None = None,
         grants: Iterator[GrantMessage] | None = None,
         on_ack: OnAck | None = None,
+        profile: bool = False,
     ) -> None:
         self.scenario = scenario
         self.plan = plan
@@ -81,6 +83,8 @@ class Session:
         self._attachments = dict(attachments or {})
         self._grants = grants
         self._on_ack = on_ack
+        self._profiled = profile
+        self._profile: Profile | None = None
 
     @property
     def endpoint(self) -> str:
@@ -120,17 +124,20 @@ class Session:
                         self.programs_endpoint,
                         self.gate,
                         resimulated=self._grants is not None,
+                        profiled=self._profiled,
                     )
                     run = Run(stack, spec, session, self.state, interrupt, recorder)
                     self._step(run, interrupt, progress)
             finally:
                 interrupt.disarm()  # a second SIGTERM does not cut the recording short
                 recorded = recorder.close() if recorder is not None else None
-        return run.bookkeeping.summary(recorded)
+        return run.bookkeeping.summary(recorded, self._profile)
 
     def _step(self, run: Run, interrupt: Interrupt, progress: Callable[[Progress], None] | None) -> None:
         """Start a run and step it to its end, which its last status reports."""
         steps = StepLoop(run, self._grants, self._on_ack)
+        if run.profile is not None:
+            steps.show_to(run.profile)
         try:
             if self.gate is not None:
                 self.gate.open(*self._outer.inside)
@@ -144,6 +151,8 @@ class Session:
             steps.book_acks()
             if run.bookkeeping.phase != "done":
                 run.bookkeeping.phase = "failed"
+            if run.profile is not None:
+                self._profile = run.profile.finish()
             run.status.publish()
 
 
@@ -157,6 +166,8 @@ def _start_and_step(
     try:
         try:
             start(run)
+            if run.profile is not None:
+                run.profile.start()
             steps.step_to_end(progress)
         finally:
             interrupt.disarm()

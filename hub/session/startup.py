@@ -6,6 +6,7 @@ import logging
 from time import monotonic, sleep
 
 from hub.planning.bonds import check_bonds
+from hub.planning.plan import Plan
 from hub.session.run import Run
 from schemas.errors import SessionError
 
@@ -46,22 +47,31 @@ def _wait_for_hosts(run: Run, hosts: list[str]) -> None:
             log.info("waiting for %s to join at %s", ", ".join(missing), endpoints)
         logged = missing
         if monotonic() > deadline:
-            raise SessionError(
-                f"{', '.join(missing)} did not join within {limit_s:g} s (join_limit) at {endpoints}"
-            )
+            named = ", ".join(_with_participants(host, run.spec.plan) for host in missing)
+            raise SessionError(f"{named} did not join within {limit_s:g} s (join_limit) at {endpoints}")
+
+
+def _with_participants(host: str, plan: Plan) -> str:
+    names = (f"'{name}'" for name, planned in plan.participants.items() if planned.host == host)
+    return f"{host} ({', '.join(names)})"
 
 
 def _wait_for_connections(run: Run) -> None:
-    """Repeat the values at time 0 until every host has received those that it reads."""
+    """Repeat the values at time 0 until every host has received those that it reads.
+
+    A camera has then drawn its first picture; from here on the session never waits for it.
+    """
     plan = run.spec.plan
     waiting = [name for name in plan.order if plan.participants[name].host != "hub"]
+    waiting += [observer.name for observer in plan.observers()]
     run.watchdog.wait_for(waiting)
     while waiting or not run.host.linked() or not run.observers.linked():
         run.host.publish_initial()
         run.failure.check()
-        ready = run.acks.ready(waiting)
-        if ready is None:
-            sleep(0.005)
-        else:
-            waiting.remove(ready)
+        for name in run.acks.ready(waiting):
+            waiting.remove(name)
+        for observer in plan.observers():
+            if observer.name in waiting and run.joined_hosts.watching(observer.host):
+                waiting.remove(observer.name)
+        sleep(0.005)
     run.watchdog.wait_for(())

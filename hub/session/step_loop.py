@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Iterator
-from time import monotonic, monotonic_ns
+from time import monotonic, monotonic_ns, sleep
 
 import zenoh
 
 from hub.observation.summary import Progress
 from hub.planning.plan import PlannedParticipant
 from hub.session.run import Run
+from hub.session.run_profile import RunProfile
+from hub.transport.publisher import Publisher
 from schemas.codec import encode
 from schemas.lockstep import Ack, Grant, pack_grant
 from schemas.trocar_msgs import GrantMessage
 
 __all__ = ["OnAck", "StepLoop"]
 
+log = logging.getLogger(__name__)
+
 _PROGRESS_S = 0.1
 _STATUS_S = 0.5
+_VALUES_S = 5.0
+"""How long values of the last steps may take that come over Zenoh, when the acks have arrived."""
 
 OnAck = Callable[[PlannedParticipant, Ack], None]
 
@@ -39,12 +46,10 @@ class StepLoop:
         self._common_period = math.lcm(*(plan.participants[name].period for name in plan.order))
         self._schedules: dict[tuple[int, int], tuple[list[str], dict[str, int]]] = {}
         self._unbooked: list[tuple[PlannedParticipant, Ack, bytes | None]] = []
-        self._grants = session.declare_publisher(
-            keys.grant,
-            encoding=zenoh.Encoding.APPLICATION_CDR,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.REAL_TIME,
-            express=True,
+        self._links = list(run.processes.links.values())
+        others = any(plan.participants[name].host not in run.processes.links for name in self._away)
+        self._grants = Publisher(
+            session, keys.grant, zenoh.CongestionControl.BLOCK, lambda: None, always=others
         )
         self._energy = {
             bond.bond.name: session.declare_publisher(
@@ -52,6 +57,11 @@ class StepLoop:
             )
             for bond in plan.bonds
         }
+
+    def show_to(self, profile: RunProfile) -> None:
+        """Let a profile time what this loop does beside calling others."""
+        profile.watch(self._run.host, self._run.devices, self._run.state)
+        profile.watch_acks(self.book_acks, self._receive_acks, self._unbooked)
 
     def step_to_end(self, progress: Callable[[Progress], None] | None) -> None:
         """Step until all steps are done or the session is to end; raises the first failure of the run.
@@ -82,9 +92,20 @@ class StepLoop:
         run.bookkeeping.stop()
         run.acks.end(clock.step)
         run.host.drain()
+        self._wait_for_values()
         self.book_acks()
         if progress is not None:
             progress(run.bookkeeping.progress())
+
+    def _wait_for_values(self) -> None:
+        """Wait until the recorder and the measures have the values of the last steps."""
+        deadline = monotonic() + _VALUES_S
+        while not self._run.observers.received(self._run.clock.step):
+            self._run.failure.check()
+            if monotonic() > deadline:
+                log.warning("values of the last steps have not arrived within %g s", _VALUES_S)
+                return
+            sleep(0.001)
 
     def _wait_while_paused(self) -> None:
         run = self._run
@@ -92,6 +113,8 @@ class StepLoop:
         run.bookkeeping.phase = "paused"  # after the acks are booked: the status counts the steps taken
         run.status.publish()
         while not run.state.wait(0.2):
+            for _ in run.acks.look():
+                pass
             run.failure.check()
         run.bookkeeping.phase = "running"
         run.clock.start()
@@ -109,20 +132,22 @@ class StepLoop:
         return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter(time_ns, step))
 
     def _step(self, grant: Grant) -> None:
-        """Publish a grant, take part in it, and wait until all others have.
+        """Give a grant, take part in it, and wait until all others have.
 
         The acks of the grant before are booked while other processes work on this one.
         """
         run = self._run
         granted_ns = monotonic_ns()
+        due, steps = self._schedule(grant)
+        run.watchdog.wait_for(due)
         payload = pack_grant(grant) if self._away or run.recorded else b""
-        if self._away:
+        for link in self._links:
+            link.send_grant(payload)
+        if self._grants.needed:
             self._grants.put(payload)
         self.book_acks()
         if run.recorded:
             run.observers.grant(grant, payload)
-        due, steps = self._schedule(grant)
-        run.watchdog.wait_for(due)
         run.host.run(grant, self._done_here)
         self._receive_acks([name for name in due if name in self._away], grant, steps)
         run.bookkeeping.acknowledged(granted_ns)
@@ -141,12 +166,10 @@ class StepLoop:
         run = self._run
         run.watchdog.wait_for(waiting)
         while waiting:
-            accepted = run.acks.receive(waiting, grant, steps)
-            if accepted is None:
-                run.failure.check()
-            else:
+            for accepted in run.acks.receive(waiting, grant, steps):
                 waiting.remove(accepted[0].name)
                 self._unbooked.append(accepted)
+            run.failure.check()
         run.watchdog.wait_for(())
 
     def _schedule(self, grant: Grant) -> tuple[list[str], dict[str, int]]:

@@ -46,6 +46,8 @@ class JoinRequest(_Json):
     host: Annotated[str, Field(pattern=r"^(remote/)?[A-Za-z][A-Za-z0-9_]*$")]
     pid: int
     ready: bool = False
+    watching: bool = False
+    """Its observers have seen the state at time 0."""
     bonds: dict[str, tuple[BondSide, ...]] = {}
     failed: str = ""
     """Why the host has failed: `participant: cause`."""
@@ -80,3 +82,5 @@ class JoinReply(_Json):
     """The key with which the host signs its acks, in hexadecimal digits."""
     programs_endpoint: str = ""
     """Where devices on the hub's machine meet programs outside Trocar; empty on other machines."""
+    profile: bool = False
+    """The host keeps a profile, for which the hub asks."""

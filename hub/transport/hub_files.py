@@ -56,8 +56,8 @@ def running_hubs() -> list[HubFile]:
             socket.create_connection(address(hub.endpoint), _PROBE_S).close()
         except ConnectionRefusedError:
             file.unlink(missing_ok=True)
+            continue
         except TimeoutError:  # it listens, and is busy or stopped
-            found.append(hub)
-        else:
-            found.append(hub)
+            pass
+        found.append(hub)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import zenoh
@@ -21,7 +21,7 @@ __all__ = ["PortPublisher"]
 
 
 class PortPublisher:
-    """Publishes the values of one output port; without a reader it costs a flag test.
+    """Publishes the values of one output port.
 
     Wall-time devices receive events under a key of their own, and signals in bundles. A step without events
     is published only for readers that need every value (`always`): dozens of quiet ports cost nothing.
@@ -32,9 +32,11 @@ class PortPublisher:
         planned: The participant.
         port: Its output.
         run: The number of the run.
+        changed: Is called whenever `needed` may have changed.
         always: A reader needs every value from the first on.
         feeds: Wall-time devices receive its events.
-        bundles: Where its signal goes to wall-time devices, with its index in each.
+        bundles: Where its signal goes to wall-time devices and observers, with its index in each.
+        stride_ns: The simulated time between two values.
         lanes: Fast lanes to other hosts of this machine.
     """
 
@@ -45,17 +47,22 @@ class PortPublisher:
         planned: PlannedParticipant,
         port: Port,
         run: int,
+        changed: Callable[[], None],
         *,
         always: bool,
         feeds: bool,
         bundles: Sequence[tuple[Bundle, int]] = (),
+        stride_ns: int = 0,
         lanes: Sequence[LaneSender] = (),
     ) -> None:
         self.codec = PortCodec(port)
         self._lanes = lanes
         self._run = run
-        self._always = always
+        self._changed = changed
+        self.always = always
+        """Whether a reader needs every value, and to know of steps without events."""
         self._bundles = bundles
+        self._stride_ns = stride_ns
         block = zenoh.CongestionControl.BLOCK
         self._publishers: list[Publisher] = []
         key = keys.output(planned.key_role, planned.name, port.name)
@@ -67,12 +74,21 @@ class PortPublisher:
 
     def _update(self) -> None:
         self._needed = [publisher for publisher in self._publishers if publisher.needed]
+        self._changed()
+
+    @property
+    def needed(self) -> bool:
+        """Whether anybody receives the values."""
+        bundled = any(bundle.needed for bundle, _ in self._bundles)
+        return bool(self._lanes or self._needed or bundled)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
         for lane in self._lanes:
             lane.send(step, value)
-        bundles = [bundle for bundle in self._bundles if bundle[0].needed] if self._bundles else ()
+        bundles: Sequence[tuple[Bundle, int]] = ()
+        if self._bundles:
+            bundles = [bundle for bundle in self._bundles if bundle[0].takes(time_ns, self._stride_ns)]
         if not self._needed and not bundles:
             return
         if not self.codec.is_event:
@@ -82,7 +98,7 @@ class PortPublisher:
             if self._needed:
                 self._send(payload, Tag.pack(self._run, 0, step, time_ns))
             return
-        if not value and self._always:
+        if not value and self.always:
             self._publishers[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
             self._send(encode(message), Tag.pack(self._run, 0, step, time_ns, index, len(value)))

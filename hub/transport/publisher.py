@@ -49,7 +49,7 @@ class Publisher:
         self.needed = bool(status.matching)
         self._changed()
 
-    def put(self, payload: bytes, tag: bytes) -> None:
+    def put(self, payload: bytes, tag: bytes | None = None) -> None:
         """Publish a message with its attachment."""
         self._publisher.put(payload, attachment=tag)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from hub.participant import Value
@@ -12,7 +12,7 @@ from hub.transport.port_codec import PortCodec
 from schemas.message import Message
 from schemas.ports import Port
 
-__all__ = ["DeviceInputs", "Reader", "as_messages"]
+__all__ = ["DeviceInputs", "Queue", "Reader", "as_messages"]
 
 Messages = Callable[[Any, int], tuple[Message, ...]]
 """Makes messages of a value and the time (ns) at which it is valid."""
@@ -42,6 +42,15 @@ class Reader:
             time_ns = cell.valid_from(self.seen) * step_ns
             arrived.extend((time_ns, message) for message in self.messages(cell.get(self.seen), time_ns))
         return arrived
+
+
+@dataclass(slots=True)
+class Queue:
+    """An event port that a neighbour in this process writes to."""
+
+    port: str
+    arrived: list[Message] = field(default_factory=list[Message])
+    """Since it was read."""
 
 
 class DeviceInputs:

@@ -8,7 +8,7 @@ from typing import Any
 import zenoh
 
 from hub.planning.plan import PlannedParticipant
-from hub.transport.bundle import Bundle
+from hub.transport.bundle import Bundle, ObserverBundle
 from hub.transport.cells import RemoteCell
 from hub.transport.lane import LaneReceiver, LaneSender, has_lane, lane_address
 from hub.transport.port_publisher import PortPublisher
@@ -55,10 +55,23 @@ class Wire:
         self._bundles: list[Bundle] = []
         self._receivers: list[PortReceiver | LaneReceiver] = []
         self._cells: list[RemoteCell] = []
+        self.changes = 0
+        """How often somebody has begun or ceased to receive an output."""
 
-    def bundle(self, source: str, device: str) -> Bundle:
-        """Return the bundle of a participant's signals for a wall-time device."""
-        bundle = Bundle(self.session, self.keys.signals(source, device))
+    def _count_change(self) -> None:
+        self.changes += 1
+
+    def bundle(self, source: str, target: str, period_ns: int) -> Bundle:
+        """Return the bundle of a participant's signals for a wall-time device or an observer.
+
+        `period_ns` is the observer's period, and 0 for a device, which receives every value.
+        """
+        key, changed = self.keys.signals(source, target), self._count_change
+        bundle = (
+            ObserverBundle(self.session, key, changed, period_ns)
+            if period_ns
+            else Bundle(self.session, key, changed)
+        )
         self._bundles.append(bundle)
         return bundle
 
@@ -70,11 +83,12 @@ class Wire:
         *,
         feeds: bool,
         bundles: Sequence[tuple[Bundle, int]],
+        stride_ns: int,
     ) -> PortPublisher:
         """Return a publisher of an output of a participant here; the hosts `readers` need every value.
 
-        Wall-time devices receive its events if it `feeds` them, and its signal in `bundles`, each with the
-        signal's index in it.
+        Wall-time devices receive its events if it `feeds` them; they and observers receive its signal in
+        `bundles`, each with the signal's index in it. `stride_ns` is the simulated time between two values.
         """
         fast = [host for host in readers if has_lane(port, self.host, host)]
         lanes = [LaneSender(lane_address(self.run, planned.name, port.name, host)) for host in fast]
@@ -85,9 +99,11 @@ class Wire:
             planned,
             port,
             self.run,
+            self._count_change,
             always=always,
             feeds=feeds,
             bundles=bundles,
+            stride_ns=stride_ns,
             lanes=lanes,
         )
         self._publishers.append(publisher)

@@ -58,6 +58,16 @@ class Fault:
         return self.moment != "close" and self.part in (ENGINE, DEVICE) and self.action in ("kill", "stop")
 
     @property
+    def may_not_join(self) -> bool:
+        """Whether a remote device may be killed before it joins, for which the hub then waits."""
+        return self.part == REMOTE and self.action == "kill" and self.moment == "birth"
+
+    @property
+    def may_prevent_start(self) -> bool:
+        """Whether the session may end, with a reason, before its first step."""
+        return self.may_not_join or (self.part == SERVO and self.moment == "birth")
+
+    @property
     def is_named(self) -> bool:
         """Whether the hub must say which part it is that has failed."""
         lost = (self.part == REMOTE and self.action == "kill") or self.action == "cut"

@@ -38,7 +38,7 @@ class RunningSession:
     """A hub, a host with an engine, and what a fault concerns: a device, a gate. `stack` ends all of them."""
 
     def __init__(self, mark: str, fault: Fault, directory: Path, stack: ExitStack) -> None:
-        self.mark, self._fault, self._directory = mark, fault, directory
+        self.mark, self.fault, self._directory = mark, fault, directory
         self.logs: list[Path] = []
         self.held: set[str] = set()
         """What the processes had when the fault came."""
@@ -66,7 +66,7 @@ class RunningSession:
 
     def _scenario(self) -> list[str]:
         """Write the scenario; return the arguments with which the hub runs and records it."""
-        fault, device = self._fault, {"kind": "fault_parts:Hand", "host": "hand"}
+        fault, device = self.fault, {"kind": "fault_parts:Hand", "host": "hand"}
         long_step = {"long_step": 20, "long_step_ms": LONG_STEP_MS} if fault.long_step else {}
         engine, port = {"kind": "fault_parts:Engine"}, "pose"
         if fault.concerns(REMOTE, LINK):
@@ -81,6 +81,7 @@ class RunningSession:
             "step": "2 ms",
             "pace": "realtime",
             "answer_limit": "3 s" if fault.action == "stop" else "60 s",
+            "join_limit": "20 s" if fault.action == "stop" or fault.may_not_join else "60 s",
             "participants": {
                 "first": {**engine, "host": "one", "configure_ms": 150, **long_step},
                 "last": {**engine, "seed": 2, "hand": with_hand, "running": str(self._running)},
@@ -93,7 +94,7 @@ class RunningSession:
         return [str(file), "--record", str(self._directory / "recording")]
 
     def _gate(self) -> list[str]:
-        if not self._fault.concerns(GATE):
+        if not self.fault.concerns(GATE):
             return []
         certificates = Authority.founded(self._directory / "certificates").directory
         return ["--listen", f"tls/127.0.0.1:{free_port()}", "--certs", str(certificates)]
@@ -109,7 +110,7 @@ class RunningSession:
 
     def strike(self) -> float:
         """Wait for the moment of the fault, let it happen, and return when that was, s of the wall clock."""
-        fault = self._fault
+        fault = self.fault
         born = {"servo": SERVO, "birth": ENGINE if fault.part == HUB else fault.part}.get(fault.moment)
         if born is None:
             self._until(self._running.exists)
@@ -130,7 +131,7 @@ class RunningSession:
         return began
 
     def _hit(self, target: Process) -> None:
-        fault = self._fault
+        fault = self.fault
         if fault.action == "kill":
             self._signal(target, signal.SIGKILL)
             return
@@ -141,24 +142,31 @@ class RunningSession:
 
     def _disturb_link(self) -> None:
         assert self._proxy is not None
-        if self._fault.action == "cut":
+        if self.fault.action == "cut":
             self._proxy.cut()
         else:
             self._proxy.hold()
-        sleep(self._fault.pause_s)
+        sleep(self.fault.pause_s)
         self._proxy.go_on()
 
     def go_on(self) -> bool:
         """Let the session go on for a moment, and end it; return whether it went on."""
-        if self._fault.moment == "close":
+        if self.fault.moment == "close":
             return True  # it ends already
-        self._until(self._running.exists)
-        if self._fault.is_named:
+        self._until(lambda: self._running.exists() or self._given_up())
+        if self._given_up():
+            return True  # it has not gone on, and says why
+        if self.fault.is_named:
             self._until(lambda: "'hand' is gone" in self.logs[0].read_text(errors="replace"))
         sleep(0.2)
         went_on = self.hub.poll() is None
         self.hub.terminate()
         return went_on
+
+    def _given_up(self) -> bool:
+        """Return whether the hub ends because what was killed did not join, or cannot be opened."""
+        log = self.logs[0].read_text(errors="replace") if self.fault.may_prevent_start else ""
+        return "did not join within" in log or "cannot be opened" in log
 
     def others(self) -> set[str]:
         """Return the parts that must end with the hub and live."""
@@ -179,7 +187,7 @@ class RunningSession:
         deadline = monotonic() + _PATIENCE_S
         while not (found := look()):
             if monotonic() > deadline or self.hub.poll() is not None:
-                raise TimeoutError(f"the session has ended or hangs before: {self._fault}")
+                raise TimeoutError(f"the session has ended or hangs before: {self.fault}")
             sleep(0.002)
         return found
 

@@ -83,7 +83,11 @@ def _row(case: str, result: Result) -> str:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    kills = [result.named_ms for result in results if result.fault.action == "kill"]
+    kills = [
+        result.named_ms
+        for result in results
+        if result.fault.action == "kill" and not result.fault.may_not_join
+    ]
     named = [ms for ms in kills if ms is not None]
     hub = [result.outlived_ms for result in results if result.fault.kills_hub]
     failed = sum(1 for result in results if result.problems)

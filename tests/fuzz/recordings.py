@@ -211,20 +211,17 @@ def _replay(file: Path, _directory: Path) -> None:
 
 def _play(file: Path, directory: Path) -> None:
     """Play it as samples of a device."""
-    device = registry.make("scripted", "hand", {"samples": str(file)}, directory)
-    _ = device.ports
-    device.open(directory)
-    try:
-        for t in range(0, _KEPT_NS, 5_000_000):
-            device.read(t)
-    finally:
-        device.close()
+    _read_device("scripted", {"samples": str(file)}, directory)
 
 
 def _play_ros(file: Path, directory: Path) -> None:
     """Play it as a bag of ROS."""
     params = {"bag": str(file), "arms": {"PSM1": {"instrument": "400006"}}, "listen": ["PSM1"]}
-    device = registry.make("ros-bag", "real", params, directory)
+    _read_device("ros-bag", params, directory)
+
+
+def _read_device(kind: str, params: dict[str, object], directory: Path) -> None:
+    device = registry.make(kind, "played", params, directory)
     _ = device.ports
     device.open(directory)
     try:

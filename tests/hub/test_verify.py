@@ -65,7 +65,14 @@ def test_a_recording_of_something_else_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("step", "start_ns", "horizon_ns"),
-    [(4, 4_000_000, 8_000_000), (0, 1, 4_000_000), (0, 0, 4_000_001), (0, 0, 0), (0, 0, -1_000_000)],
+    [
+        (4, 4_000_000, 8_000_000),
+        (0, 1, 4_000_000),
+        (0, 0, 4_000_001),
+        (0, 0, 0),
+        (0, 0, -1_000_000),
+        (0, 0, 10**18),
+    ],
 )
 def test_grants_that_do_not_follow_one_another_are_refused(
     recording, monkeypatch, step, start_ns, horizon_ns

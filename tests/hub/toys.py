@@ -17,6 +17,7 @@ import numpy as np
 from hub.participant import Device, ForceSide, MotionSide, Params, Sample, Stepped, state_hash
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64MultiArray, Header, Joy, Point, Pose, PoseStamped, StringMessage, Time
+from schemas.trocar_msgs import SoftBodyState
 
 SIZE = 3
 POSE, JOY, TEXT = PoseStamped.ros_type, Joy.ros_type, StringMessage.ros_type
@@ -404,6 +405,33 @@ class Paced(Mixer):
         return super().step(t, h, inputs)
 
 
+class BusyParams(Params):
+    burn_ms: float = 0.0
+    """Of a core, in each step."""
+    sleep_ms: float = 0.0
+    """In each step."""
+    hash_sleep_ms: float = 0.0
+    """While its state is hashed."""
+
+
+class Busy(Chain):
+    """Takes time."""
+
+    params_model = BusyParams
+
+    def step(self, t, h, inputs):
+        time.sleep(self.params.sleep_ms * 1e-3)
+        until = time.thread_time() + self.params.burn_ms * 1e-3
+        while time.thread_time() < until:
+            pass
+        self.fold(t.to_bytes(8, "little"))
+        return {}
+
+    def state_hash(self):
+        time.sleep(self.params.hash_sleep_ms * 1e-3)
+        return super().state_hash()
+
+
 class MassParams(Params):
     mass: float = 1.0
     x: float = 1.0
@@ -457,3 +485,73 @@ class Spring(Bare):
 
     def state_hash(self):
         return state_hash(self.side.state)
+
+
+class CameraParams(Params):
+    milliseconds: float = 0.0
+    file: str = ""
+    """Gets the process id, and then, with it, what it shows."""
+    dies: Literal["", "raise", "kill"] = ""
+    """At the first state after that at time 0."""
+
+
+class Camera(Bare):
+    """Looks at numbers and the nodes of a soft body; shows `time, number, nodes, triangles` of each state."""
+
+    observer = True
+    params_model = CameraParams
+    ports = (
+        Port(name="numbers", causality="input", size=SIZE),
+        Port(name="nodes", causality="input", type=SoftBodyState.ros_type),
+        Port(name="seen", causality="output", type=TEXT, variability="event"),
+    )
+
+    def configure(self, setup):
+        self.triangles = 0
+        if self.params.file:
+            Path(self.params.file).write_text(str(os.getpid()))
+        return {"seen": ()}
+
+    def step(self, t, h, inputs):
+        if t and self.params.dies == "raise":
+            raise ArithmeticError("the lens is broken")
+        if t and self.params.dies == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(self.params.milliseconds * 1e-3)
+        nodes = inputs.message("nodes")
+        self.triangles += nodes.triangles.size
+        if not self.triangles:
+            raise ValueError("the surface is missing")
+        text = f"{t} {inputs['numbers'][0]:g} {nodes.nodes_m[0]:g} {self.triangles}"
+        if self.params.file:
+            Path(self.params.file).write_text(f"{os.getpid()} {text}")
+        return {"seen": (StringMessage(data=text),)}
+
+
+class Jelly(Bare):
+    """A soft body whose first node and number are the step; its surface comes with the first message."""
+
+    ports = (
+        Port(name="numbers", causality="output", size=SIZE),
+        Port(name="nodes", causality="output", type=SoftBodyState.ros_type),
+    )
+
+    def configure(self, setup):
+        self.steps = 0
+        return self.outputs(np.array([0, 1, 2], np.uint32))
+
+    def outputs(self, triangles):
+        nodes = SoftBodyState(
+            header=Header(frame_id="world"),
+            body="jelly",
+            nodes_m=np.full(9, self.steps, np.float32),
+            triangles=triangles,
+        )
+        return {"numbers": np.full(SIZE, float(self.steps)), "nodes": nodes}
+
+    def step(self, t, h, inputs):
+        self.steps += 1
+        return self.outputs(np.zeros(0, np.uint32))
+
+    def state_hash(self):
+        return self.steps

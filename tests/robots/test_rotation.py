@@ -51,3 +51,10 @@ def test_from_matrix_holds_at_half_turns():
     for axis in np.eye(3):
         half_turn = rotation.exp(np.pi * axis)
         assert abs(abs(rotation.from_matrix(rotation.matrix(half_turn)) @ half_turn) - 1.0) < 1e-15
+
+
+def test_the_quaternions_of_many_matrices_are_those_of_each_to_the_bit():
+    turns = np.random.default_rng(7).normal(size=(40, 3)) * np.linspace(0.0, 4.0, 40)[:, None]
+    matrices = np.array([rotation.matrix(rotation.exp(turn)) for turn in turns])
+    each = np.array([rotation.from_matrix(matrix) for matrix in matrices])
+    assert rotation.from_matrices(matrices).tobytes() == each.tobytes()

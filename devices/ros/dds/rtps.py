@@ -1,14 +1,14 @@
 """The RTPS messages that `devices.ros.dds.services` sends and receives, little-endian only.
 
-Message, submessages (DATA, HEARTBEAT, ACKNACK, GAP, INFO_DST) and parameter lists. Source: OMG DDSI-RTPS
-2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters). INFO_TS and fragments are skipped: services
-need neither.
+Message, submessages (DATA, DATA_FRAG, HEARTBEAT, HEARTBEAT_FRAG, ACKNACK, NACK_FRAG, GAP, INFO_DST) and
+parameter lists. Source: OMG DDSI-RTPS 2.5, 8.3 and 9.4 (submessages), 9.6.2 and 9.6.3 (parameters). INFO_TS
+is skipped; fragments are received and never sent, as responses fit into a datagram.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -18,14 +18,18 @@ __all__ = [
     "PL_CDR_LE",
     "AckNack",
     "Data",
+    "DataFragments",
+    "FromWriter",
     "Gap",
     "Heartbeat",
+    "HeartbeatFragments",
     "Message",
     "Submessage",
     "encode_acknack",
     "encode_data",
     "encode_heartbeat",
     "encode_message",
+    "encode_nack_fragments",
     "encode_parameters",
     "encode_sequence_number",
     "encode_string",
@@ -39,8 +43,9 @@ _PID_SENTINEL = struct.pack("<HH", 1, 0)
 _LITTLE_ENDIAN, _INLINE_QOS, _FINAL, _DATA_PRESENT, _KEY_PRESENT = 1, 2, 2, 4, 8
 """Flags of submessages: of all; DATA; HEARTBEAT and ACKNACK; DATA; DATA."""
 _ACKNACK, _HEARTBEAT, _GAP, _INFO_DST, _DATA = 0x06, 0x07, 0x08, 0x0E, 0x15
+_NACK_FRAG, _HEARTBEAT_FRAG, _DATA_FRAG = 0x12, 0x13, 0x16
 _MOST_IN_SET = 256
-"""Sequence numbers in one SequenceNumberSet."""
+"""Numbers in one SequenceNumberSet or FragmentNumberSet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,34 @@ class Data:
     """Parameters beside the payload, by id."""
     payload: bytes
     """With its encapsulation header; of a disposed instance the key, or nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class DataFragments:
+    """DATA_FRAG: consecutive fragments of one sample."""
+
+    writer_id: bytes
+    reader_id: bytes
+    sequence_number: int
+    first: int
+    """The number of the first of them, from 1."""
+    count: int
+    fragment_size: int
+    """Bytes of each, but for the last one of the sample."""
+    sample_size: int
+    """Bytes of the whole payload, with its encapsulation header."""
+    inline_qos: Mapping[int, bytes]
+    content: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class HeartbeatFragments:
+    """HEARTBEAT_FRAG: the writer has the fragments of one sample up to `last`."""
+
+    writer_id: bytes
+    reader_id: bytes
+    sequence_number: int
+    last: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +122,9 @@ class Gap:
     others: tuple[int, ...]
 
 
-Submessage: TypeAlias = Data | Heartbeat | AckNack | Gap
+FromWriter: TypeAlias = Data | DataFragments | Heartbeat | HeartbeatFragments | Gap
+"""What a reader receives from a matched writer."""
+Submessage: TypeAlias = FromWriter | AckNack
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,13 +176,27 @@ def encode_acknack(
     writer_id: bytes, reader_id: bytes, base: int, missing: Iterable[int], count: int
 ) -> bytes:
     """Return an ACKNACK submessage: all before `base` is there, `missing` (within 256 of it) is requested."""
-    offsets = [number - base for number in missing if number - base < _MOST_IN_SET]
+    numbers = encode_sequence_number(base) + _bitmap(base, missing)
+    return _submessage(_ACKNACK, _FINAL, reader_id + writer_id + numbers + struct.pack("<I", count))
+
+
+def encode_nack_fragments(
+    writer_id: bytes, reader_id: bytes, sequence_number: int, missing: Sequence[int], count: int
+) -> bytes:
+    """Return a NACK_FRAG submessage: of a sample, the fragments `missing` (within 256 of the first)."""
+    numbers = struct.pack("<I", missing[0]) + _bitmap(missing[0], missing)
+    sample = encode_sequence_number(sequence_number)
+    return _submessage(_NACK_FRAG, 0, reader_id + writer_id + sample + numbers + struct.pack("<I", count))
+
+
+def _bitmap(base: int, members: Iterable[int]) -> bytes:
+    """Return number of bits and bitmap of a set of numbers, as far as they lie within 256 of `base`."""
+    offsets = [number - base for number in members if number - base < _MOST_IN_SET]
     bits = max(offsets, default=-1) + 1
     words = [0] * ((bits + 31) // 32)
     for offset in offsets:
         words[offset // 32] |= 1 << (31 - offset % 32)
-    numbers = encode_sequence_number(base) + struct.pack(f"<I{len(words)}I", bits, *words)
-    return _submessage(_ACKNACK, _FINAL, reader_id + writer_id + numbers + struct.pack("<I", count))
+    return struct.pack(f"<I{len(words)}I", bits, *words)
 
 
 def encode_parameters(values: Mapping[int, bytes]) -> bytes:
@@ -205,6 +254,11 @@ def _submessages(datagram: bytes, own: bytes) -> Iterator[Submessage]:
             is_ours = content[:12] in (own, bytes(12))
         elif is_ours and kind == _DATA:
             yield _data(content, flags)
+        elif is_ours and kind == _DATA_FRAG:
+            yield _data_fragments(content, flags)
+        elif is_ours and kind == _HEARTBEAT_FRAG:
+            (last,) = struct.unpack_from("<I", content, 16)
+            yield HeartbeatFragments(content[4:8], content[:4], _sequence_number(content, 8), last)
         elif is_ours and kind == _HEARTBEAT:
             first, last = _sequence_number(content, 8), _sequence_number(content, 16)
             yield Heartbeat(content[4:8], content[:4], first, last, bool(flags & _FINAL))
@@ -216,13 +270,26 @@ def _submessages(datagram: bytes, own: bytes) -> Iterator[Submessage]:
 
 
 def _data(content: bytes, flags: int) -> Data:
-    (to_qos,) = struct.unpack_from("<H", content, 2)
-    at, inline_qos = 4 + to_qos, dict[int, bytes]()
-    if flags & _INLINE_QOS:
-        inline_qos, length = parse_parameters(content[at:])
-        at += length
+    at, inline_qos = _inline_qos(content, flags)
     payload = content[at:] if flags & (_DATA_PRESENT | _KEY_PRESENT) else b""
     return Data(content[8:12], content[4:8], _sequence_number(content, 12), inline_qos, payload)
+
+
+def _data_fragments(content: bytes, flags: int) -> DataFragments:
+    at, inline_qos = _inline_qos(content, flags)
+    number = _sequence_number(content, 12)
+    numbers = struct.unpack_from("<IHHI", content, 20)
+    return DataFragments(content[8:12], content[4:8], number, *numbers, inline_qos, content[at:])
+
+
+def _inline_qos(content: bytes, flags: int) -> tuple[int, dict[int, bytes]]:
+    """Return where the payload of a DATA or DATA_FRAG begins, and the inline QoS before it."""
+    (to_qos,) = struct.unpack_from("<H", content, 2)
+    at = 4 + to_qos
+    if not flags & _INLINE_QOS:
+        return at, {}
+    inline_qos, length = parse_parameters(content[at:])
+    return at + length, inline_qos
 
 
 def _sequence_number(content: bytes, at: int) -> int:

@@ -4,9 +4,7 @@ Programs with rmw_fastrtps tell requests apart by inline QoS, which Cyclone DDS 
 services need a participant of their own, of which programs see the servers and nothing else. It answers
 programs with rmw_cyclonedds, too: of two servers they would use the first that they discover.
 Subscriptions are here because a reader of Cyclone DDS loses what a writer sends before Cyclone DDS has
-matched the two, and a program publishes as soon as its own side is matched (docs/decisions/0030). Sources of
-the identity of a request: ros2/rmw_fastrtps, rmw_fastrtps_shared_cpp/src/rmw_request.cpp and
-rmw_response.cpp; ros2/rmw_cyclonedds, rmw_cyclonedds_cpp/src/rmw_node.cpp (cdds_request_header_t).
+matched the two, and a program publishes as soon as its own side is matched (docs/decisions/0030).
 """
 
 from __future__ import annotations
@@ -16,21 +14,20 @@ import os
 import socket
 import struct
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from time import monotonic
 
+from devices.ros.dds.endpoints import ReceiveSample, Service, Subscription
+from devices.ros.dds.participant_proxy import ParticipantProxy, require_room
+from devices.ros.dds.responses import CYCLONE_DDS, FAST_DDS, ResponseTo
 from devices.ros.dds.rtps import (
     AckNack,
     Data,
-    Gap,
-    Heartbeat,
+    FromWriter,
     Message,
     encode_data,
     encode_message,
-    encode_sequence_number,
     encode_string,
     parse_message,
 )
@@ -46,7 +43,6 @@ from devices.ros.dds.rtps_discovery import (
     SUBSCRIPTIONS_READER,
     SUBSCRIPTIONS_WRITER,
     WRITER_NO_KEY,
-    Pid,
     announced_endpoint,
     announced_participant,
     disposed_endpoint_id,
@@ -65,72 +61,14 @@ __all__ = ["ServiceParticipant"]
 
 log = logging.getLogger(__name__)
 
-ReceiveSample = Callable[[bytes, bytes], None]
-"""Receives a message (CDR) and the GUID of the participant that has published it."""
-
-_FAST_DDS, _CYCLONE_DDS, _NO_VENDOR = b"\x01\x0f", b"\x01\x10", b"\x00\x00"
-"""Vendors of participants, the first two bytes of the GUID prefix."""
-_CYCLONE_HEADER = slice(4, 20)
-"""cdds_request_header_t of requests and responses of rmw_cyclonedds, behind the encapsulation header:
-client and number of the request.
-"""
-
+_NO_VENDOR = b"\x00\x00"
+"""The first two bytes of our GUID prefix."""
 _ANNOUNCE_S, _FORGET_S = 1.0, 3600.0
 """How often we announce ourselves, and after how long a silent participant is forgotten: one that was
 stopped for longer than its lease, as in a debugger, goes on with the sequence numbers that it knows.
 """
-_MOST_EARLY = 64
-
-
-@dataclass(frozen=True, slots=True)
-class _Service:
-    request_topic: str
-    response_topic: str
-    type: str
-    """Of both without `Request_` and `Response_`: `crtk_msgs::srv::dds_::QueryForwardKinematics_`."""
-    reader_id: bytes
-    """Of requests."""
-    writer_id: bytes
-    """Of responses."""
-    handle: ServiceHandler
-
-
-@dataclass(frozen=True, slots=True)
-class _Subscription:
-    topic: str
-    type: str
-    """`crtk_msgs::msg::dds_::StringStamped_`."""
-    reader_id: bytes
-    user_data: str
-    receive: ReceiveSample
-
-
-@dataclass(slots=True)
-class _ParticipantProxy:
-    """A remote participant, and our endpoints that are matched with its own."""
-
-    metatraffic: tuple[str, int]
-    """Address where it receives SPDP and SEDP."""
-    default: tuple[str, int]
-    """Address where it receives all else."""
-    announced_s: float
-    """When it announced itself last, by the monotonic clock."""
-    readers: dict[bytes, StatefulReader] = field(default_factory=dict[bytes, StatefulReader])
-    """By EntityId of the remote writer."""
-    writers: dict[tuple[bytes, bytes], StatefulWriter] = field(
-        default_factory=dict[tuple[bytes, bytes], StatefulWriter]
-    )
-    """By EntityIds of our writer and the remote reader."""
-    publications: dict[bytes, bytes] = field(default_factory=dict[bytes, bytes])
-    """Topics, as parameters have them, by EntityId of the remote writer."""
-    gone: set[bytes] = field(default_factory=set[bytes])
-    """EntityIds of writers that have announced their end."""
-    unmatched: deque[Data | Heartbeat | Gap] = field(
-        default_factory=lambda: deque["Data | Heartbeat | Gap"](maxlen=_MOST_EARLY)
-    )
-    """What writers have sent that are not discovered yet: they may not send it again."""
-    early: list[tuple[_Service, Data]] = field(default_factory=list["tuple[_Service, Data]"])
-    """Requests of clients whose readers of responses are not discovered yet."""
+_MOST_PARTICIPANTS = 512
+"""Of a domain: whatever is sent on it, memory is limited."""
 
 
 class ServiceParticipant:
@@ -155,9 +93,9 @@ class ServiceParticipant:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1" if is_local else "", 0))
         self._host = "127.0.0.1" if is_local else _own_address(domain)
-        self._services: list[_Service] = []
-        self._subscriptions: list[_Subscription] = []
-        self._proxies: dict[bytes, _ParticipantProxy] = {}
+        self._services: list[Service] = []
+        self._subscriptions: list[Subscription] = []
+        self._proxies: dict[bytes, ParticipantProxy] = {}
         """By GUID prefix."""
         self._changing = threading.Lock()
         self._ended = threading.Event()
@@ -183,7 +121,7 @@ class ServiceParticipant:
         """
         package, group, name = ros_type.split("/")
         key = self._next_key()
-        service = _Service(
+        service = Service(
             f"rq{topic}Request",
             f"rr{topic}Reply",
             f"{package}::{group}::dds_::{name}_",
@@ -202,8 +140,7 @@ class ServiceParticipant:
         """Subscribe to a topic, reliable and volatile.
 
         Every message of a writer that counts itself matched is received, once and in order, however early it
-        is sent, as far as the writer's history reaches. Messages in fragments are not received: those above
-        64 kB of rmw_fastrtps and above 1.3 kB of rmw_cyclonedds.
+        is sent, as far as the writer's history reaches; one in fragments up to `fragments.MOST_BYTES`.
 
         Args:
             topic: name of the ROS topic: `/PSM1/state_command`.
@@ -215,7 +152,7 @@ class ServiceParticipant:
             GUID (16 bytes) of the reader.
         """
         package, group, name = ros_type.split("/")
-        subscription = _Subscription(
+        subscription = Subscription(
             f"rt{topic}",
             f"{package}::{group}::dds_::{name}_",
             self._next_key() + READER_NO_KEY,
@@ -281,7 +218,7 @@ class ServiceParticipant:
 
     def _receive(self, message: Message, host: str) -> None:
         prefix = message.guid_prefix
-        if prefix[:2] not in (_FAST_DDS, _CYCLONE_DDS) or prefix == self._gateway:
+        if prefix[:2] not in (FAST_DDS, CYCLONE_DDS) or prefix == self._gateway:
             return
         with self._changing:
             for part in message.submessages:
@@ -294,7 +231,7 @@ class ServiceParticipant:
                     if (writer := proxy.writers.get((part.writer_id, part.reader_id))) is not None:
                         writer.on_acknack(part)
                 elif (reader := proxy.readers.get(part.writer_id)) is not None:
-                    _dispatch(reader, part)
+                    reader.receive(part)
                 else:
                     self._on_unmatched(prefix, proxy, part)
 
@@ -307,8 +244,10 @@ class ServiceParticipant:
         if known is not None:
             known.announced_s = monotonic()
             return
+        if len(self._proxies) >= _MOST_PARTICIPANTS:
+            raise MessageError(f"a participant of RTPS beside {_MOST_PARTICIPANTS} others is not answered")
         metatraffic, default = ((host, port) for port in announced_participant(announcement))
-        proxy = self._proxies[prefix] = _ParticipantProxy(metatraffic, default, monotonic())
+        proxy = self._proxies[prefix] = ParticipantProxy(metatraffic, default, monotonic())
         send = self._sender(prefix, metatraffic)
         proxy.readers[PUBLICATIONS_WRITER] = _matched_reader(
             send, prefix, PUBLICATIONS_READER, PUBLICATIONS_WRITER, partial(self._on_publication, prefix)
@@ -334,9 +273,10 @@ class ServiceParticipant:
             gone = disposed_endpoint_id(announcement)
             proxy.readers.pop(gone, None)
             proxy.publications.pop(gone, None)
-            proxy.gone.add(gone)
+            proxy.gone.append(gone)
             return
         topic, writer_id = announced_endpoint(announcement)
+        require_room(proxy.publications)
         proxy.publications[writer_id] = topic
         self._match_publication(prefix, writer_id)
 
@@ -350,7 +290,7 @@ class ServiceParticipant:
         if found is not None and writer_id not in proxy.readers:
             self._match(prefix, proxy, writer_id, *found)
 
-    def _on_unmatched(self, prefix: bytes, proxy: _ParticipantProxy, part: Data | Heartbeat | Gap) -> None:
+    def _on_unmatched(self, prefix: bytes, proxy: ParticipantProxy, part: FromWriter) -> None:
         """Match a writer that is not discovered yet with the reader that it addresses, or discover it now."""
         if part.writer_id in proxy.gone:
             return
@@ -360,21 +300,22 @@ class ServiceParticipant:
                 deliver = partial(_on_message, subscription, prefix)
                 self._match(prefix, proxy, part.writer_id, part.reader_id, deliver)
                 return
-        if prefix.startswith(_FAST_DDS):
+        if prefix.startswith(FAST_DDS):
             proxy.readers[PUBLICATIONS_WRITER].request_heartbeat()
 
     def _match(
         self,
         prefix: bytes,
-        proxy: _ParticipantProxy,
+        proxy: ParticipantProxy,
         writer_id: bytes,
         reader_id: bytes,
         deliver: Callable[[Data], None],
     ) -> None:
+        require_room(proxy.readers)
         send = self._sender(prefix, proxy.default)
         reader = proxy.readers[writer_id] = _matched_reader(send, prefix, reader_id, writer_id, deliver)
         for part in [part for part in proxy.unmatched if part.writer_id == writer_id]:
-            _dispatch(reader, part)
+            reader.receive(part)
 
     def _reader_of(self, topic: bytes, prefix: bytes) -> tuple[bytes, Callable[[Data], None]] | None:
         """Return EntityId and handler of our reader of a topic, which is as a parameter has it."""
@@ -396,52 +337,29 @@ class ServiceParticipant:
         topic, reader_id = announced_endpoint(announcement)
         for service in self._services:
             if topic.startswith(encode_string(service.response_topic)):
+                require_room(proxy.writers)
                 proxy.writers[service.writer_id, reader_id] = StatefulWriter(
                     self._sender(prefix, proxy.default), service.writer_id, reader_id
                 )
-        early, proxy.early = proxy.early, []
+        early = tuple(proxy.early)
+        proxy.early.clear()
         for service, request in early:
             self._on_request(service, prefix, request)
 
-    def _on_request(self, service: _Service, prefix: bytes, request: Data) -> None:
-        """Send the response: to the client that the inline QoS names, or to all clients of the participant.
-
-        Of those with rmw_cyclonedds each looks for its own header.
-        """
-        proxy, payload = self._proxies[prefix], request.payload
-        if prefix.startswith(_FAST_DDS):
-            qos = request.inline_qos
-            client = qos.get(Pid.RELATED_SAMPLE_IDENTITY) or qos.get(Pid.RELATED_SAMPLE_IDENTITY_EPROSIMA)
-            reader_guid = (client or b"")[:16]
-            identity = reader_guid + encode_sequence_number(request.sequence_number)
-            header, inline_qos = (
-                b"",
-                {
-                    int(Pid.RELATED_SAMPLE_IDENTITY): identity,
-                    int(Pid.RELATED_SAMPLE_IDENTITY_EPROSIMA): identity,
-                },
-            )
-            writers = [
-                writer
-                for ids, writer in proxy.writers.items()
-                if ids == (service.writer_id, reader_guid[12:])
-            ]
-        else:
-            header, inline_qos = payload[_CYCLONE_HEADER], {}
-            payload = payload[: _CYCLONE_HEADER.start] + payload[_CYCLONE_HEADER.stop :]
-            writers = [writer for ids, writer in proxy.writers.items() if ids[0] == service.writer_id]
+    def _on_request(self, service: Service, prefix: bytes, request: Data) -> None:
+        """Send the response to a request, as soon as the reader of the client is discovered."""
+        proxy, response = self._proxies[prefix], ResponseTo(request, prefix)
+        writers = [writer for ids, writer in proxy.writers.items() if response.is_for(ids, service.writer_id)]
         if not writers:
-            proxy.early = [*proxy.early, (service, request)][-_MOST_EARLY:]
+            proxy.early.append((service, request))
             return
         try:
-            response = service.handle(payload)
+            content = service.handle(response.request)
         except MessageError as error:
             log.warning("%s: a request is not answered: %s", service.request_topic, error)
             return
         for writer in writers:
-            writer.write(
-                response[: _CYCLONE_HEADER.start] + header + response[_CYCLONE_HEADER.start :], inline_qos
-            )
+            writer.write(response.payload(content), response.inline_qos)
 
     def _announce_participant(self, targets: Sequence[tuple[str, int]]) -> None:
         """SPDP: announce ourselves."""
@@ -449,7 +367,7 @@ class ServiceParticipant:
         data = encode_data(SPDP_WRITER, SPDP_READER, 1, payload)
         self._send(encode_message(self._guid_prefix, bytes(12), [data]), targets)
 
-    def _announce_endpoints(self, proxy: _ParticipantProxy, service: _Service) -> None:
+    def _announce_endpoints(self, proxy: ParticipantProxy, service: Service) -> None:
         """SEDP: announce the reader of requests and the writer of responses."""
         for ids, entity_id, topic, type_ in (
             (
@@ -467,7 +385,7 @@ class ServiceParticipant:
         ):
             proxy.writers[ids].write(endpoint_data(self._guid_prefix, entity_id, topic, type_), {})
 
-    def _announce_subscription(self, proxy: _ParticipantProxy, subscription: _Subscription) -> None:
+    def _announce_subscription(self, proxy: ParticipantProxy, subscription: Subscription) -> None:
         """SEDP: announce the reader of a topic."""
         announcement = endpoint_data(
             self._guid_prefix,
@@ -515,23 +433,14 @@ def _matched_reader(
     Cyclone DDS sends a HEARTBEAT by itself, and takes the request for one as malformed.
     """
     reader = StatefulReader(send, reader_id, writer_id, deliver)
-    if prefix.startswith(_FAST_DDS):
+    if prefix.startswith(FAST_DDS):
         reader.request_heartbeat()
     return reader
 
 
-def _on_message(subscription: _Subscription, prefix: bytes, sample: Data) -> None:
+def _on_message(subscription: Subscription, prefix: bytes, sample: Data) -> None:
     if sample.payload and not is_disposed(sample):
         subscription.receive(sample.payload, prefix + PARTICIPANT)
-
-
-def _dispatch(reader: StatefulReader, part: Data | Heartbeat | Gap) -> None:
-    if isinstance(part, Data):
-        reader.on_data(part)
-    elif isinstance(part, Heartbeat):
-        reader.on_heartbeat(part)
-    else:
-        reader.on_gap(part)
 
 
 def _own_address(domain: int) -> str:

@@ -9,15 +9,21 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
+from devices.ros.dds.fragments import PartialSample
 from devices.ros.dds.rtps import (
     AckNack,
     Data,
+    DataFragments,
+    FromWriter,
     Gap,
     Heartbeat,
+    HeartbeatFragments,
     encode_acknack,
     encode_data,
     encode_heartbeat,
+    encode_nack_fragments,
 )
+from schemas.errors import MessageError
 
 __all__ = ["SendSubmessages", "StatefulReader", "StatefulWriter"]
 
@@ -26,6 +32,8 @@ SendSubmessages = Callable[[Sequence[bytes]], None]
 
 _HISTORY = 64
 """Samples that a writer keeps for retransmission, and that a reader keeps while earlier ones are missing."""
+_MOST_PARTIAL = 4
+"""Samples of one writer that are put together of fragments at a time; the next ones are requested again."""
 
 
 class StatefulWriter:
@@ -85,6 +93,7 @@ class StatefulReader:
         self._expected, self._acknacks = 1, 0
         self._early: dict[int, Data | None] = {}
         """Samples that arrived before their turn, by sequence number; None: irrelevant by a GAP."""
+        self._partial: dict[int, PartialSample] = {}
 
     def request_heartbeat(self) -> None:
         """Send an ACKNACK of base 0, to which the writer answers with a HEARTBEAT.
@@ -98,28 +107,73 @@ class StatefulReader:
         self._acknacks += 1
         self._send([encode_acknack(self._writer_id, self.reader_id, base, missing, self._acknacks)])
 
-    def on_data(self, sample: Data) -> None:
+    def receive(self, part: FromWriter) -> None:
+        """Take what the writer has sent. Raises MessageError if fragments do not fit one another."""
+        match part:
+            case Data():
+                self._on_data(part)
+            case DataFragments():
+                self._on_fragments(part)
+            case Heartbeat():
+                self._on_heartbeat(part)
+            case HeartbeatFragments():
+                self._request_fragments(part.sequence_number, part.last)
+            case Gap():
+                self._on_gap(part)
+
+    def _on_data(self, sample: Data) -> None:
         """Deliver a sample in its turn."""
         if self._expected <= sample.sequence_number < self._expected + _HISTORY:
             self._early.setdefault(sample.sequence_number, sample)
         self._deliver_next()
 
-    def on_heartbeat(self, heartbeat: Heartbeat) -> None:
-        """Request the samples that the writer has and this reader has not."""
+    def _on_fragments(self, part: DataFragments) -> None:
+        """Deliver a sample in its turn, when all its fragments have arrived."""
+        number = part.sequence_number
+        if not self._expected <= number < self._expected + _HISTORY or number in self._early:
+            return
+        if number not in self._partial:
+            if len(self._partial) == _MOST_PARTIAL:
+                return
+            self._partial[number] = PartialSample(part)
+        sample = self._partial[number]
+        try:
+            sample.add(part)
+        except MessageError:
+            del self._partial[number]  # which of the two is wrong is unknown: it is requested anew
+            raise
+        if not sample.missing():
+            del self._partial[number]
+            self._on_data(sample.whole(part))
+
+    def _request_fragments(self, number: int, last: int | None = None) -> None:
+        """Request the fragments, up to `last`, that are missing of a sample of which some have arrived."""
+        missing = self._partial[number].missing(last) if number in self._partial else ()
+        if missing:
+            self._acknacks += 1
+            self._send(
+                [encode_nack_fragments(self._writer_id, self.reader_id, number, missing, self._acknacks)]
+            )
+
+    def _on_heartbeat(self, heartbeat: Heartbeat) -> None:
+        """Request the samples, and fragments of samples, that the writer has and this reader has not."""
         self._skip_to(heartbeat.first)
         missing = [
             number
             for number in range(self._expected, min(heartbeat.last + 1, self._expected + _HISTORY))
-            if number not in self._early
+            if number not in self._early and number not in self._partial
         ]
         if missing or not heartbeat.is_final:
             self._acknack(self._expected, missing)
+        for number in tuple(self._partial):
+            self._request_fragments(number)
 
-    def on_gap(self, gap: Gap) -> None:
+    def _on_gap(self, gap: Gap) -> None:
         """Do not wait for irrelevant samples any more."""
         for number in gap.others:
             if self._expected <= number < self._expected + _HISTORY:
                 self._early.setdefault(number, None)
+                self._partial.pop(number, None)
         if gap.start <= self._expected:
             self._skip_to(gap.base)
         self._deliver_next()
@@ -128,6 +182,7 @@ class StatefulReader:
         if first > self._expected:
             self._expected = first
             self._early = {number: sample for number, sample in self._early.items() if number >= first}
+            self._partial = {number: sample for number, sample in self._partial.items() if number >= first}
         self._deliver_next()
 
     def _deliver_next(self) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices, TetMesh
+from engines.bullet.meshing.tet_mesh import Indices, TetMesh, cross
 from schemas.vectors import Vector
 
 __all__ = ["Elasticity"]
@@ -38,7 +38,7 @@ class Elasticity:
         around = at[self._tetrahedra].any(axis=1)
         tetrahedra: Indices = self._tetrahedra[around]
         F = np.einsum("mai,maj->mij", nodes[tetrahedra], self._gradients[around])
-        cofactor = np.stack([np.cross(F[:, :, (i + 1) % 3], F[:, :, (i + 2) % 3]) for i in range(3)], axis=2)
+        cofactor = np.stack([cross(F[:, :, (i + 1) % 3], F[:, :, (i + 2) % 3]) for i in range(3)], axis=2)
         J = np.einsum("mi,mi->m", F[:, :, 0], cofactor[:, :, 0])
         stretch = self._mu * (1.0 - 1.0 / (np.einsum("mij,mij->m", F, F) + 1.0))
         stress = stretch[:, None, None] * F + (self._lambda * (J - self._alpha))[:, None, None] * cofactor

@@ -18,7 +18,7 @@ import numpy as np
 
 from engines.bullet.elasticity.forces import Elasticity
 from engines.bullet.elasticity.material import Material
-from engines.bullet.meshing.tet_mesh import Indices
+from engines.bullet.meshing.tet_mesh import Indices, cross
 from engines.bullet.organs.organ import Organ
 from engines.bullet.probes.probe import Probe
 from schemas.vectors import Vector
@@ -44,6 +44,12 @@ _LEAST_PART = 1e-3
 
 _LEAST_FORCE_N = 5e-3
 """Below this the inertia of the touched nodes, of some 0.1 g each, counts in what they receive."""
+
+_NEXT = (1, 2, 0)
+"""Corner of a triangle after each."""
+
+_ALL_SIDES = 0b111111
+"""The six sides of a box, each a bit."""
 
 
 class Tissue:
@@ -108,11 +114,13 @@ class Contacts:
         """Correct every gain by what the tissue receives; the organs' nodes have just been read."""
         touches: list[list[_Touch]] = [[] for _ in self._tissues]
         for probe in probes:
+            loose = np.flatnonzero(~probe.held)
+            found = [_touches(tissue, probe, loose) for tissue in self._tissues]
             for sphere in range(len(probe.radii)):
-                nearest = None if probe.held[sphere] else self._nearest(probe, sphere)
-                probe.touching[sphere] = nearest is not None
-                if nearest is not None:
-                    i, touch = nearest
+                here = [(i, touch[sphere]) for i, touch in enumerate(found) if sphere in touch]
+                probe.touching[sphere] = bool(here)
+                if here:
+                    i, touch = min(here, key=lambda item: item[1].distance)
                     touches[i].append(touch)
                 else:
                     probe.gains[sphere] = probe.corrections[sphere] = 1.0
@@ -121,34 +129,55 @@ class Contacts:
                 _correct(tissue, here)
             tissue.advance()
 
-    def _nearest(self, probe: Probe, sphere: int) -> tuple[int, _Touch] | None:
-        """Return the number of the nearest organ that a sphere touches, and the touch; None without one."""
-        found = [(i, touch) for i, t in enumerate(self._tissues) if (touch := _touch(t, probe, sphere))]
-        return min(found, key=lambda item: item[1].distance, default=None)
-
 
 def touched_faces(
-    centre: Vector, reach: float, nodes: Vector, faces: Indices
-) -> tuple[Indices, Vector, Vector]:
-    """Return the faces nearer than `reach` (m) to `centre`, shape (f, 3).
+    centres: Vector, reach: Vector, nodes: Vector, faces: Indices
+) -> tuple[Indices, Indices, Vector, Vector]:
+    """Return which spheres touch which faces: all pairs with a distance below the sphere's `reach`.
 
-    Also returns the barycentric coordinates of their nearest points, shape (f, 3), and their distances (m),
-    shape (f,).
+    A pair is the number of the sphere, shape (p,), and its face, shape (p, 3). Also returned are the
+    barycentric coordinates of the faces' nearest points, shape (p, 3), and their distances (m), shape (p,).
+    Pairs stand in the order of the spheres, then of the faces.
+
+    Args:
+        centres: of the spheres, m, shape (k, 3).
+        reach: of each, m, shape (k,).
+        nodes: m, shape (n, 3).
+        faces: the three nodes of each, shape (f, 3).
     """
-    corners = nodes[faces]  # (f, 3, 3)
-    near = ((corners.min(axis=1) < centre + reach) & (corners.max(axis=1) > centre - reach)).all(axis=1)
-    weights, distance = closest_points(centre, corners[near])
-    within = distance < reach
-    return faces[near][within], weights[within], distance[within]
+    low, high = centres - reach[:, None], centres + reach[:, None]
+    close = np.flatnonzero(((nodes.min(axis=0) < high) & (nodes.max(axis=0) > low)).all(axis=1))
+    if not close.size:
+        return close, np.zeros((0, 3), np.int64), np.zeros((0, 3)), np.zeros(0)
+    # A face is near where on each of the six sides of the sphere's box some corner of it is inside.
+    inside = np.concatenate([nodes < high[close, None], nodes > low[close, None]], axis=2)  # (c, n, 6)
+    sides = np.packbits(inside, axis=2, bitorder="little")[:, :, 0]
+    a, b, c = faces.T
+    sphere, face = np.nonzero((sides[:, a] | sides[:, b] | sides[:, c]) == _ALL_SIDES)
+    sphere, corners = close[sphere], faces[face]
+    weights, distance = closest_points(centres[sphere], nodes[corners])
+    within = distance < reach[sphere]
+    return sphere[within], corners[within], weights[within], distance[within]
 
 
-def _touch(tissue: Tissue, probe: Probe, sphere: int) -> _Touch | None:
-    reach = float(probe.radii[sphere]) + _BAND_M
-    faces, weights, distance = touched_faces(
-        probe.positions[sphere], reach, tissue.organ.nodes, tissue.organ.touchable
+def _touches(tissue: Tissue, probe: Probe, loose: Indices) -> dict[int, _Touch]:
+    """Return by number, of the spheres `loose`, those that touch the tissue."""
+    reach = probe.radii[loose] + _BAND_M
+    organ = tissue.organ
+    pairs, faces, weights, distances = touched_faces(
+        probe.positions[loose], reach, organ.nodes, organ.touchable
     )
-    if not len(faces):
-        return None
+    starts = np.searchsorted(pairs, np.arange(len(loose) + 1)).tolist()
+    return {
+        sphere: _touch(probe, sphere, reach[i], faces[start:end], weights[start:end], distances[start:end])
+        for i, (sphere, start, end) in enumerate(zip(loose.tolist(), starts[:-1], starts[1:], strict=True))
+        if start < end
+    }
+
+
+def _touch(
+    probe: Probe, sphere: int, reach: float, faces: Indices, weights: Vector, distance: Vector
+) -> _Touch:
     share, s = reach - distance, np.einsum("fi,fi->f", weights, weights)
     guess = float(share @ ((1.0 + s) ** 2 / (4.0 * s)) / share.sum())
     touched, place = np.unique(faces, return_inverse=True)
@@ -179,27 +208,26 @@ def _correct(tissue: Tissue, touches: Sequence[_Touch]) -> None:
 
 
 def closest_points(point: Vector, corners: Vector) -> tuple[Vector, Vector]:
-    """Return the points of triangles that are nearest to `point` (m).
+    """Return the points of triangles that are nearest to `point` (m), one for all or one for each.
 
     They come as barycentric coordinates, shape (f, 3), with their distances (m), shape (f,). The nearest
     point is the foot of the perpendicular if that lies inside the triangle, else it lies on an edge.
     """
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal, to_point = np.cross(b - a, c - a), point - a
+    edges = corners.take(_NEXT, axis=1) - corners  # (f, 3, 3): edge k from corner k
+    to_point = np.reshape(point, (-1, 1, 3)) - corners  # (f, 3, 3)
+    b, c = edges[:, 0], corners[:, 2] - corners[:, 0]  # from corner 0
+    normal = cross(b, c)
     square = np.einsum("fi,fi->f", normal, normal)
-    on_c = np.einsum("fi,fi->f", np.cross(b - a, to_point), normal) / square
-    on_b = np.einsum("fi,fi->f", np.cross(to_point, c - a), normal) / square
+    on_c = np.einsum("fi,fi->f", cross(b, to_point[:, 0]), normal) / square
+    on_b = np.einsum("fi,fi->f", cross(to_point[:, 0], c), normal) / square
+    along = np.einsum("fki,fki->fk", to_point, edges) / np.einsum("fki,fki->fk", edges, edges)
+    along = np.minimum(np.maximum(along, 0.0), 1.0)
     candidates = np.zeros((4, len(corners), 3))
-    candidates[0] = np.stack([1.0 - on_b - on_c, on_b, on_c], axis=1)
-    for i, (start, end) in enumerate(((0, 1), (1, 2), (2, 0)), start=1):
-        edge = corners[:, end] - corners[:, start]
-        along = np.clip(
-            np.einsum("fi,fi->f", point - corners[:, start], edge) / np.einsum("fi,fi->f", edge, edge),
-            0.0,
-            1.0,
-        )
-        candidates[i, :, start], candidates[i, :, end] = 1.0 - along, along
-    distance = np.linalg.norm(np.einsum("kfi,fij->kfj", candidates, corners) - point, axis=2)
+    candidates[0, :, 0], candidates[0, :, 1], candidates[0, :, 2] = 1.0 - on_b - on_c, on_b, on_c
+    for i in range(3):
+        candidates[1 + i, :, i], candidates[1 + i, :, _NEXT[i]] = 1.0 - along[:, i], along[:, i]
+    away = np.einsum("kfi,fij->kfj", candidates, corners) - point
+    distance = np.sqrt((away * away).sum(axis=2))
     distance[0, (candidates[0] < 0.0).any(axis=1)] = np.inf
     best, face = distance.argmin(axis=0), np.arange(len(corners))
     return candidates[best, face], distance[best, face]

@@ -63,10 +63,6 @@ class Probe:
         """
         self.touching = np.zeros(n, dtype=np.bool_)
         """Which spheres touched an organ at the last reading of the contacts, shape (n,)."""
-        self.contacts = np.zeros((n, 3))
-        """Force (N) with which each proxy pressed on what it touched in the last sub-step, as Bullet has it,
-        shape (n, 3).
-        """
         self._side = ForceSide(bond, plan)
         self._coupling = coupling
         self._weight = np.array([0.0, 0.0, coupling.mass * gravity])
@@ -79,14 +75,15 @@ class Probe:
         """Centres of the spheres on the instrument at the end of the step, as predicted, m, frame `world`,
         shape (n, 3).
         """
+        self._applied = np.zeros((n, 3))  # in Bullet, without the weight
+        self._dt, self._velocities_before = 1.0, self.velocities  # of and before the last sub-step
         self._reset = np.zeros((n, 3))  # force of the spring when the proxy is at its target
         self._reset_rate = 1.0 / coupling.reset_time if coupling.reset_time else 0.0
         self._placed = False
         self._client = client
         self.bodies: list[int] = [self._sphere(radius) for radius in self.radii.tolist()]
         """Bullet's number of every proxy."""
-        self._read_pose, self._read_velocity, self._apply, self._frame = (
-            bullet.getBasePositionAndOrientation,
+        self._read_velocity, self._apply, self._frame = (
             bullet.getBaseVelocity,
             bullet.applyExternalForce,
             bullet.WORLD_FRAME,
@@ -100,6 +97,14 @@ class Probe:
         """
         return self._springs + self._dampers
 
+    @property
+    def contacts(self) -> Vector:
+        """Force (N) with which each proxy pressed on what it touched in the last sub-step, shape (n, 3).
+
+        As Bullet has it.
+        """
+        return self._applied - self._coupling.mass / self._dt * (self.velocities - self._velocities_before)
+
     def begin(self, inputs: Inputs, h: float) -> None:
         """Take the other side's motion at the start of a step of `h` seconds."""
         self._side.begin(inputs, h)
@@ -110,21 +115,24 @@ class Probe:
         """Apply the coupling forces of the sub-step of `dt` seconds around `tau`, taken at its middle."""
         self._stretch(tau, 0.5 * dt)
         self._side.add(self._spring, self._damper, tau, dt)
-        self._reset += self._reset_rate * dt * (self._springs - self._reset)
+        if self._reset_rate:
+            self._reset += self._reset_rate * dt * (self._springs - self._reset)
         self._applied = self.gains[:, None] * (self._springs + self._dampers)
+        apply, frame, client = self._apply, self._frame, self._client
         for body, force, position in zip(
             self.bodies, (self._applied + self._weight).tolist(), self.positions.tolist(), strict=True
         ):
-            self._apply(body, -1, force, position, self._frame, physicsClientId=self._client)
+            apply(body, -1, force, position, frame, client)
 
     def read(self, dt: float) -> None:
-        """Take positions and velocities from Bullet after a sub-step of `dt` seconds."""
-        client, before = self._client, self.velocities
-        self.positions = np.array([self._read_pose(body, physicsClientId=client)[0] for body in self.bodies])
-        self.velocities = np.array(
-            [self._read_velocity(body, physicsClientId=client)[0] for body in self.bodies]
-        )
-        self.contacts = self._applied - self._coupling.mass / dt * (self.velocities - before)
+        """Take velocities from Bullet after a sub-step of `dt` seconds, and move as it does.
+
+        A multi-body moves by its velocity times the sub-step, so the positions need not be read.
+        """
+        read, client = self._read_velocity, self._client
+        self._dt, self._velocities_before = dt, self.velocities
+        self.velocities = np.array([read(body, client)[0] for body in self.bodies])
+        self.positions = self.positions + dt * self.velocities
 
     def result(self, t: int, h: float) -> dict[str, Vector]:
         """Return force or wrench, and work, at the end `t` (ns) of a step of `h` seconds.
@@ -160,10 +168,14 @@ class Probe:
         The proxies are taken where they will be `ahead` seconds from now.
         """
         self.targets, velocities = self._motion(tau)
-        self._springs[:] = (
-            self._coupling.stiffness * (self.targets - self.positions - ahead * self.velocities) + self._reset
-        )
-        self._dampers[:] = self._coupling.damping * (velocities - self.velocities)
+        springs, dampers = self._springs, self._dampers
+        np.subtract(self.targets, self.positions, out=springs)
+        if ahead:
+            springs -= ahead * self.velocities
+        springs *= self._coupling.stiffness
+        springs += self._reset
+        np.subtract(velocities, self.velocities, out=dampers)
+        dampers *= self._coupling.damping
 
     def _motion(self, tau: float) -> tuple[Vector, Vector]:
         """Return positions (m) and velocities (m/s) of the instrument's spheres, shapes (n, 3).

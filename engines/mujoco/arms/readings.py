@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from engines.mujoco.arms.servos import Servos
 from engines.mujoco.model import FINGERS, first_sensor
 from engines.mujoco.model.poses import ROS_ORDER
-from engines.mujoco.params import EcmParams, PsmParams, has_jaw
+from engines.mujoco.params import has_jaw
+from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
@@ -35,7 +36,7 @@ class Readings:
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        arms: Mapping[CartArm, PsmParams | EcmParams],
+        arms: Mapping[CartArm, MountedPsm | MountedEcm],
         servos: Servos,
     ) -> None:
         """Report on `arms`."""
@@ -51,12 +52,12 @@ class Readings:
             self.outputs[f"{arm}/measured_js"] = self._sensors[first : first + 3 * n]
             self.outputs[f"{arm}/setpoint_js"] = servos.arm_setpoint(arm)
             self.outputs[f"{arm}/measured_cp"] = self._poses[7 * i : 7 * i + 7]
-            if isinstance(params, PsmParams) and has_jaw(params):
+            if isinstance(params, MountedPsm) and has_jaw(params):
                 fingers = int(model.sensor(f"{arm}/position/{FINGERS[0]}").adr[0])
                 jaw = self.outputs[f"{arm}/jaw/measured_js"] = np.empty(3 * len(params.tool.jaw_joints))
                 matrix = _JAW if params.tool.roller is None else _ROLLING_JAW
                 self._jaws.append((matrix, self._sensors[fingers : fingers + matrix.shape[1]], jaw))
-            elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+            elif isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
                 fingers, k, m = (
                     int(model.sensor(f"{arm}/position/{hand.fingers[0]}").adr[0]),
                     3 * len(hand.joints),

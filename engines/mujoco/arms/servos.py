@@ -15,14 +15,14 @@ import mujoco
 import numpy as np
 
 from engines.mujoco.model import FINGERS
-from engines.mujoco.params import EcmParams, PsmParams
 from hub.participant import Inputs
 from robots.dvrk.instruments import Jaw
+from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.rolling_needle_driver import PADS, ROLLER
 from robots.dvrk.setup_joints import CartArm
 from robots.serial_chain import Joint
 from schemas.errors import SessionError
-from schemas.vectors import Vector
+from schemas.vectors import Vector, joined
 
 __all__ = ["Servos"]
 
@@ -65,7 +65,7 @@ class Servos:
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        arms: Mapping[CartArm, PsmParams | EcmParams],
+        arms: Mapping[CartArm, MountedPsm | MountedEcm],
         period: float,
     ) -> None:
         """Drive `arms`, which are stepped every `period` seconds, from where they start."""
@@ -75,9 +75,9 @@ class Servos:
         shares: list[_Share] = []
         for arm, params in arms.items():
             self._add_joints(arm, f"{arm}/", params.chain.joints, params.start, rows, shares)
-            if isinstance(params, PsmParams) and params.tool.jaw is not None:
+            if isinstance(params, MountedPsm) and params.tool.jaw is not None:
                 self._add_jaw(arm, params, params.tool.jaw, rows, shares)
-            elif isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+            elif isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
                 self._add_joints(arm, f"{arm}/hand/", hand.joints, params.hand, rows, shares)
         start, self._lower, self._upper, speed = np.array(rows).T.copy()
         n = start.size
@@ -97,6 +97,8 @@ class Servos:
         self.off: frozenset[str] = frozenset()
         """The arms whose joints have no torque."""
         self._holding = True
+        self._at_rest = b""
+        """The commands and modes that have been reached; empty while setpoints move."""
         np.multiply(self._springs, start - self._rest, out=self._effort)
         self._layout.dot(self._inputs, data.ctrl)
 
@@ -116,7 +118,9 @@ class Servos:
             (q, joint.lower, joint.upper, joint.velocity) for q, joint in zip(start, joints, strict=True)
         ]
 
-    def _add_jaw(self, arm: str, params: PsmParams, jaw: Jaw, rows: list[_Row], shares: list[_Share]) -> None:
+    def _add_jaw(
+        self, arm: str, params: MountedPsm, jaw: Jaw, rows: list[_Row], shares: list[_Share]
+    ) -> None:
         """Add a jaw, whose two fingers share one drive, and the roller in it."""
         self._add_group(arm, f"{arm}/jaw/", list(FINGERS), len(rows), 1)
         group = self._groups[-1]
@@ -184,11 +188,15 @@ class Servos:
         return self.setpoint[next(group.part for group in self._groups if group.arm == arm)]
 
     def begin(self, inputs: Inputs) -> None:
-        """Take commands and modes for the step that begins.
+        """Take commands and modes for the step that begins; where they are reached, there is nothing to do.
 
         Raises SessionError for an unknown mode.
         """
-        np.concatenate([inputs[port] for port in self._ports], out=self._taken)
+        taken = [inputs[port] for port in self._ports]
+        asked = joined(taken)
+        if asked == self._at_rest:
+            return
+        np.concatenate(taken, out=self._taken)
         if self._asked.tobytes() != self._modes.tobytes():
             self._set_modes(self._asked)
         command, setpoint, reach = self._command, self.setpoint, self._reach
@@ -203,6 +211,8 @@ class Servos:
         if not self._holding:
             self._let_go(inputs)
         self._layout.dot(self._inputs, self._data.ctrl)
+        is_at_rest = self._holding and setpoint.tobytes() == self._previous.tobytes()
+        self._at_rest = asked if is_at_rest else b""
 
     def _let_go(self, inputs: Inputs) -> None:
         """Where no position is held, apply the commanded effort and let the setpoint follow the joint.
@@ -250,5 +260,6 @@ class Servos:
 
     @state.setter
     def state(self, state: Vector) -> None:
+        self._at_rest = b""
         self.setpoint[:] = state[: self.setpoint.size]
         self._set_modes(state[self.setpoint.size :])

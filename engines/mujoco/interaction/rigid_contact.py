@@ -36,7 +36,7 @@ class RigidContact:
         ]
         self._arms = np.arange(len(arms))
         self._sums, self._means = np.zeros((len(arms), 6)), np.zeros((len(arms), 6))
-        self._substeps = 0
+        self._substeps, self._is_touched = 0, False
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
 
     def add(self) -> None:
@@ -53,11 +53,16 @@ class RigidContact:
 
     def end(self) -> None:
         """Set the outputs to the mean over the sub-steps since the last call."""
+        if not self._is_touched:
+            if self._means.any():
+                self._means[:] = 0.0
+            self._substeps = 0
+            return
         for to_base, total, mean in zip(self._to_base, self._sums, self._means, strict=True):
             to_base.dot(total, mean)
         self._means /= self._substeps
         self._sums[:] = 0.0
-        self._substeps = 0
+        self._substeps, self._is_touched = 0, False
 
     def _add_contacts(self) -> None:
         model, data, contact = self._model, self._data, self._data.contact
@@ -65,6 +70,7 @@ class RigidContact:
         found = (owners[:, 0] != owners[:, 1]).nonzero()[0]
         if not len(found):
             return
+        self._is_touched = True
         loads = np.empty((len(found), 6))  # on the second geom: force and torque
         for load, i in zip(loads, found.tolist(), strict=True):
             mujoco.mj_contactForce(model, data, i, load)
@@ -85,6 +91,7 @@ class RigidContact:
 
         Its free joint has the force at its origin in the world, and the torque in its own frame.
         """
+        self._is_touched = True
         model, data = self._model, self._data
         of_weld = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == weld)
         generalised = np.zeros(model.nv)

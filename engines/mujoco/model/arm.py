@@ -11,11 +11,11 @@ from engines.mujoco.model.names import FINGERS, sphere_site
 from engines.mujoco.model.poses import placed
 from engines.mujoco.model.shapes import Bodies
 from engines.mujoco.model.tree import BASE, Link, links
-from engines.mujoco.params import EcmParams, PsmParams
 from robots.dvrk import drives, inertia
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.contact_spheres import ContactSphere
 from robots.dvrk.drives import Drive
+from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.rolling_needle_driver import ROLLER
 from schemas.vectors import Vector
 
@@ -41,7 +41,7 @@ _MOTOR = (
 )
 
 
-def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose: Vector) -> Bodies:
+def add(spec: mujoco.MjSpec, name: str, params: MountedPsm | MountedEcm, base_pose: Vector) -> Bodies:
     """Add the arm called `name`, and return its bodies by link.
 
     `base_pose`: of its base frame in the world, shape (4, 4).
@@ -61,7 +61,7 @@ def add(spec: mujoco.MjSpec, name: str, params: PsmParams | EcmParams, base_pose
     chain = params.chain
     bodies[chain.joints[-1].name][0].add_site(name=f"{name}/tip", group=_HIDDEN, **placed(chain.tip))
     _add_sensors(spec, name, [joint.name for joint in chain.joints], has_jaw=FINGERS[0] in bodies)
-    if isinstance(params, PsmParams):
+    if isinstance(params, MountedPsm):
         if (hand := params.tool.hand) is not None:
             _add_sensors_of(
                 spec, name, _MOTOR, mujoco.mjtObj.mjOBJ_ACTUATOR, [motor.name for motor in hand.joints]
@@ -94,9 +94,9 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
         )
 
 
-def _add_drives(spec: mujoco.MjSpec, arm: str, params: PsmParams | EcmParams) -> None:
+def _add_drives(spec: mujoco.MjSpec, arm: str, params: MountedPsm | MountedEcm) -> None:
     """Give each independent joint its drive, and an instrument's discs the friction of wrist and jaw."""
-    is_psm = isinstance(params, PsmParams)
+    is_psm = isinstance(params, MountedPsm)
     driven = drives.psm(params.tool) if is_psm else drives.ECM
     hand, roller = (params.tool.hand, params.tool.roller) if is_psm else (None, None)
     for name, drive in driven.items():
@@ -150,9 +150,11 @@ def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
     )
 
 
-def _set_inertias(bodies: Bodies, params: PsmParams | EcmParams) -> None:
+def _set_inertias(bodies: Bodies, params: MountedPsm | MountedEcm) -> None:
     """Carry the inertia of each link, given in the base frame with every joint at 0, to its body."""
-    masses = inertia.psm(params.tool, params.probe_radius) if isinstance(params, PsmParams) else inertia.ecm()
+    masses = (
+        inertia.psm(params.tool, params.probe_radius) if isinstance(params, MountedPsm) else inertia.ecm()
+    )
     for link, given in masses.items():
         body, pose = bodies[link]
         turn = pose[:3, :3]

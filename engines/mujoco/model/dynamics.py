@@ -15,8 +15,9 @@ import numpy as np
 
 from engines.mujoco.model.scene import build
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import PsmParams, SceneParams
+from engines.mujoco.params import SceneParams
 from robots.dvrk import drives
+from robots.dvrk.mounted import MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
@@ -72,7 +73,7 @@ def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -
     mujoco.mj_fullM(model, data, inertia)
     driven, wrist = (
         (drives.psm(params.tool), drives.discs(params.tool))
-        if isinstance(params, PsmParams)
+        if isinstance(params, MountedPsm)
         else (drives.ECM, ())
     )
     at_rest = dict.fromkeys(driven, 0.0)

@@ -10,9 +10,9 @@ import numpy as np
 from engines.mujoco.model import arm, objects, setup_joints, shapes
 from engines.mujoco.model.names import FINGERS
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import EcmParams, PsmParams, SceneParams, has_hand
+from engines.mujoco.params import SceneParams, has_hand
 from robots import rotation
-from robots.dvrk.mounted import MountedArm
+from robots.dvrk.mounted import MountedArm, MountedEcm, MountedPsm
 from robots.dvrk.rolling_needle_driver import PADS
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
@@ -51,11 +51,13 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
     return result
 
 
-def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, PsmParams | EcmParams]) -> None:
+def place(
+    model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, MountedPsm | MountedEcm]
+) -> None:
     """Put the joints of `arms`, with linkages and fingers, where they start."""
     for name, params in arms.items():
         start = dict(zip((joint.name for joint in params.chain.joints), params.start, strict=True))
-        if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+        if isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
             start |= dict(
                 zip(
                     (link.name for link in hand.links),
@@ -67,7 +69,7 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, arms: Mapping[CartArm, Psm
         for link in links(name, params):
             if link.follow is not None:
                 q = link.follow.ratio * start[link.follow.joint]
-            elif link.name in FINGERS and isinstance(params, PsmParams):
+            elif link.name in FINGERS and isinstance(params, MountedPsm):
                 q = params.jaw / 2.0
             else:
                 q = start[link.name]

@@ -17,8 +17,9 @@ import numpy as np
 
 from engines.mujoco import looks
 from engines.mujoco.model.poses import placed
-from engines.mujoco.params import EcmParams, PsmParams, has_probe
+from engines.mujoco.params import has_probe
 from robots.dvrk.cart import inverse_pose
+from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.vectors import Vector
 
@@ -40,13 +41,13 @@ _UNSEEN_BY_PHYSICS = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": _SEE
 
 
 def add_arm(
-    spec: mujoco.MjSpec, arm: CartArm, params: PsmParams | EcmParams, bodies: Bodies, *, seen: bool
+    spec: mujoco.MjSpec, arm: CartArm, params: MountedPsm | MountedEcm, bodies: Bodies, *, seen: bool
 ) -> None:
     """Give an arm and its instrument collision shapes and, if they are to be `seen`, looks."""
-    whats = ("ecm",) if isinstance(params, EcmParams) else ("psm", f"instrument/{params.tool.name}")
+    whats = ("ecm",) if isinstance(params, MountedEcm) else ("psm", f"instrument/{params.tool.name}")
     for what in whats:
         add(spec, what, arm, bodies, seen=seen)
-    if isinstance(params, PsmParams) and has_probe(params):
+    if isinstance(params, MountedPsm) and has_probe(params):
         body, _ = bodies["wrist_yaw"]
         body.add_geom(
             name=f"{arm}/probe",

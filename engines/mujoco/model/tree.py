@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 
 from engines.mujoco.model.names import FINGERS
-from engines.mujoco.params import EcmParams, PsmParams
 from robots.dvrk.instruments import Instrument
 from robots.dvrk.linkage import LINKAGES
+from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.rolling_needle_driver import PADS
 from schemas.vectors import Vector
 
@@ -47,7 +47,7 @@ class Link:
     follow: Follow | None = None
 
 
-def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
+def links(arm: str, params: MountedPsm | MountedEcm) -> tuple[Link, ...]:
     """Return all moving links of `arm`, parents before children.
 
     They are its joints, then the linkage, then the fingers of a jaw with the pads of a roller, or the
@@ -74,12 +74,12 @@ def links(arm: str, params: PsmParams | EcmParams) -> tuple[Link, ...]:
             upper,
             Follow(passive.follows, passive.ratio),
         )
-    if isinstance(params, PsmParams) and (jaw := params.tool.jaw) is not None:
+    if isinstance(params, MountedPsm) and (jaw := params.tool.jaw) is not None:
         wrist = tree[chain.joints[-1].name]
         for name, turn in zip(FINGERS, (np.eye(4), _HALF_TURN), strict=True):
             tree[name] = Link(name, wrist.name, "revolute", wrist.pose @ turn, jaw.lower / 2, jaw.upper / 2)
         tree |= {pad.name: pad for pad in _pads(params.tool, wrist.pose, poses[-1][:3, 2])}
-    if isinstance(params, PsmParams) and (hand := params.tool.hand) is not None:
+    if isinstance(params, MountedPsm) and (hand := params.tool.hand) is not None:
         shaft = tree[chain.joints[-1].name].pose
         for bone in hand.links:
             tree[bone.name] = Link(

@@ -40,6 +40,7 @@ class Endoscope(Stepped):
 
     params_model: ClassVar[type[Params]] = EndoscopeParams
     params: EndoscopeParams
+    observer: ClassVar[bool] = True
 
     def __init__(self, name: str, params: EndoscopeParams) -> None:
         super().__init__(name, params)

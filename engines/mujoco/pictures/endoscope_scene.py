@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engines.mujoco.model import spec
-from engines.mujoco.params import EcmParams
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.skins import Skins, SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
 from robots.dvrk.endoscope import FAR, optical_in_roll
+from robots.dvrk.mounted import MountedEcm
 from schemas.vectors import Vector
 
 __all__ = ["EndoscopeScene", "look_at"]
@@ -43,7 +43,7 @@ class EndoscopeScene:
         far = params.far
         if params.view is not None:
             self._mounting = look_at(params.view)
-        elif isinstance(ecm, EcmParams):
+        elif isinstance(ecm, MountedEcm):
             self._carrier, self._mounting = self._model.body("ECM/roll").id, optical_in_roll(ecm.endoscope)
             far = far or FAR
         else:

@@ -369,3 +369,16 @@ def test_a_lock_keeps_position_or_orientation_and_lets_go_without_a_jump():
     assert np.allclose(moved - position, 19 * np.array([1e-5, 2e-5, -1e-5]), atol=1e-8)
     _, turned = lead(rotation=False)
     assert not np.allclose(turned, kept, atol=1e-3)
+
+
+def test_a_restored_command_does_not_keep_the_pose_of_the_tip_that_it_had_before():
+    session, other = Session(), Session()
+    for each in (session, other):
+        each.step(count=2)
+    session.measured[:2] = 0.1
+    session.step(arm=("PAUSED", True))
+    session.teleoperation.restore(other.teleoperation.save())
+    other.measured[:2] = 0.1
+    for each in (session, other):
+        each.step(arm=("PAUSED", True))
+    assert session.teleoperation.save() == other.teleoperation.save()

@@ -216,7 +216,6 @@ def check_served(gateway: Gateway, peer: Peer, rows: Sequence[Row]) -> None:
     for row in (row for row in rows if row.way == "serve"):
         arm = gateway.params.arms.shown[row.owner]  # pyright: ignore[reportArgumentType]
         queries, home = KinematicsQueries(arm.chain), np.array(arm.start)
-        _tell_states(gateway)
         base = (
             None
             if row.name.startswith("local/")
@@ -224,16 +223,18 @@ def check_served(gateway: Gateway, peer: Peer, rows: Sequence[Row]) -> None:
         )
         if row.name == "inverse_kinematics":
             there = queries.forward(home)
-            answer = peer.call(row, InverseKinematicsRequest(cp=_pose(there.value), jp=home))
+            answer = _answer(gateway, peer, row, InverseKinematicsRequest(cp=_pose(there.value), jp=home))
             assert isinstance(answer, InverseKinematicsResponse)
             assert answer.result, answer.message
             np.testing.assert_array_equal(answer.jp, queries.inverse(there.value, home).value)
         else:
-            answer = peer.call(row, ForwardKinematicsRequest(jp=home))
+            answer = _answer(gateway, peer, row, ForwardKinematicsRequest(jp=home))
             assert isinstance(answer, ForwardKinematicsResponse)
             assert answer.result, answer.message
             np.testing.assert_array_equal(_numbers(answer.cp), queries.forward(home, base).value)
-        refused = peer.call(
+        refused = _answer(
+            gateway,
+            peer,
             row,
             (
                 InverseKinematicsRequest(jp=np.zeros(9))
@@ -243,6 +244,16 @@ def check_served(gateway: Gateway, peer: Peer, rows: Sequence[Row]) -> None:
         )
         assert not getattr(refused, "result", True)
         assert "joints" in getattr(refused, "message", "")
+
+
+def _answer(gateway: Gateway, peer: Peer, row: Row, request: Message) -> Message | None:
+    """Return the answer to a request; states hold for a second, which a slow program may need to ask."""
+    for _ in range(5):
+        _tell_states(gateway)
+        answer = peer.call(row, request)
+        if "has no value now" not in getattr(answer, "message", ""):
+            break
+    return answer
 
 
 def check_late_joiner(gateway: Gateway, late: Peer, *, timeout_s: float = 5.0) -> None:

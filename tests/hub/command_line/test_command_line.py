@@ -185,6 +185,20 @@ def test_a_failing_participant_is_exit_code_1_and_a_clean_message(trocar, swingi
     assert "participant 'two' failed at step 0: ArithmeticError: the rope is torn" in err
 
 
+def test_run_with_a_profile_shows_where_the_time_goes(trocar, swinging):
+    code, out, err = trocar("run", swinging, "--profile", "--json")
+    assert code == 0, err
+    profile = json.loads(out)["profile"]
+    assert profile["core_s_per_sim_s"] >= profile["by_taker"]["participant one"] > 0.0
+    assert profile["step"]["hub"]["participant two"]["wall_s"] > 0.0
+    assert (profile["late_causes"], profile["worst_steps"]) == ({}, [])
+    assert json.loads(trocar("run", swinging, "--json")[1])["profile"] is None
+    _, _, text = trocar("run", swinging, "--profile")
+    assert "core-seconds per simulated second" in text
+    assert "participant two" in text
+    assert "late because of" not in text
+
+
 def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
     (tmp_path / "session.yaml").write_text(REMOTE)
     endpoint = free_endpoint()

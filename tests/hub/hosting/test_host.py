@@ -10,6 +10,7 @@ from hub.participant import Params
 from hub.testing import run_in_process
 from schemas.errors import ParticipantError, StateError
 from schemas.lockstep import Grant
+from schemas.ros import Float64Message
 from tests.hub.parts import Part, into, out, plan_of
 
 MS = 1_000_000
@@ -260,3 +261,52 @@ def test_a_linear_connection_follows_the_source_inside_the_step():
     exact = [(1e-3 * step, 1e-3 * step + 0.5e-3) for step in range(8)]
     # before its second value it can only hold
     np.testing.assert_allclose(probe.seen[2:], exact[2:], atol=1e-12)
+
+
+class Counter(Part):
+    """Counts its steps in an array that stays the same one, and says so at every other step."""
+
+    def __init__(self, name, **rest):
+        super().__init__(name, out(**rest), out("said", variability="event", type="std_msgs/msg/Float64"))
+        self.count = np.zeros((1, 2))[:, 0]  # not contiguous with what stands beside it
+
+    def _outputs(self):
+        said = () if self.count[0] % 2 else (Float64Message(data=self.count[0]),)
+        return {"out": self.count, "said": said}
+
+    def configure(self, setup):
+        return self._outputs()
+
+    def step(self, t, h, inputs):
+        self.count[0] += 1.0
+        return self._outputs()
+
+
+class Reader(Part):
+    """Notes a value, and messages."""
+
+    def __init__(self, name):
+        super().__init__(name, into(), into("heard", variability="event", type="std_msgs/msg/Float64"))
+        self.values, self.messages = [], []
+
+    def step(self, t, h, inputs):
+        self.values.append(float(inputs["in"][0]))
+        self.messages.append([message.data for message in inputs.events("heard")])
+        return {}
+
+
+@pytest.mark.parametrize("order", [["counter", "reader"], ["reader", "counter"]])
+def test_a_value_that_is_published_less_often_than_it_changes_is_seen_as_it_was_then(order):
+    reader = Reader("reader")
+    scenario = {
+        "name": "slow",
+        "step": "1 ms",
+        "duration": "7 ms",
+        "order": order,
+        "connections": ["counter.out -> reader.in", "counter.said -> reader.heard"],
+    }
+    run_in_process(scenario, {"counter": Counter("counter", period_ns=3 * MS), "reader": reader})
+    late = order[0] == "reader"
+    assert reader.values == [3.0 * ((step + 1 - late) // 3) for step in range(7)]
+    said = [[float(n)] if n and n % 2 == 0 else [] for n in range(8)]
+    assert reader.messages == said[:7] if late else said[1:8]

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -233,6 +235,13 @@ def test_installed_scenarios_are_found_by_name_only():
         load("palpatoin")
     with pytest.raises(ScenarioError, match=r"there is no scenario file 'nowhere/palpation\.yaml'"):
         load("nowhere/palpation.yaml")
+
+
+def test_a_file_in_this_directory_is_found_whatever_its_suffix(good, tmp_path, monkeypatch):
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    Path("mine.json").write_text(GOOD)
+    assert load("mine.json").scenario == load(good).scenario
 
 
 def test_an_error_of_the_wiring_gets_its_place(good):

@@ -1,7 +1,10 @@
 """ROS bags of every kind have the same topics and messages, and damaged ones are refused."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import zstandard
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from hub.recording.ros_bag_reader import BagTopic, RosBag
@@ -69,3 +72,16 @@ def test_what_is_no_bag_is_refused(tmp_path):
     for nothing in (tmp_path / "nowhere", tmp_path, tmp_path / "half.mcap"):
         with pytest.raises(RecordingError, match=r"cannot read the bag .* a rosbag2 directory, an .mcap,"):
             RosBag(nothing)
+
+
+def test_a_bag_that_does_not_fit_on_the_disk_is_not_unpacked(tmp_path, monkeypatch):
+    bag = write(tmp_path / "bag", RECORDED, compression=CompressionMode.FILE)
+    (packed,) = bag.glob("*.zstd")
+    packed.write_bytes(zstandard.compress(bytes(2**24)))
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=2**24))
+    unpacked = tmp_path / "temporary"
+    unpacked.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(unpacked))
+    with pytest.raises(RecordingError, match="is not unpacked: its compressed files need more than half"):
+        RosBag(bag)
+    assert list(unpacked.iterdir()) == []

@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+from threading import Thread
+from time import sleep
 
 import pytest
 
@@ -161,3 +163,47 @@ def test_a_hub_without_a_certificate_does_not_listen_to_other_machines(loaded, t
         ConnectError, match=r"hub\.pem is not valid: certificate has expired.*trocar certs renew"
     ):
         launch(loaded(), outside=["tls/0.0.0.0:7447"], certificates=authority.directory)
+
+
+LOOKED_AT = """\
+name: looked_at
+step: 2 ms
+pace: realtime
+participants:
+  jelly: {kind: "toys:Jelly"}
+  camera: {kind: "toys:Camera", host: remote, period: 20 ms, file: "FILE"}
+connections:
+  - jelly.* -> camera.*
+"""
+
+
+def test_a_camera_elsewhere_that_is_lost_joins_again_and_gets_the_surface_again(loaded, tmp_path, caplog):
+    file, endpoint = tmp_path / "shown.txt", f"tcp/127.0.0.1:{free_port()}"
+    session = launch(loaded(text=LOOKED_AT.replace("FILE", str(file))), endpoint=endpoint)
+    command = [sys.executable, "-P", "-m", "hub.command_line", "engine", "camera", "--connect", endpoint]
+
+    def join_and_be_lost():
+        """Start the camera, again if it fails, and kill it when it has shown a state after that at time 0."""
+        while True:
+            with subprocess.Popen(command, stderr=subprocess.DEVNULL) as camera:
+                while camera.poll() is None:
+                    words = file.read_text().split() if file.exists() else []
+                    if words[:1] == [str(camera.pid)] and int([*words, "0"][1]) > 0:
+                        seen.append(words[-1])
+                        camera.kill()
+                        return
+                    sleep(0.02)
+
+    def lose_twice():
+        join_and_be_lost()
+        join_and_be_lost()
+        session.state.shutdown()
+
+    seen = []
+    thread = Thread(target=lose_twice)
+    thread.start()
+    summary = session.run()
+    thread.join()
+    assert summary.state == "done"
+    assert seen == ["3", "3"]
+    assert "its host is gone; start 'trocar engine camera' again" in caplog.text

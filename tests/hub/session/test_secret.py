@@ -19,6 +19,7 @@ from hub.transport.control_client import ask
 from hub.transport.control_messages import Empty, SetRequest
 from hub.transport.endpoints import address
 from hub.transport.envelope import signature
+from hub.transport.host_link import HostLink, HubLink, has_link
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.refusals import Refusals
 from hub.transport.session_secret import listen_with_secret, private_directory, secret_of
@@ -166,6 +167,18 @@ def test_a_host_that_the_same_user_starts_by_hand_joins(prepare):
         assert process().wait(30) == 0
 
 
+def test_a_host_with_a_link_and_one_that_joins_by_hand_step_together(prepare):
+    text = SCENARIO.replace("connections:", '  far: {kind: "toys:Mixer", host: remote}\nconnections:')
+    text += "  - there.out -> far.a\n  - far.out -> there.b\norder: [here, there, far]\n"
+    expected = prepare(text, *(f"participants.{name}.host=hub" for name in ("there", "far"))).run()
+    session = prepare(text, "join_limit=60 s")
+    command = [sys.executable, "-P", "-m", "hub.command_line", "engine", "far", "--connect", session.endpoint]
+    with running_later(command) as process:
+        summary = session.run()
+        assert process().wait(30) == 0
+    assert (summary.state_hash, summary.dropped_messages) == (expected.state_hash, 0)
+
+
 @contextmanager
 def running_later(command):
     """Start a command as a person would who has waited for the hub to listen."""
@@ -201,31 +214,40 @@ def test_a_forged_ack_ends_the_session_with_the_reason(prepare):
     assert "an ack of it has arrived that its host 'other' did not send" in str(error)
 
 
-@pytest.fixture
-def acks(prepare):
-    """The receiver of a run, without the run: what is published on its keys arrives."""
+@pytest.fixture(params=["zenoh", "link"])
+def acks(prepare, request):
+    """The receiver of a run, without the run: what its host sends arrives, over Zenoh or by its link."""
     plan = prepare(SCENARIO).plan
+    if request.param == "link" and not has_link("other"):
+        pytest.skip("hosts have links on Linux alone")
     with open_session("router", listen=[free_endpoint()]) as session:
         refusals = Refusals()
-        receiver = AckReceiver(session, KEYS, plan, 5, refusals, dict.fromkeys(plan.hosts(), HOSTS))
+        links = {"other": HubLink(["there"])} if request.param == "link" else {}
+        receiver = AckReceiver(session, KEYS, plan, 5, refusals, dict.fromkeys(plan.hosts(), HOSTS), links)
+        host = HostLink(*map(os.dup, links["other"].inherited)) if links else None
 
         def publish(hash_, step=3):
             payload = pack_ack(Ack(5, 0, step, (hash_,), (0,), ()))
-            session.put(KEYS.ack("there"), payload, attachment=signature(payload, HOSTS))
+            if host is not None:
+                host.send_acks([(0, payload)])
+            else:
+                session.put(KEYS.ack("there"), payload, attachment=signature(payload, HOSTS))
 
         yield publish, receiver, refusals
+        for end in (*links.values(), *([host] if host else [])):
+            end.close()
 
 
 def accepted(receiver, step=3):
     found = receiver.receive(["there"], Grant(5, 0, step, 0, 1), {"there": 1})
-    return found and list(found[1].state_hash)
+    return [list(ack.state_hash) for _, ack, _ in found]
 
 
 def test_a_second_ack_of_a_step_ends_the_session(acks):
     publish, receiver, _ = acks
     publish(1)
     publish(2)
-    assert accepted(receiver) == [1]
+    assert accepted(receiver) == [[1]]
     with pytest.raises(ParticipantError, match="'there' failed at step 3: a second ack of it has arrived"):
         accepted(receiver, step=4)
 
@@ -233,7 +255,7 @@ def test_a_second_ack_of_a_step_ends_the_session(acks):
 def test_a_second_ack_of_the_last_step_ends_the_session(acks):
     publish, receiver, _ = acks
     publish(1)
-    assert accepted(receiver) == [1]
+    assert accepted(receiver) == [[1]]
     publish(2)
     with pytest.raises(ParticipantError):
         receiver.end(4)
@@ -244,7 +266,7 @@ def test_an_ack_that_is_only_repeated_is_refused_and_counted(acks):
     publish(1)
     publish(1)
     publish(2, step=4)
-    assert (accepted(receiver), accepted(receiver, 4), accepted(receiver, 4)) == ([1], None, [2])
+    assert (accepted(receiver), accepted(receiver, 4), accepted(receiver, 4)) == ([[1]], [], [[2]])
     assert refusals.total == 1
 
 

@@ -150,3 +150,23 @@ connections:
 def test_hundreds_of_values_between_two_readings_delay_no_host(prepare):
     hashes = [prepare(SELDOM, *_on(host, ("seldom", "ledger"))).run().state_hash for host in ("hub", "far")]
     assert hashes[0] == hashes[1]
+
+
+UNREAD = """\
+name: unread
+step: 1 ms
+duration: 60 ms
+participants:
+  two: {kind: "toys:Mixer", period: 2 ms, step_ns: 2000000, host: other}
+  rare: {kind: "toys:Mixer", out_every: 3, host: other}
+"""
+
+
+def test_the_values_of_the_last_steps_in_other_processes_are_recorded(prepare, tmp_path):
+    """The hub reads none of them, and has the acks before Zenoh has delivered the values."""
+    prepare(UNREAD, record=tmp_path / "recording").run()
+    recording = Recording(tmp_path / "recording")
+    times = {name: recording[f"{name}.out"].time[-1] for name in ("two", "rare")}
+    assert times == {"two": 0.06, "rare": 0.06}
+    assert len(recording["two.out"].values) == 31
+    assert len(recording["rare.out"].values) == 21

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from zenoh.handlers import FifoChannel
 
-from hub.transport.bundle import Bundle, bundled, unpacked
+from hub.transport.bundle import Bundle, ObserverBundle, bundled, unpacked
 from hub.transport.zenoh_session import open_session
 from schemas.errors import MessageError
 from tests.hub.authorities import free_endpoint
@@ -17,10 +17,10 @@ from tests.hub.parts import Part, Stylus, into, out, plan_of
 @pytest.fixture(scope="module")
 def bundle():
     with open_session("router", listen=[free_endpoint()]) as session:
-        made = Bundle(session, "trocar/test/engine/arm/signals/console")
+        made = Bundle(session, "trocar/test/engine/arm/signals/console", lambda: None)
         made.received = session.declare_subscriber("trocar/test/engine/arm/signals/console", FifoChannel(100))
         until = time.monotonic() + 5.0
-        while not made.needed and time.monotonic() < until:
+        while not made.takes(0, 1) and time.monotonic() < until:
             time.sleep(0.005)
         yield made
         made.close()
@@ -36,12 +36,13 @@ def test_a_bundle_unpacks_to_the_values_that_were_added(bundle, values):
     assert list(unpacked(sample.payload.to_bytes())) == values
 
 
-def test_a_step_without_values_sends_nothing(bundle):
-    bundle.send(b"nothing")
+def test_it_is_filled_by_values_and_emptied_by_sending(bundle):
+    assert not bundle.filled
     bundle.add(0, b"something")
+    assert bundle.filled
     bundle.send(b"first")
+    assert not bundle.filled
     assert bundle.received.recv().attachment.to_bytes() == b"first"
-    assert bundle.received.try_recv() is None
 
 
 @pytest.mark.parametrize(("cut", "where"), [(4, "within a head"), (10, "within a value of 5")])
@@ -64,3 +65,42 @@ def test_both_ends_number_the_same_connections():
         ("a", "y"),
     ]
     assert bundled(plan, "arm", "other") == []
+
+
+KEY = "trocar/test/engine/arm/signals/camera"
+
+
+def subscribed(session, bundle):
+    """Return a subscriber of `bundle` that it knows of."""
+    subscriber = session.declare_subscriber(KEY, FifoChannel(100))
+    until = time.monotonic() + 5.0
+    while not bundle.takes(0, 1) and time.monotonic() < until:
+        time.sleep(0.005)
+    return subscriber
+
+
+def test_an_observer_gets_the_values_that_hold_at_its_period_and_the_first_again_when_it_joins_again():
+    with open_session("router", listen=[free_endpoint()]) as session:
+        bundle = ObserverBundle(session, KEY, lambda: None, 40)
+        assert not bundle.takes(0, 2)
+        camera = subscribed(session, bundle)
+        assert [t for t in range(0, 121, 2) if bundle.takes(t, 2)] == [0, 40, 80, 120]
+        assert [t for t in range(0, 181, 30) if bundle.takes(t, 30)] == [0, 30, 60, 120, 150, 180]
+        assert all(bundle.takes(t, 48) for t in range(0, 480, 48))
+
+        def send(payload, *, first=False):
+            bundle.add(0, payload)
+            bundle.send(payload, first=first)
+
+        send(b"surface", first=True)
+        send(b"40")
+        assert [camera.recv().attachment.to_bytes() for _ in "12"] == [b"surface", b"40"]
+        camera.undeclare()
+        until = time.monotonic() + 5.0
+        while bundle.takes(0, 1) and time.monotonic() < until:
+            time.sleep(0.005)
+        camera = subscribed(session, bundle)
+        send(b"80")
+        send(b"120")
+        assert [camera.recv().attachment.to_bytes() for _ in "123"] == [b"surface", b"80", b"120"]
+        bundle.close()

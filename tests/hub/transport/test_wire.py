@@ -16,6 +16,7 @@ from zenoh.handlers import Callback, RingChannel
 from hub.recording.recording import Recording
 from hub.remote.hub_connection import reach
 from hub.session.startup import start
+from hub.transport.host_link import has_link
 from hub.transport.zenoh_session import open_session
 from schemas.codec import encode
 from schemas.ros import Header, Joy, PoseStamped
@@ -50,7 +51,7 @@ measure:
 """
 PREFIX = "trocar/target"
 HEARD = [
-    f"{PREFIX}/hub/grant",
+    *(() if has_link("other") else (f"{PREFIX}/hub/grant",)),
     *(
         f"{PREFIX}/engine/{name}/ack"
         for name in ("away", "talker", "far_listener", "follower", "nobody", "hub")

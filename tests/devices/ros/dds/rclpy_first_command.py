@@ -1,6 +1,6 @@
 """Programs on real rclpy, one after another, that publish one command each as soon as they are matched.
 
-Arguments: topic, `latched` or `once`, number of programs.
+Arguments: topic, `latched` or `once`, number of programs, length of the command.
 """
 
 import sys
@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 DURABILITY = {"latched": DurabilityPolicy.TRANSIENT_LOCAL, "once": DurabilityPolicy.VOLATILE}
 
 
-def publish_first(topic, kind, number):
+def publish_first(topic, kind, number, length):
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node(f"program{number}", context=context)
@@ -21,7 +21,7 @@ def publish_first(topic, kind, number):
     limit = time.monotonic() + 20.0
     while not publisher.get_subscription_count() and time.monotonic() < limit:
         time.sleep(0.0005)
-    message = StringStamped(string="enable")
+    message = StringStamped(string="enable".ljust(length))
     message.header.frame_id = f"{kind}{number}"
     message.header.stamp = node.get_clock().now().to_msg()
     publisher.publish(message)
@@ -31,4 +31,4 @@ def publish_first(topic, kind, number):
 
 
 for number in range(int(sys.argv[3])):
-    publish_first(*sys.argv[1:3], number)
+    publish_first(*sys.argv[1:3], number, int(sys.argv[4]))

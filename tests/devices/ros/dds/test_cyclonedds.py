@@ -75,6 +75,11 @@ class Response(IdlStruct, typename="crtk_msgs.srv.dds_.QueryForwardKinematics_Re
     message: str
 
 
+@dataclass
+class Text(IdlStruct, typename="std_msgs.msg.dds_.String_"):
+    data: str
+
+
 def opened(number, directory, name="ros", **params):
     gateway = DdsGateway(name, DdsGateway.params_model.model_validate(ARM | {"domain": number} | params))
     gateway.open(directory)
@@ -99,6 +104,24 @@ def test_requests_of_rmw_cyclonedds_are_answered_once_with_what_came_before_them
     assert [(it.guid, it.seq, it.result) for it in heard] == [(0xFEED, 1, True), (0xFEED, 2, True)]
     time.sleep(0.2)
     assert not hear.take(10)
+    program.__del__()
+
+
+@pytest.mark.parametrize("length", [100, 1_500, 70_000, 1_000_000])
+def test_messages_of_any_size_are_received_whole(gateway, length):
+    """Cyclone DDS sends what is larger than 1344 bytes in fragments."""
+    received = []
+    gateway._transport._services.subscribe(
+        "/text", "std_msgs/msg/String", "", lambda data, _: received.append(data)
+    )
+    program = DomainParticipant(gateway.params.domain)
+    writer = DataWriter(program, Topic(program, "rt/text", Text), RELIABLE)
+    assert until(lambda: writer.get_matched_subscriptions())
+    sent = ["ab" * (length // 2), "last"]
+    for text in sent:
+        writer.write(Text(text))
+    assert until(lambda: len(received) == len(sent))
+    assert [data[8:].rstrip(b"\0").decode() for data in received] == sent
     program.__del__()
 
 

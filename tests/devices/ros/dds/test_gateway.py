@@ -156,17 +156,19 @@ def test_a_flood_costs_no_other_console_its_states(rclpy_python, psm):
         assert 0 < len(received(psm, COMMAND)) < 20_000
 
 
-@pytest.mark.parametrize("kind", ["latched", "once"])
-def test_the_first_command_of_a_program_is_received_once(rclpy_python, psm, kind):
-    count = 8
-    command = [rclpy_python, FIRST_COMMAND, "/PSM1/state_command", kind, str(count)]
+@pytest.mark.parametrize(("kind", "length"), [("latched", 6), ("once", 6), ("once", 200_000)])
+def test_the_first_command_of_a_program_is_received_once(rclpy_python, psm, kind, length):
+    """One above 64 kB arrives in fragments."""
+    count = 8 if length == 6 else 2
+    command = [rclpy_python, FIRST_COMMAND, "/PSM1/state_command", kind, str(count), str(length)]
     with subprocess.Popen(command, env=environment(psm.params.domain)) as programs:
         try:
             programs.wait(timeout=60.0)
         finally:
             programs.kill()
-    heard = [sample.message.header.frame_id for sample in received(psm, "/PSM1/state_command")]
-    assert heard == [f"{kind}{number}" for number in range(count)]
+    heard = [sample.message for sample in received(psm, "/PSM1/state_command")]
+    assert [message.header.frame_id for message in heard] == [f"{kind}{number}" for number in range(count)]
+    assert {message.string for message in heard} == {"enable".ljust(length)}
 
 
 def test_a_console_that_stops_reading_holds_up_nobody(rclpy_python, domain, tmp_path):

@@ -3,14 +3,15 @@
 import socket
 import struct
 import threading
-from contextlib import closing
+from contextlib import closing, suppress
 from time import monotonic
 
 import pytest
 
-from devices.ros.dds.rtps import encode_data, encode_message
+from devices.ros.dds.rtps import encode_data, encode_message, parse_message
 from devices.ros.dds.rtps_discovery import SPDP_READER, SPDP_WRITER, participant_data
 from devices.ros.dds.services import ServiceParticipant
+from schemas.errors import MessageError
 
 PATIENCE_S = 30.0
 
@@ -38,3 +39,12 @@ def test_an_address_that_is_none_does_not_end_the_services_of_other_programs(por
             threading.Event().wait(0.05)
         peer.sendto(announcement(b"\x01\x0fright67890", peer.getsockname()[1]), ours)
         assert peer.recv(65536).startswith(b"RTPS")
+
+
+def test_what_is_remembered_of_a_domain_is_limited() -> None:
+    with closing(ServiceParticipant(77, multicast=False, hosts=[])) as services:
+        for number in range(600):
+            peer = b"\x01\x0f" + number.to_bytes(10, "big")
+            with suppress(MessageError):
+                services._receive(parse_message(announcement(peer, 9), services._guid_prefix), "127.0.0.1")
+        assert len(services._proxies) == 512

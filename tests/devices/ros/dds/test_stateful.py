@@ -1,5 +1,6 @@
 """Reliable transfer of RTPS: with datagrams lost, doubled or reordered, samples arrive once and in order."""
 
+import struct
 from contextlib import suppress
 
 import pytest
@@ -55,12 +56,7 @@ class Air:
                 if way == "back":
                     self.writer.on_acknack(it)
                 else:
-                    handlers = {
-                        Data: self.reader.on_data,
-                        Heartbeat: self.reader.on_heartbeat,
-                        Gap: self.reader.on_gap,
-                    }
-                    handlers[type(it)](it)
+                    self.reader.receive(it)
 
 
 @given(st.lists(st.sampled_from(["arrives", "lost", "twice", "overtakes"]), max_size=60), st.integers(1, 20))
@@ -80,12 +76,12 @@ def test_all_arrives_once_and_in_order(fates, count):
 
 def test_irrelevant_samples_are_not_waited_for():
     air = Air([])
-    air.reader.on_data(Data(WRITER, READER, 5, {}, b"five"))
+    air.reader.receive(Data(WRITER, READER, 5, {}, b"five"))
     assert air.heard == []
-    air.reader.on_gap(Gap(WRITER, READER, 1, 4, (4,)))
+    air.reader.receive(Gap(WRITER, READER, 1, 4, (4,)))
     assert air.heard == [b"five"]
-    air.reader.on_heartbeat(Heartbeat(WRITER, READER, 9, 8, is_final=True))
-    air.reader.on_data(Data(WRITER, READER, 9, {}, b"nine"))
+    air.reader.receive(Heartbeat(WRITER, READER, 9, 8, is_final=True))
+    air.reader.receive(Data(WRITER, READER, 9, {}, b"nine"))
     assert air.heard == [b"five", b"nine"]
 
 
@@ -133,3 +129,75 @@ def test_noise_is_refused(noise):
 def test_bytes_that_are_no_message_are_refused():
     with pytest.raises(MessageError, match="no message of RTPS"):
         parse_message(b"GIOP" + bytes(30), THEM)
+
+
+SIZE, PIECE = 1000, 96
+LARGE = bytes(range(250)) * 4
+PIECES = -(-SIZE // PIECE)
+
+
+def fragment(number, first, count=1, *, size=SIZE, content=None):
+    """Return a DATA_FRAG of `LARGE`, written by the standard's figure and not by ours."""
+    if content is None:
+        content = LARGE[(first - 1) * PIECE : (first - 1 + count) * PIECE]
+    head = struct.pack("<HH", 0, 28) + READER + WRITER + struct.pack("<iI", 0, number)
+    body = head + struct.pack("<IHHI", first, count, PIECE, size) + content
+    return struct.pack("<BBH", 0x16, 1, len(body)) + body
+
+
+def parsed(submessage):
+    (found,) = parse_message(encode_message(US, THEM, [submessage]), THEM).submessages
+    return found
+
+
+def requested(submessage):
+    """Return sample and fragments of a NACK_FRAG."""
+    kind, _, _, reader, writer, high, low, base, bits = struct.unpack_from("<BBH4s4siIII", submessage)
+    assert (kind, reader, writer, high) == (0x12, READER, WRITER, 0)
+    words = struct.unpack_from(f"<{(bits + 31) // 32}I", submessage, 28)
+    return low, [base + bit for bit in range(bits) if words[bit // 32] >> (31 - bit % 32) & 1]
+
+
+@given(st.lists(st.integers(1, PIECES), max_size=30), st.randoms(use_true_random=False))
+def test_a_sample_in_fragments_is_put_together_and_what_is_missing_requested(arrived, random):
+    sent, heard = [], []
+    reader = StatefulReader(sent.extend, READER, WRITER, lambda sample: heard.append(sample.payload))
+    for first in arrived:
+        reader.receive(parsed(fragment(1, first)))
+    reader.receive(Data(WRITER, READER, 2, {}, b"after it"))
+    if set(arrived) != set(range(1, PIECES + 1)):
+        assert heard == []
+    while not heard:
+        sent.clear()
+        reader.receive(Heartbeat(WRITER, READER, 1, 2, is_final=False))
+        acknack = parsed(sent[0])
+        assert acknack.base == 1
+        if acknack.missing:
+            assert (acknack.missing, arrived) == ((1,), [])
+            missing = list(range(1, PIECES + 1))
+        else:
+            number, missing = requested(sent[1])
+            assert (number, missing) == (1, sorted(set(range(1, PIECES + 1)) - set(arrived)))
+        for first in random.sample(missing, random.randint(1, len(missing))):
+            arrived.append(first)
+            reader.receive(parsed(fragment(1, first)))
+    assert heard == [LARGE, b"after it"]
+
+
+def test_fragments_that_fit_no_sample_are_refused_and_leave_no_trace():
+    heard = []
+    reader = StatefulReader(lambda parts: None, READER, WRITER, lambda sample: heard.append(sample.payload))
+    for wrong in (
+        fragment(1, 1, size=2**31),
+        fragment(1, 0),
+        fragment(1, 1, size=PIECE - 1),
+        fragment(1, PIECES + 1, content=bytes(PIECE)),
+        fragment(1, 2, content=b"short"),
+    ):
+        with pytest.raises(MessageError, match="fragments"):
+            reader.receive(parsed(wrong))
+    reader.receive(parsed(fragment(1, 1, size=SIZE + 1)))
+    with pytest.raises(MessageError, match="do not fit a sample"):
+        reader.receive(parsed(fragment(1, 2)))
+    reader.receive(parsed(fragment(1, 1, PIECES)))
+    assert heard == [LARGE]

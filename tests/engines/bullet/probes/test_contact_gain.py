@@ -133,10 +133,22 @@ def test_no_point_of_a_triangle_is_nearer_than_the_closest(point, corners):
 
 def test_faces_are_touched_up_to_the_reach():
     nodes, faces = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]), np.array([[0, 1, 2]])
-    for height, count in ((4e-3, 1), (6e-3, 0)):
-        found, weights, distance = touched_faces(
-            nodes.mean(axis=0) + np.array([0, 0, height]), 5e-3, nodes, faces
-        )
-        assert len(found) == len(weights) == len(distance) == count
-        np.testing.assert_allclose(weights, np.full((count, 3), 1 / 3))
-        np.testing.assert_allclose(distance, np.full(count, height))
+    centres = nodes.mean(axis=0) + np.array([[0, 0, 6e-3], [0, 0, 4e-3], [1, 1, 0], [0, 0, -4e-3]])
+    spheres, found, weights, distance = touched_faces(centres, np.full(4, 5e-3), nodes, faces)
+    np.testing.assert_array_equal(spheres, [1, 3])
+    np.testing.assert_array_equal(found, [[0, 1, 2]] * 2)
+    np.testing.assert_allclose(weights, np.full((2, 3), 1 / 3))
+    np.testing.assert_allclose(distance, [4e-3, 4e-3])
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_many_spheres_touch_what_each_does_alone(seed):
+    organ = params(SMALL_BLOCK).organs["block"].rest
+    random = np.random.default_rng(seed)
+    centres = random.uniform(organ.nodes.min(axis=0) - 0.01, organ.nodes.max(axis=0) + 0.01, (6, 3))
+    reach = random.uniform(1e-3, 1e-2, 6)
+    together = touched_faces(centres, reach, organ.nodes, organ.triangles)
+    for i in range(6):
+        _, distance = closest_points(centres[i], organ.nodes[organ.triangles])
+        np.testing.assert_array_equal(together[1][together[0] == i], organ.triangles[distance < reach[i]])
+        np.testing.assert_array_equal(together[3][together[0] == i], distance[distance < reach[i]])

@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 
 from engines.mujoco.model import FINGERS, build, first_sensor, probe_body
 from engines.mujoco.model.tree import links
-from engines.mujoco.params import EcmParams, SceneParams
+from engines.mujoco.params import SceneParams
 from robots import rotation
 from robots.dvrk import setup_joints
 from robots.dvrk.linkage import LINKAGES
+from robots.dvrk.mounted import MountedEcm
 
 ARMS = ("PSM1", "PSM2", "PSM3", "ECM")
 ORIENTATION = rotation.exp(np.array([0.3, -0.5, 0.7]))
@@ -243,5 +244,5 @@ def test_the_endoscope_tips_the_camera():
 
 
 def test_ecm_params_have_the_endoscope_chain():
-    assert isinstance(FREE.arms["ECM"], EcmParams)
+    assert isinstance(FREE.arms["ECM"], MountedEcm)
     assert len(FREE.arms["ECM"].chain.joints) == 4

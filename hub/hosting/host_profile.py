@@ -1,0 +1,61 @@
+"""The profile of a host process, for which the hub asks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import zenoh
+from zenoh.handlers import Callback
+
+from hub.hosting.host import Host
+from hub.hosting.process_profile import WAITING, ProcessProfile
+from hub.observation.stopwatch import Phase
+from hub.planning.plan import Plan
+from schemas.codec import encode
+from schemas.keys import Keys
+from schemas.trocar_msgs import Profile
+
+__all__ = ["HostProfile"]
+
+
+class HostProfile:
+    """Answers with what this process has taken since its first grant."""
+
+    def __init__(self, session: zenoh.Session, keys: Keys, host: str, plan: Plan, run: int) -> None:
+        self.process = ProcessProfile(host, plan, Phase("waiting for hub", WAITING))
+        self.process.restart()
+        self._began = False
+        self._key, self._session_name, self._run = keys.host_profile(host), keys.session, run
+        self._queryable = session.declare_queryable(self._key, Callback(self._answer))
+
+    def attach(self, host: Host, acknowledge: Callable[..., None]) -> None:
+        """Time `Host.run`, and `acknowledge`, which sends an ack.
+
+        The first grant is left out: a host has waited for it since it was ready.
+        """
+        watch = self.process.watch
+        self.process.attach(host, self._ran)
+        watch.time(acknowledge, watch.phase("acks", "connections"))
+
+    def _ran(self) -> None:
+        if self._began:
+            self.process.watch.next_round()
+        else:
+            self.process.restart()
+        self._began = True
+
+    def _answer(self, query: zenoh.Query) -> None:
+        profile = Profile(
+            session=self._session_name,
+            run=self._run,
+            sim_time_ns=0,
+            wall_time_ns=0,
+            steps=0,
+            rows=self.process.rows(),
+        )
+        with query:
+            query.reply(self._key, encode(profile), encoding=zenoh.Encoding.APPLICATION_CDR)
+
+    def undeclare(self) -> None:
+        """Answer no more."""
+        self._queryable.undeclare()

@@ -1,0 +1,108 @@
+"""How a host receives grants and sends acks: over Zenoh, or by a link if the hub has started it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import zenoh
+from zenoh.handlers import FifoChannel
+
+from hub.transport.envelope import signature
+from hub.transport.host_link import HostLink
+from hub.transport.refusals import Refusals
+from schemas.errors import MessageError
+from schemas.keys import Keys
+from schemas.lockstep import Ack, Grant, pack_ack
+
+__all__ = ["HubChannel", "LinkChannel", "ZenohChannel"]
+
+CheckGrant = Callable[[bytes], Grant]
+"""Returns the grant in a payload; raises MessageError if it is not the next one of the run."""
+
+
+class HubChannel(Protocol):
+    """Receives the grants of a run, and sends the acks of one host's participants."""
+
+    def grant(self, *, wait: bool) -> Grant | None:
+        """Return the next grant; None if it has not arrived. With `wait`, wait for a message."""
+        ...
+
+    def acknowledge(self, name: str, ack: Ack) -> None:
+        """Send the ack of a participant, at once or with `flush`."""
+        ...
+
+    def flush(self) -> None:
+        """Send what has not been sent: the host has done its part of a grant."""
+        ...
+
+
+class ZenohChannel:
+    """A channel over Zenoh, with an ack at once after each participant's last step, signed with `ack_key`.
+
+    Grants that are not valid are refused and counted.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: Keys,
+        names: Sequence[str],
+        ack_key: bytes,
+        refusals: Refusals,
+        check: CheckGrant,
+    ) -> None:
+        self._ack_key, self._refusals, self._check = ack_key, refusals, check
+        self._acks = {
+            name: session.declare_publisher(
+                keys.ack(name),
+                encoding=zenoh.Encoding.APPLICATION_CDR,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.REAL_TIME,
+                express=True,
+            )
+            for name in names
+        }
+        self._grants = session.declare_subscriber(keys.grant, FifoChannel(256))
+
+    def grant(self, *, wait: bool) -> Grant | None:
+        """Return the grant in the next message; None if there is no message, or no valid grant in it."""
+        sample = self._grants.recv() if wait else self._grants.try_recv()
+        if sample is None:
+            return None
+        try:
+            return self._check(sample.payload.to_bytes())
+        except MessageError as error:
+            self._refusals.refuse_sample(sample, error)
+            return None
+
+    def acknowledge(self, name: str, ack: Ack) -> None:
+        """Send an ack."""
+        payload = pack_ack(ack)
+        self._acks[name].put(payload, attachment=signature(payload, self._ack_key))
+
+    def flush(self) -> None:
+        """Everything has been sent."""
+
+
+class LinkChannel:
+    """A channel by the link to the hub that has started this host: all acks of a grant in one message."""
+
+    def __init__(self, link: HostLink, names: Sequence[str], check: CheckGrant) -> None:
+        self._link, self._check = link, check
+        self._places = {name: place for place, name in enumerate(names)}
+        self._acks: list[tuple[int, bytes]] = []
+
+    def grant(self, *, wait: bool) -> Grant | None:
+        """Return the next grant; raises MessageError if it is not."""
+        payload = self._link.grant(wait=wait)
+        return None if payload is None else self._check(payload)
+
+    def acknowledge(self, name: str, ack: Ack) -> None:
+        """Keep an ack until `flush`."""
+        self._acks.append((self._places[name], pack_ack(ack)))
+
+    def flush(self) -> None:
+        """Send the acks."""
+        self._link.send_acks(self._acks)
+        self._acks.clear()

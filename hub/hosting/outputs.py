@@ -1,0 +1,211 @@
+"""The outputs of a participant that are due together: checked, and passed on where anybody reads them.
+
+What did not change costs nothing here: arrays that stay the same objects are given to their readers once,
+equal bits are checked once, and event ports without a message are passed over all at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from operator import is_, itemgetter
+from typing import Any
+
+import numpy as np
+
+from hub.participant import Outputs
+from hub.transport.cells import INITIAL, Cell
+from hub.transport.port_publisher import PortPublisher
+from hub.transport.reader import Queue
+from hub.transport.wire import Wire
+from schemas.errors import MessageError
+from schemas.ports import Port
+from schemas.vectors import Vector, VectorCodec, joined
+
+__all__ = ["DueOutputs", "Listener", "Output"]
+
+Listener = Callable[[int, int, Any], None]
+"""Is called with every value of one output: step, time (ns) at which it is valid, value."""
+
+
+@dataclass(slots=True)
+class Output:
+    """An output port and everywhere its value goes."""
+
+    port: Port
+    codec: VectorCodec | None
+    """Of a vector; None for messages and events."""
+    copied: bool
+    """Its readers get a copy, as its owner may write to its array before the next value is due."""
+    cell: Cell | None
+    """For readers in this process that look back."""
+    publisher: PortPublisher | None
+    """For readers in other processes."""
+    listener: Listener | None
+    inputs: list[tuple[dict[str, Any], str]] = field(default_factory=list[tuple[dict[str, Any], str]])
+    """The inputs in this process that hold its newest value: the values of a participant, and the port."""
+    queues: list[Queue] = field(default_factory=list[Queue])
+    """The event inputs in this process that get all of its messages."""
+
+    def set_inputs(self, value: Any) -> None:
+        """Write `value` into the inputs that hold the newest one."""
+        for values, port in self.inputs:
+            values[port] = value
+
+
+class _Passage:
+    """Where the values of some outputs go at every step in which they are due; `wire` None: nowhere else."""
+
+    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+        self._wire = wire
+        self._cells = [(i, output.cell) for i, output in enumerate(outputs) if output.cell is not None]
+        self._publishers = [(i, output.publisher) for i, output in enumerate(outputs) if output.publisher]
+        self._listeners = [(i, output.listener) for i, output in enumerate(outputs) if output.listener]
+        self._needed: list[tuple[int, PortPublisher]] = []
+        self._changes = -1
+
+    def put(self, step: int, time_ns: int, values: Sequence[Any]) -> None:
+        """Pass on the values computed in `step`, valid at `time_ns`."""
+        if self._wire is not None:
+            if self._changes != self._wire.changes:
+                self._changes = self._wire.changes  # first, or a change meanwhile would be missed
+                self._needed = [one for one in self._publishers if one[1].needed]
+            for i, publisher in self._needed:
+                publisher.put(step, time_ns, values[i])
+        for i, cell in self._cells:
+            cell.put(step, values[i])
+        for i, listener in self._listeners:
+            listener(step, time_ns, values[i])
+
+
+class _Vectors:
+    """Vectors that are due together."""
+
+    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+        self._values: Sequence[Vector] = ()
+        self._bytes = b""
+        self._codecs = [output.codec for output in outputs if output.codec is not None]
+        self._shapes = [codec.neutral.shape for codec in self._codecs]
+        self._size = sum(codec.neutral.nbytes for codec in self._codecs)
+        read = [(i, output) for i, output in enumerate(outputs) if output.inputs]
+        self._shared = [(i, output) for i, output in read if not output.copied]
+        self._copied = [(i, output) for i, output in read if output.copied]
+        self._passage = _Passage(outputs, wire)
+
+    def put(self, step: int, time_ns: int, values: Sequence[Vector]) -> None:
+        before, self._values = self._values, values
+        same = len(before) == len(values) and all(map(is_, values, before))
+        if not same and [value.shape for value in values] != self._shapes:
+            self._check(values)
+        data = joined(values)
+        if data != self._bytes:
+            self._bytes = data
+            if len(data) != self._size or not _is_finite(data) or step == INITIAL:
+                self._check(values)  # raises what is wrong, unless the numbers are only large
+            for i, output in self._copied:
+                output.set_inputs(values[i].copy())
+        if not same:
+            for i, output in self._shared:
+                output.set_inputs(values[i])
+        self._passage.put(step, time_ns, values)
+
+    def _check(self, values: Sequence[Vector]) -> None:
+        for codec, value in zip(self._codecs, values, strict=True):
+            codec.checked(value)
+
+
+class _Messages:
+    """Signals without a vector form that are due together."""
+
+    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+        self._read = [(i, output) for i, output in enumerate(outputs) if output.inputs]
+        self._passage = _Passage(outputs, wire)
+
+    def put(self, step: int, time_ns: int, values: Sequence[Any]) -> None:
+        for i, output in self._read:
+            output.set_inputs(values[i])
+        self._passage.put(step, time_ns, values)
+
+
+class _Events:
+    """Event ports that are due together; the value of each is a tuple of messages."""
+
+    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+        self._read = [(i, output.queues) for i, output in enumerate(outputs) if output.queues]
+        self._passage = _Passage(outputs, wire)
+        self._passes_none = any(o.cell or (o.publisher and o.publisher.always) for o in outputs)
+
+    def put(self, step: int, time_ns: int, values: Sequence[Any]) -> None:
+        if any(values):
+            for i, queues in self._read if step > INITIAL else ():
+                for queue in queues:
+                    queue.arrived += values[i]
+        elif not self._passes_none:
+            return
+        self._passage.put(step, time_ns, values)
+
+
+class DueOutputs:
+    """The outputs of a participant with the same stride.
+
+    Args:
+        outputs: They, in the order in which they are published.
+        wire: Carries values to other processes; None if there are none.
+    """
+
+    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+        vectors = [output for output in outputs if output.codec is not None]
+        events = [output for output in outputs if output.port.variability == "event"]
+        messages = [output for output in outputs if output not in vectors and output not in events]
+        self._parts = [
+            (_values_of(part), kind(part, wire).put)
+            for kind, part in ((_Vectors, vectors), (_Messages, messages), (_Events, events))
+            if part
+        ]
+        self._outputs = outputs
+        self._initial: list[tuple[PortPublisher, Any]] = []
+
+    def put(self, step: int, time_ns: int, returned: Outputs) -> None:
+        """Check the values computed in `step`, valid at `time_ns`, and pass them on.
+
+        Raises MessageError if one is missing or invalid.
+        """
+        for values_of, put in self._parts:
+            try:
+                values = values_of(returned)
+            except KeyError:
+                missing = next(o.port.name for o in self._outputs if o.port.name not in returned)
+                raise MessageError(f"output '{missing}' is missing from what step() returned") from None
+            put(step, time_ns, values)
+        if step == INITIAL:
+            self._keep(returned)
+
+    def _keep(self, returned: Outputs) -> None:
+        """Keep the values at time 0, which are published until all hosts have them."""
+        for output in self._outputs:
+            if output.publisher is not None:
+                value: Any = returned[output.port.name]
+                self._initial.append((output.publisher, value if output.codec is None else value.copy()))
+
+    def put_initial_again(self) -> None:
+        """Publish the values at time 0 once more."""
+        for publisher, value in self._initial:
+            publisher.put(INITIAL, 0, value)
+
+
+def _values_of(outputs: Sequence[Output]) -> Callable[[Outputs], Sequence[Any]]:
+    """Return what gets the values of `outputs` from what a participant returned, or raises KeyError."""
+    names = [output.port.name for output in outputs]
+    if len(names) > 1:
+        return itemgetter(*names)
+
+    def only(returned: Mapping[str, Any]) -> Sequence[Any]:
+        return (returned[names[0]],)
+
+    return only
+
+
+def _is_finite(data: bytes) -> bool:
+    numbers = np.frombuffer(data)
+    return isfinite(numbers.dot(numbers))

@@ -1,0 +1,124 @@
+"""The processor time of each thread of this process, by what the thread is for.
+
+Linux keeps it in nanoseconds (`/proc/self/task/TID/schedstat`, field 1; proc(5)). Elsewhere all of it counts
+as the main thread's.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time_ns
+
+__all__ = ["CoreQueue", "ThreadClocks"]
+
+_TASKS = Path("/proc/self/task")
+_WIRE = ("app-", "net-", "acc-", "rx-", "tx-", "tokio")
+"""How the names of Zenoh's threads begin."""
+
+
+class ThreadClocks:
+    """Sums the processor time of all threads since `restart`.
+
+    Args:
+        taker: Returns what a thread of Python is for, by its name.
+        native: What threads of libraries other than Zenoh are for.
+    """
+
+    def __init__(self, taker: Callable[[str], str], native: str) -> None:
+        self._taker, self._native = taker, native
+        self._main = threading.main_thread().native_id or 0
+        self._lock = threading.Lock()
+        self._seen: dict[int, tuple[str, int]] = {}
+        self._ended: dict[str, int] = {}
+        self._from: dict[str, int] = {}
+        self._process_from_ns = self._main_from_ns = 0
+
+    def restart(self) -> None:
+        """Count from now."""
+        self._from = self._totals()
+        self._process_from_ns = process_time_ns()
+        self._main_from_ns = _core_ns(self._main) or 0
+
+    def main_ns(self) -> int:
+        """Return the processor time of the main thread; of all threads where it is not known."""
+        now_ns = _core_ns(self._main)
+        return process_time_ns() - self._process_from_ns if now_ns is None else now_ns - self._main_from_ns
+
+    def other_ns(self, main_ns: int) -> dict[str, float]:
+        """Return the processor time of the other threads, by what they are for.
+
+        `main_ns` is that of the main thread; what of the process' time belongs to no thread that was seen is
+        of `other threads`.
+        """
+        times: dict[str, float] = {
+            taker: total - self._from.get(taker, 0) for taker, total in self._totals().items()
+        }
+        rest = process_time_ns() - self._process_from_ns - main_ns - sum(times.values())
+        times["other threads"] = times.get("other threads", 0.0) + max(rest, 0.0)
+        return {taker: time_ns for taker, time_ns in times.items() if time_ns > 0.0}
+
+    def _totals(self) -> dict[str, int]:
+        """Return the processor time of every taker so far, with that of threads that have ended."""
+        names = {thread.native_id: thread.name for thread in threading.enumerate()}
+        with self._lock:
+            seen: dict[int, tuple[str, int]] = {}
+            for directory in _TASKS.iterdir() if _TASKS.exists() else ():
+                task = int(directory.name)
+                time_ns = _core_ns(task)
+                if task != self._main and time_ns is not None:
+                    seen[task] = self._of(task, names.get(task), time_ns), time_ns
+            for task, (taker, time_ns) in self._seen.items():
+                if seen.get(task, ("", -1))[1] < time_ns:
+                    self._ended[taker] = self._ended.get(taker, 0) + time_ns
+            self._seen, totals = seen, dict(self._ended)
+        for taker, time_ns in seen.values():
+            totals[taker] = totals.get(taker, 0) + time_ns
+        return totals
+
+    def _of(self, task: int, name: str | None, time_ns: int) -> str:
+        """Return what a thread is for: `name` is Python's, if Python has started it.
+
+        Python forgets a thread shortly before it ends: then it is for what it was for.
+        """
+        if name is not None:
+            return self._taker(name)
+        known, then_ns = self._seen.get(task, ("", 0))
+        if known and then_ns <= time_ns:
+            return known
+        try:
+            own = (_TASKS / str(task) / "comm").read_text(encoding="utf-8")
+        except OSError:
+            return "other threads"
+        return "wire" if own.startswith(_WIRE) else self._native
+
+
+def _core_ns(task: int) -> int | None:
+    """Return the processor time of a thread; None if it has ended, or if this system does not tell."""
+    try:
+        return int((_TASKS / str(task) / "schedstat").read_bytes().split()[0])
+    except (OSError, IndexError):
+        return None
+
+
+class CoreQueue:
+    """How long a thread could have run and had no core (field 2 of `schedstat`)."""
+
+    def __init__(self) -> None:
+        """Watch the calling thread, where the system knows this time."""
+        try:
+            self._file = os.open("/proc/thread-self/schedstat", os.O_RDONLY)
+        except OSError:
+            self._file = None
+
+    def waited_ns(self) -> int:
+        """Return the time so far; 0 where it is not known."""
+        return 0 if self._file is None else int(os.pread(self._file, 64, 0).split()[1])
+
+    def close(self) -> None:
+        """Watch no more."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

@@ -1,0 +1,93 @@
+"""What the observers of a session report, and which of them are lost: the session goes on without them."""
+
+from __future__ import annotations
+
+import logging
+from time import monotonic_ns
+
+import zenoh
+from zenoh.handlers import Callback
+
+from hub.observation.summary import Observed
+from hub.participant.token_bucket import TokenBucket
+from hub.planning.plan import Plan
+from hub.transport.refusals import Refusals
+from schemas.codec import decode
+from schemas.errors import MessageError
+from schemas.keys import Keys
+from schemas.trocar_msgs import Latency, ObserverStatus
+
+__all__ = ["ObserverReports"]
+
+log = logging.getLogger(__name__)
+
+_RATE = 10.0
+"""Statuses per second that are accepted for each observer; a host sends one."""
+
+
+class ObserverReports:
+    """Receives the statuses of all observers, and keeps why one is lost; from any thread."""
+
+    def __init__(self, plan: Plan, keys: Keys, session: zenoh.Session, refusals: Refusals) -> None:
+        self._keys, self._refusals = keys, refusals
+        self._names = [observer.name for observer in plan.observers()]
+        self._statuses: dict[str, ObserverStatus] = {}
+        self._lost: dict[str, str] = {}
+        self._limit = TokenBucket(_RATE * (1.0 + len(self._names)))
+        self._subscriber = session.declare_subscriber(
+            keys.observer_status("*"), Callback(self._receive, indirect=False)
+        )
+
+    def lose(self, observer: str, cause: str) -> None:
+        """Report that an observer is lost, the first time; `cause` is a clause."""
+        if observer not in self._lost:
+            self._lost = {**self._lost, observer: cause}
+            log.error("observer '%s' is lost, the session goes on without it: %s", observer, cause)
+
+    def find(self, observer: str) -> None:
+        """Report that an observer is here again."""
+        self._lost = {name: cause for name, cause in self._lost.items() if name != observer}
+
+    @property
+    def lost(self) -> str:
+        """Which observers are lost, and why; empty if none is."""
+        return "; ".join(f"observer '{name}' is lost: {cause}" for name, cause in self._lost.items())
+
+    @property
+    def latencies(self) -> list[Latency]:
+        """How long states took to the observers."""
+        return [latency for _, status in sorted(self._statuses.items()) for latency in status.latencies]
+
+    def step(self, observer: str) -> int:
+        """Return the step whose state an observer saw last; -1 if it has not reported any."""
+        status = self._statuses.get(observer)
+        return -1 if status is None else status.step
+
+    def observed(self) -> dict[str, Observed]:
+        """Return what each observer has seen."""
+        rows: dict[str, Observed] = {}
+        for name in self._names:
+            status, lost = self._statuses.get(name), self._lost.get(name)
+            if status is None:
+                rows[name] = Observed(0, 0, 0.0, 0.0, lost)
+            else:
+                rates = status.rate, status.attainable_rate
+                rows[name] = Observed(status.states, status.dropped, *rates, lost)
+        return rows
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        try:
+            if not self._limit.spend(monotonic_ns()):
+                raise MessageError("observers report their status more often than they may")
+            status = decode(ObserverStatus, sample.payload.to_bytes())
+            name = status.observer
+            if name not in self._names or str(sample.key_expr) != self._keys.observer_status(name):
+                raise MessageError(f"reports on '{name}', which is no observer of this name here")
+        except MessageError as error:
+            self._refusals.refuse_sample(sample, error)
+            return
+        self._statuses = {**self._statuses, name: status}  # other threads may be iterating over the old one
+
+    def undeclare(self) -> None:
+        """Receive no more."""
+        self._subscriber.undeclare()

@@ -1,0 +1,87 @@
+"""The work that `bench/live.py` times as bare is the session's own."""
+
+import json
+
+import pytest
+
+from bench import live
+
+TEXT = """\
+name: short
+step: 1 ms
+duration: 30 ms
+participants:
+  one: {kind: "toys:Mixer", seed: 1, host: other}
+  two: {kind: "toys:Mixer", seed: 2, period: 2 ms, step_ns: 2000000}
+  talker: {kind: "toys:Talker"}
+  listener: {kind: "toys:Listener", period: 2 ms}
+order: [one, two]
+connections:
+  - one.out -> two.a
+  - {source: two.out, target: one.b, extrapolation: linear}
+  - talker.words -> listener.words
+"""
+
+
+@pytest.fixture
+def scenario(toys, tmp_path):
+    file = tmp_path / "short.yaml"
+    file.write_text(TEXT)
+    return str(file)
+
+
+def test_bare_steps_reach_the_states_of_the_session(scenario):
+    captured = live.capture(scenario, 0.03)
+    assert {name: len(hashes) for name, hashes in captured.hashes.items()} == {
+        "one": 30,
+        "two": 15,
+        "talker": 30,
+        "listener": 15,
+    }
+    live.run_bare(scenario, 0.03, captured, check=True)
+    assert live.run_bare(scenario, 0.03, captured).wall_s > 0.0
+    captured.hashes["two"][7] ^= 1
+    with pytest.raises(ValueError, match="'two' reached another state than in the session at 14000000 ns"):
+        live.run_bare(scenario, 0.03, captured, check=True)
+
+
+def test_a_session_is_measured_with_its_hosts(scenario):
+    cost = live.run_session(live.Case("short", scenario, recorded=True), 0.03)
+    assert 0.0 < cost.sim_s <= 0.03
+    assert cost.wall_s > 0.0
+
+
+def test_every_scenario_has_a_row_or_a_reason():
+    rows = live.cases([])
+    assert {row.scenario for row in rows} | live.LEFT_OUT.keys() == set(live.installed_scenarios())
+    kinds = [(row.one_host, row.recorded) for row in rows if row.scenario == "palpation"]
+    assert sorted(kinds) == [(False, False), (False, True), (True, False), (True, True)]
+
+
+def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(live, "DOCS", tmp_path / "live.md")
+    row = {
+        f"{of}{name}": 1.25
+        for of in ("", "bare_")
+        for name in ("real_time_factor", "core_s_per_sim_s", "wall_ratio", "core_ratio")
+    }
+    figures = {
+        "seconds": 2.0,
+        "runs": 3,
+        "cores": 2,
+        "load_begin": [1.0, 2.0, 3.0],
+        "load_end": [4.0, 5.0, 6.0],
+        "left_out": {"keys": "why"},
+        "rows": [{"name": "short", **row}],
+    }
+    (tmp_path / "live.json").write_text(json.dumps(figures))
+    live.DOCS.write_text(f"before\n{live.BEGIN}\nold\n{live.END}\nafter\n")
+    monkeypatch.setattr("sys.argv", ["live", "--input", str(tmp_path / "live.json"), "--docs"])
+    live.main()
+    page = live.DOCS.read_text()
+    assert page.startswith("before\n")
+    assert page.endswith(f"{live.END}\nafter\n")
+    assert "| short | 1.25 | 1.25 | 1.25 | 1.25 | 1.250 | 1.250 |" in page
+    assert "at the end 4.0 5.0 6.0" in page
+    assert "old" not in page
+    assert "| short |" in capsys.readouterr().out
