@@ -33,6 +33,7 @@ from hub.planning.plan import PlannedParticipant
 from hub.planning.scenario_file import installed_scenarios, load
 from hub.session.launch import in_one_host, launch, plan_of
 from hub.session.session import Session
+from hub.transport.router_client import RouterClient
 from schemas.lockstep import Ack
 
 LEFT_OUT = {"keys": "a person drives it by the keyboard"}
@@ -125,8 +126,16 @@ def capture(scenario: str, seconds: float) -> Capture:
     for name, participant in participants.items():
         if isinstance(participant, Stepped):
             found.watch(name, participant)
-    place = file.source.directory
-    Session(scenario_here, plan, participants, place, endpoint=ENDPOINT, on_ack=found.take).run()
+    foreign = [p.foreign_keys for p in participants.values() if isinstance(p, RouterClient)]
+    Session(
+        scenario_here,
+        plan,
+        participants,
+        file.source.directory,
+        endpoint=ENDPOINT,
+        foreign_keys=[key for keys in foreign for key in keys],
+        on_ack=found.take,
+    ).run()
     return found
 
 
