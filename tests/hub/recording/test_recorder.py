@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import resource
@@ -307,6 +308,26 @@ def test_a_full_disk(tmp_path: Path, small_disk: Path) -> None:
         [sys.executable, "-c", FULL_DISK, small_disk / "run"], capture_output=True, text=True, check=True
     )
     _check_full_disk(small_disk / "run", tmp_path / "saved", 800 * 2**10, run, "No space left on device")
+
+
+def test_nothing_is_recorded_after_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was queued while a chunk failed would fit on the disk, and leave a gap before it."""
+    recorder = Recorder(tmp_path / "run", attachments={})
+    channel, failing, queued = recorder.channel("/pose", POSE), threading.Event(), threading.Event()
+
+    def fails_once(data: object) -> None:
+        monkeypatch.undo()
+        failing.set()
+        queued.wait()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(recorder._file, "add_chunk", fails_once)
+    recorder.write_all([(channel, t, _pose(t)) for t in range(1000)])
+    failing.wait()
+    recorder.write_all([(channel, t, _pose(t)) for t in range(1000, 1010)])
+    queued.set()
+    summary = recorder.close()
+    assert (summary.messages, summary.dropped, summary.error) == (0, 1010, "No space left on device")
 
 
 def test_sigkill_loses_at_most_what_was_queued(tmp_path: Path) -> None:
