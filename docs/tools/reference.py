@@ -157,7 +157,7 @@ def scenario() -> str:
             " parameters of every kind installed on your machine.",
             "",
             "YAML merge keys (`<<: *scene`) are allowed. Every value can be overridden on the command line:"
-            ' `--set participants.tissue.organs.block.young_modulus="25 kPa"`.',
+            ' `--set participants.tissue.organs.block.young_modulus="25 kPa"`; `participants.` may be left out.',
             "",
             *_scenario_limits(),
             *_model("Top level", schema),

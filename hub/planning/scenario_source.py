@@ -12,6 +12,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from hub.planning.limits import MAX_BYTES, MAX_DEPTH, MAX_TEXT, shown
 from hub.planning.yaml_text import MERGE, LimitError, compose, construct
 from schemas.errors import ScenarioError
+from schemas.scenario import Scenario
 
 __all__ = ["Location", "Source", "merged", "read"]
 
@@ -68,6 +69,8 @@ class Source:
     def override(self, text: str) -> None:
         """Apply `a.b.c=value`. Missing mappings on the way are created; the validation judges them later.
 
+        `participants.` may be left out before a participant's name.
+
         Raises ScenarioError if the text has another form, or names a part of something that has no parts.
         """
         dotted, equals, value_text = text.partition("=")
@@ -88,6 +91,9 @@ class Source:
         except YAMLError as error:
             raise ScenarioError(f"--set {shown(text)}: the value is not valid YAML") from error
         path: Location = tuple(_key_or_index(part) for part in dotted.split("."))
+        names = self.tree.get("participants")
+        if path[0] not in Scenario.model_fields and isinstance(names, dict) and path[0] in names:
+            path = ("participants", *path)
         parent: Any = self.tree
         for depth, part in enumerate(path):
             if problem := _no_such_part(parent, part):

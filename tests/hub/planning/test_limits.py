@@ -192,3 +192,14 @@ def test_a_text_is_shown_shortened_and_printable():
     assert shown("80 mm") == "80 mm"
     assert shown("a\x1b\ud800\nb") == "a\\x1b\\ud800\nb"
     assert shown("a" * 1_000, 10) == "aaaaa... (1000 characters) ...aaaaa"
+
+
+def test_an_override_may_leave_participants_out_but_for_names_of_the_top_level(tmp_path):
+    file = tmp_path / "two.yaml"
+    file.write_text(
+        "name: two\nstep: 1 ms\nduration: 1 ms\nparticipants:\n"
+        "  one: {kind: 'toys:Bare'}\n  order: {kind: 'toys:Bare'}\nconnections: []\n"
+    )
+    short = load(str(file), ["one.host=other", "order=[order, one]"]).scenario
+    assert short.participants["one"].host == "other"
+    assert short.order == ("order", "one")

@@ -1,0 +1,1 @@
+"""Learning from sessions: sweeps over parameters of a scenario."""

@@ -1,0 +1,103 @@
+"""The results of a sweep: one table of all trials, and plots of what it varied."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from learning.sweeps.variation import Variation, number_and_unit
+
+__all__ = ["flat", "write_plots", "write_table"]
+
+_ABOUT_THE_RUN = {
+    "trial", "repetition", "attempts", "node", "recording", "state", "error", "ending", "steps", "sim_time_s",
+    "wall_time_s", "real_time_factor", "late_steps", "dropped_messages", "state_hash", "recording_complete",
+    "energy_residual_j",
+}  # fmt: skip
+"""Columns that are not plotted: they say how a trial went, not what came out."""
+_MOST_PLOTS = 12
+
+
+def flat(row: Mapping[str, Any], variations: Sequence[Variation]) -> dict[str, Any]:
+    """Return a row without mappings in it, and varied values as numbers where they have a common unit."""
+    units = {variation.path: variation.unit for variation in variations}
+    made: dict[str, Any] = {}
+    for name, value in row.items():
+        if units.get(name) is not None and (found := number_and_unit(value)) is not None:
+            made[name] = found[0]
+        elif isinstance(value, Mapping):
+            made |= {f"{name}.{key}": each for key, each in flat(value, ()).items()}  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
+        else:
+            made[name] = json.dumps(value) if isinstance(value, list) else value
+    return made
+
+
+def write_table(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variation], file: Path) -> None:
+    """Write all rows as one parquet file; the unit of a varied parameter is in its column's metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    made = [flat(row, variations) for row in rows]
+    units = {variation.path: variation.unit for variation in variations}
+    fields: list[Any] = []
+    columns: list[Any] = []
+    for name in dict.fromkeys(name for row in made for name in row):
+        values = [row.get(name) for row in made]
+        if len({str if isinstance(value, str) else float for value in values if value is not None}) > 1:
+            values = [None if value is None else str(value) for value in values]
+        column = pa.array(values)
+        metadata = {"unit": unit} if (unit := units.get(name)) else None
+        fields.append(pa.field(name, column.type, metadata=metadata))
+        columns.append(column)
+    part = file.with_suffix(".part")
+    pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema(fields)), part)
+    part.replace(file)
+
+
+def write_plots(rows: Sequence[Mapping[str, Any]], variations: Sequence[Variation], file: Path) -> bool:
+    """Draw each measure over each varied parameter; return False if there is nothing to draw."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    made = [flat(row, variations) for row in rows]
+    varied = [each for each in variations if len(each.values) > 1]
+    measures = [
+        name
+        for name in dict.fromkeys(name for row in made for name in row)
+        if _is_measure(name, made, varied)
+    ]
+    measures = measures[:_MOST_PLOTS]
+    if not measures or not varied:
+        return False
+    size = (4.5 * len(varied), 2.6 * len(measures))
+    subplots: Any = plt.subplots
+    figure, axes = subplots(len(measures), len(varied), figsize=size, squeeze=False, layout="constrained")
+    for line, measure in zip(axes, measures, strict=True):
+        for axis, variation in zip(line, varied, strict=True):
+            _draw(axis, made, variation, measure)
+    figure.savefig(file, dpi=120)
+    plt.close(figure)
+    return True
+
+
+def _is_measure(name: str, rows: Sequence[Mapping[str, Any]], varied: Sequence[Variation]) -> bool:
+    if name in _ABOUT_THE_RUN or name in {variation.path for variation in varied}:
+        return False
+    values = [row.get(name) for row in rows]
+    return any(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+
+
+def _draw(axis: Any, rows: Sequence[Mapping[str, Any]], variation: Variation, measure: str) -> None:
+    """Draw all trials as points, and the mean of those with the same value as a line."""
+    points = [(row[variation.path], row[measure]) for row in rows if row.get(measure) is not None]
+    if variation.unit is None:
+        points = [(str(x), y) for x, y in points]
+    means = {x: [y for at, y in points if at == x] for x, _ in points}
+    axis.plot(*zip(*points, strict=True), "o", alpha=0.4, markersize=4)
+    axis.plot(list(means), [sum(ys) / len(ys) for ys in means.values()], "-")
+    axis.set_xlabel(variation.path.rpartition(".")[2] + (f" [{variation.unit}]" if variation.unit else ""))
+    axis.set_ylabel(measure)

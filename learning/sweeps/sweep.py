@@ -1,0 +1,176 @@
+"""A sweep and its directory: which trials are done, and what they gave.
+
+    DIR/sweep.json              what is swept
+    DIR/trials/00007.json       the row of a trial that is done
+    DIR/trials/00007/           its recording
+    DIR/results.parquet, .png   the table and its plots, written anew after each run
+
+A trial counts as done when its row stands there, which is written in one piece: a sweep that was interrupted,
+however it ended, goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import trocar
+from learning.sweeps.trial import Trial, planned, run_trial
+from learning.sweeps.variation import Variation
+from schemas.errors import ScenarioError
+
+__all__ = ["Sweep"]
+
+_Call = tuple[str, list[str], str | None]
+"""The arguments of `run_trial`."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What is swept, and where the results go."""
+
+    scenario: str
+    """A name or a path, as `trocar run` takes it."""
+    variations: tuple[Variation, ...]
+    directory: Path
+    repeat: int = 1
+    seed: str | None = None
+    """The path of a parameter that gets the number of the repetition."""
+    overrides: tuple[str, ...] = ()
+    """What every trial has, as `--set` takes it."""
+    recorded: bool = True
+
+    @property
+    def trials(self) -> list[Trial]:
+        """All trials, in order."""
+        return planned(self.variations, self.repeat, self.seed)
+
+    def check(self) -> None:
+        """Raise ScenarioError if a parameter is varied twice, or if a value is not valid in the scenario."""
+        paths = [variation.path for variation in self.variations] + ([self.seed] if self.seed else [])
+        if twice := sorted({path for path in paths if paths.count(path) > 1}):
+            raise ScenarioError(f"'{twice[0]}' is varied twice; give it one --vary with all its values")
+        first = {variation.path: variation.values[0] for variation in self.variations}
+        if self.seed:
+            first[self.seed] = 0
+        for variation in self.variations:
+            for value in variation.values:
+                trocar.load_scenario(
+                    self.scenario, set=self._fixed() | _texts(first | {variation.path: value})
+                )
+
+    def open(self) -> None:
+        """Create the directory, or go on with the sweep in it.
+
+        Raises ScenarioError if it holds another sweep, or something else.
+        """
+        file, text = self.directory / "sweep.json", json.dumps(self._described(), indent=2) + "\n"
+        if file.exists():
+            if file.read_text(encoding="utf-8") != text:
+                raise ScenarioError(
+                    f"'{self.directory}' holds another sweep (see {file}): name a new directory, or repeat"
+                    " the command that began it"
+                )
+            return
+        if self.directory.exists() and (not self.directory.is_dir() or any(self.directory.iterdir())):
+            raise ScenarioError(f"'{self.directory}' holds something else than a sweep; name a new directory")
+        (self.directory / "trials").mkdir(parents=True)
+        _write(file, text)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the rows of all trials that are done, in order."""
+        return [
+            {"trial": trial.number, "repetition": trial.repetition, **trial.settings}
+            | json.loads(_read(file))
+            for trial in self.trials
+            if (file := self._row(trial)).exists()
+        ]
+
+    def pending(self) -> list[Trial]:
+        """Return the trials that are not done yet."""
+        return [trial for trial in self.trials if not self._row(trial).exists()]
+
+    def run(self, jobs: int, *, ray: str | None = None) -> Iterator[dict[str, Any]]:
+        """Run what is pending, `jobs` trials at a time, and yield each row when it is there and written.
+
+        `ray` is the address of a Ray cluster, whose nodes run the trials; `jobs` is then left to it.
+        """
+        pending = self.pending()
+        made = _on_ray(ray, self._calls(pending)) if ray else _here(jobs, self._calls(pending))
+        for number, row in made:
+            _write(self._row(pending[number]), json.dumps(row, indent=2) + "\n")
+            yield row
+
+    def _calls(self, trials: Sequence[Trial]) -> list[_Call]:
+        file = Path(self.scenario)
+        scenario = str(file.resolve()) if file.suffix else self.scenario
+        return [
+            (
+                scenario,
+                [*self.overrides, *(f"{path}={text}" for path, text in _texts(trial.settings).items())],
+                str(self.directory.resolve() / "trials" / trial.name) if self.recorded else None,
+            )
+            for trial in trials
+        ]
+
+    def _fixed(self) -> dict[str, str]:
+        return {path: value for path, _, value in (each.partition("=") for each in self.overrides)}
+
+    def _described(self) -> dict[str, Any]:
+        return {
+            "scenario": self.scenario,
+            "vary": {variation.path: variation.values for variation in self.variations},
+            "repeat": self.repeat,
+            "seed": self.seed,
+            "set": self.overrides,
+            "recorded": self.recorded,
+        }
+
+    def _row(self, trial: Trial) -> Path:
+        return self.directory / "trials" / f"{trial.name}.json"
+
+
+def _here(jobs: int, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
+    from joblib import Parallel, delayed
+
+    # threads: a trial is a process already, and one that dies takes no worker with it
+    parallel = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered", batch_size=1)
+    yield from parallel(delayed(_numbered)(number, call) for number, call in enumerate(calls))
+
+
+def _on_ray(address: str, calls: Sequence[_Call]) -> Iterator[tuple[int, dict[str, Any]]]:
+    import ray
+
+    # joblib's own backend for Ray gives results only when all are there, which an interruption would lose
+    ray.init(address=address, log_to_driver=False)
+    try:
+        run = ray.remote(num_cpus=1)(_numbered)
+        pending = [run.remote(number, call) for number, call in enumerate(calls)]
+        while pending:
+            done, pending = ray.wait(pending)
+            yield ray.get(done[0])
+    finally:
+        ray.shutdown()
+
+
+def _numbered(number: int, call: _Call) -> tuple[int, dict[str, Any]]:
+    return number, run_trial(*call)
+
+
+def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Return values as `--set` reads them."""
+    return {path: json.dumps(value) for path, value in settings.items()}
+
+
+def _read(file: Path) -> str:
+    return file.read_text(encoding="utf-8")
+
+
+def _write(file: Path, text: str) -> None:
+    """Write a file in one piece."""
+    part = file.with_suffix(".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(file)

@@ -1,0 +1,86 @@
+"""One trial of a sweep: `trocar run` in a process of its own, whose end, however it comes, is a row."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from learning.sweeps.variation import Variation
+
+__all__ = ["Trial", "planned", "run_trial"]
+
+_ATTEMPTS = 2
+_LAST_LINES = 3
+_LEFT_OUT = {"latency", "observers", "profile", "session", "recording"}
+"""Of a summary: what has no place in a row, and what the row has under another name."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Which values a trial has, and the how manieth repetition it is."""
+
+    number: int
+    repetition: int
+    settings: Mapping[str, Any]
+    """Values of the scenario by their path."""
+
+    @property
+    def name(self) -> str:
+        """The name of its files."""
+        return f"{self.number:05d}"
+
+
+def planned(variations: Sequence[Variation], repeat: int, seed: str | None) -> list[Trial]:
+    """Return all trials: each combination of values, `repeat` times, the last variation changing fastest.
+
+    `seed` is the path of a parameter that gets the number of the repetition, from 0.
+    """
+    combinations = product(*(variation.values for variation in variations))
+    settings = [
+        {variation.path: value for variation, value in zip(variations, values, strict=True)}
+        | ({seed: repetition} if seed else {})
+        for values in combinations
+        for repetition in range(repeat)
+    ]
+    return [Trial(number, number % repeat, each) for number, each in enumerate(settings)]
+
+
+def run_trial(scenario: str, overrides: Sequence[str], recording: str | None) -> dict[str, Any]:
+    """Run a trial, again if its process ends with a failure, and return its row.
+
+    Args:
+        scenario: the name or path that `trocar run` is given.
+        overrides: what its `--set` is given.
+        recording: the directory of its recording; whatever stands there is removed first.
+    """
+    command = [sys.executable, "-P", "-m", "trocar", "run", scenario, "--pace", "fast", "--json"]
+    command += [part for override in overrides for part in ("--set", override)]
+    command += ["--record", recording] if recording else []
+    row: dict[str, Any] = {}
+    for attempt in range(1, _ATTEMPTS + 1):
+        if recording:
+            shutil.rmtree(recording, ignore_errors=True)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        row = {"attempts": attempt, "node": platform.node(), "recording": recording} | _ending(done)
+        if row["error"] is None:
+            break
+    return row
+
+
+def _ending(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
+    """Return what a process has left: its summary, or why there is none."""
+    if done.returncode == 0:
+        summary: dict[str, Any] = json.loads(done.stdout)
+        kept = {name: value for name, value in summary.items() if name not in _LEFT_OUT}
+        return {"error": None} | kept
+    if done.returncode < 0:
+        return {"state": "died", "error": f"killed by signal {-done.returncode}"}
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    return {"state": "failed", "error": "\n".join(lines[-_LAST_LINES:]) or f"exit code {done.returncode}"}
