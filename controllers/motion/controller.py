@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from controllers.motion.following import follow
+from controllers.motion.following import Followers
 from controllers.motion.frames import base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
@@ -39,6 +39,7 @@ class MotionController(Controller):
         super().__init__(name, params)
         self._arms: dict[str, Arm] = {}
         self._sets: list[tuple[Telemetry, list[Arm]]] = []
+        self._followers: Followers | None = None
         self._period = 0.0
         self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
         self._camera_pose, self._camera_seen = np.eye(4), b""
@@ -102,7 +103,9 @@ class MotionController(Controller):
             arm.sense(inputs)
         following = [setpoint for arm in arms for setpoint in arm.step(t, h, inputs)]
         if following:
-            follow(following, self._period)
+            if self._followers is None or self._followers.setpoints != following:
+                self._followers = Followers(following, self._period)
+            self._followers.step()
         if not (t + h) % self.params.publish_period:
             self._publish()
         self._setup_joints.step(t, h, inputs)
