@@ -129,6 +129,7 @@ class MotionController(Controller):
         """Release the arms."""
         self._arms.clear()
         self._sets.clear()
+        self._followers = None
         self._outputs.clear()
 
 
