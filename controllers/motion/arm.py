@@ -175,7 +175,8 @@ class Arm:
         """Write to `row` what the states are computed from that are not published at every step."""
         drives, settings = self._drives, self._commands.settings
         joints = drives.joints
-        row.setpoint[:], row.measured[:] = joints.commanded, joints.measured
+        row.setpoint[0], row.setpoint[1] = joints.setpoint.position, joints.setpoint.velocity
+        row.setpoint[2], row.measured[:] = joints.effort, joints.measured
         row.base[:], row.ratio[:] = self._base.pose, settings.ratio
         row.switches[0] = drives.control.absolute
         row.switches[1] = joints.mode is not Mode.OFF and settings.gravity_compensation

@@ -38,7 +38,7 @@ class MotionController(Controller):
     def __init__(self, name: str, params: MotionParams) -> None:
         super().__init__(name, params)
         self._arms: dict[str, Arm] = {}
-        self._sets: list[tuple[Telemetry, list[Arm]]] = []
+        self._telemetry: Telemetry | None = None
         self._followers: Followers | None = None
         self._period = 0.0
         self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
@@ -76,10 +76,9 @@ class MotionController(Controller):
             name: Arm(name, self.params, self._camera, period, self._outputs)
             for name in self.params.arms.driven
         }
-        self._sets = _sets(self._arms)
-        self._publish()
-        for telemetry, _ in self._sets:
-            self._outputs |= telemetry.outputs
+        self._telemetry = Telemetry([(name, arm.chain, arm.weight) for name, arm in self._arms.items()])
+        self._publish(self._telemetry)
+        self._outputs |= self._telemetry.outputs
         self.keep(*(part for arm in self._arms.values() for part in arm.state), *self._setup_joints.state)
         return self._outputs
 
@@ -106,17 +105,16 @@ class MotionController(Controller):
             if self._followers is None or self._followers.setpoints != following:
                 self._followers = Followers(following, self._period)
             self._followers.step()
-        if not (t + h) % self.params.publish_period:
-            self._publish()
+        if self._telemetry is not None and not (t + h) % self.params.publish_period:
+            self._publish(self._telemetry)
         self._setup_joints.step(t, h, inputs)
         return self._outputs
 
-    def _publish(self) -> None:
+    def _publish(self, telemetry: Telemetry) -> None:
         """Update the states that are not published at every step."""
-        for telemetry, arms in self._sets:
-            for arm, row in zip(arms, telemetry.rows, strict=True):
-                arm.publish(row)
-            telemetry.update()
+        for name, arm in self._arms.items():
+            arm.publish(telemetry.rows[name])
+        telemetry.update()
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state, of trajectories from their start, goal and age."""
@@ -128,17 +126,5 @@ class MotionController(Controller):
     def close(self) -> None:
         """Release the arms."""
         self._arms.clear()
-        self._sets.clear()
-        self._followers = None
+        self._telemetry = self._followers = None
         self._outputs.clear()
-
-
-def _sets(arms: Mapping[str, Arm]) -> list[tuple[Telemetry, list[Arm]]]:
-    """Return the arms whose states are computed together: those with joints of the same kinds."""
-    sets: dict[tuple[str, ...], dict[str, Arm]] = {}
-    for name, arm in arms.items():
-        sets.setdefault(tuple(joint.kind for joint in arm.chain.joints), {})[name] = arm
-    return [
-        (Telemetry([(name, arm.chain, arm.weight) for name, arm in alike.items()]), list(alike.values()))
-        for alike in sets.values()
-    ]
