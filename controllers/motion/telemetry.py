@@ -38,7 +38,7 @@ def body_to_spatial(tip: Vector) -> Vector:
     frame's origin, in the base frame (Murray, Li, Sastry, A Mathematical Introduction to Robotic
     Manipulation, section 2.4), as on the dVRK's `spatial/` ports.
     """
-    rotation, (x, y, z) = tip[..., :3, :3], np.moveaxis(tip[..., :3, 3], -1, 0)
+    rotation, x, y, z = tip[..., :3, :3], tip[..., 0, 3], tip[..., 1, 3], tip[..., 2, 3]
     across = np.zeros((*tip.shape[:-2], 3, 3))
     across[..., 0, 1], across[..., 0, 2], across[..., 1, 2] = -z, y, -x
     across[..., 1, 0], across[..., 2, 0], across[..., 2, 1] = z, -y, x
@@ -103,8 +103,8 @@ class Telemetry:
             state[0], state[1].reshape(-1), self._base[i], self._ratio[i], self._switches[i]
         )
         self.outputs |= group.outputs_of(member, arm)
-        self.outputs |= {name.format(arm): pose for name, pose in zip(_POSES, self._poses[i], strict=True)}
-        self.outputs |= {name.format(arm): twist for name, twist in zip(_TWISTS, self._twists[i], strict=True)}
+        for names, values in ((_POSES, self._poses[i]), (_TWISTS, self._twists[i])):
+            self.outputs |= {name.format(arm): value for name, value in zip(names, values, strict=True)}
         self.outputs |= {
             f"{arm}/trajectory_j/{name}": self._ratios[i, j : j + 1] for j, name in enumerate(_RATIOS)
         }
@@ -208,7 +208,8 @@ class _Group:
         for i, (weight, (absolute, carries)) in enumerate(zip(self._weights, switches.tolist(), strict=True)):
             self._carried[i] = carries * weight.effort(self.state[i, 1, 0])
             if absolute:
-                self._wrenches[i, 0] = turned(base[i, :3, :3] @ self._tips[i, 1, :3, :3], self._wrenches[i, 0])
+                in_reference = base[i, :3, :3] @ self._tips[i, 1, :3, :3]
+                self._wrenches[i, 0] = turned(in_reference, self._wrenches[i, 0])
 
 
 def _pseudo_inverse(matrices: Vector) -> Vector:

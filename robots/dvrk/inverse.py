@@ -133,7 +133,7 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
 
 
 def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vector]:
-    """Return poses, shape (N, 4, 4), and where they are looked for, (N, n) or (1, n), once they make sense."""
+    """Return poses, (N, 4, 4), and where they are looked for, (N, n) or (1, n), once they make sense."""
     n, many = len(chain.joints), np.shape(pose)[:-2]
     if np.shape(pose)[-2:] != (4, 4):
         raise MotionError(f"pose of shape {np.shape(pose)}, expected (..., 4, 4), a homogeneous transform")
