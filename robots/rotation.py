@@ -100,8 +100,7 @@ def from_matrices(r: Vector) -> Vector:
     signed = _SQUARES * entries[:, None, ::4]
     squares = 1.0 + signed[..., 0] + signed[..., 1] + signed[..., 2]  # (m, 4)
     products = entries.take(_FIRST, -1) + _SIGNS * entries.take(_SECOND, -1)  # (m, 6)
-    parts = np.concatenate([squares, products], axis=-1)
-    starts = np.arange(0, parts.size, parts.shape[1])[:, None]
-    rows = parts.take(_ROWS.take(squares.argmax(axis=-1), 0) + starts)
+    parts = np.concatenate([squares, products], axis=-1)  # (m, 10)
+    rows: Vector = parts[np.arange(len(r))[:, None], _ROWS.take(squares.argmax(axis=-1), 0)]
     x, y, z, w = (rows * rows).T
     return rows / np.sqrt(x + y + z + w)[:, None]

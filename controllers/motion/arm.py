@@ -59,7 +59,7 @@ class Arm:
         Args:
             name: its name.
             params: parameters of the controller.
-            camera: returns the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+            camera: as of `BaseFrame`.
             period: the controller's step, s.
             outputs: those of the controller; the arm puts its own among them, whose arrays stay the same.
         """

@@ -14,6 +14,7 @@ from controllers.motion.ports import arm_ports, setup_joint_ports
 from controllers.motion.setup_joints import SetupJoints
 from controllers.motion.telemetry import Telemetry
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import CART_FRAME
 from schemas.errors import MissingExtraError
 from schemas.ports import Port
@@ -41,7 +42,7 @@ class MotionController(Controller):
         self._followers: Followers | None = None
         self._period = 0.0
         self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
-        self._camera_pose, self._camera_seen = np.eye(4), b""
+        self._world_seen, self._camera_seen = np.eye(4), b""
         self._outputs: dict[str, Any] = {}
         self._setup_joints = SetupJoints(params, self._outputs)
 
@@ -82,7 +83,7 @@ class MotionController(Controller):
         return self._outputs
 
     def _camera(self) -> Vector | None:
-        """Return the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+        """Return the pose of the world in the frame of the ECM's tip, shape (4, 4), if there is an ECM.
 
         It is the same array until the ECM moves.
         """
@@ -91,8 +92,8 @@ class MotionController(Controller):
         position = self._arms["ECM"].position
         if (seen := position.tobytes()) != self._camera_seen:
             self._camera_seen = seen
-            self._camera_pose = self._camera_stand @ self._arms["ECM"].chain.forward(position)
-        return self._camera_pose
+            self._world_seen = inverse_pose(self._camera_stand @ self._arms["ECM"].chain.forward(position))
+        return self._world_seen
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Execute commands and advance all setpoints by `h` nanoseconds."""
