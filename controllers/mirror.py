@@ -24,7 +24,6 @@ from pydantic import Field
 from controllers.motion.params import Arms, EcmParams, PsmParams
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, Value, array, flag, number
 from robots.dvrk import crtk
-from robots.serial_chain import Joint
 from schemas.crtk import OperatingState
 from schemas.ports import Port
 from schemas.quantity import Duration
@@ -99,13 +98,19 @@ class _Arm:
         self._name, self._chain, self._max_age_ns = name, params.chain, max_age_ns
         gripper = params.gripper
         self._jaw = gripper.joints[:1] if gripper is not None and gripper.name == "jaw" else ()
+        self._range = self._chain.lower, self._chain.upper
+        self._jaw_range = (
+            np.array([joint.lower for joint in self._jaw]),
+            np.array([joint.upper for joint in self._jaw]),
+        )
         n, m = len(self._chain.joints), len(self._jaw)
         self.state = _ArmState(n=n, jaw=m)
         self._forget()
-        self.outputs: dict[str, Value] = {
+        self._silence: dict[str, Value] = {
             f"{name}/{out}": ()
             for out in ("servo_jp", "hold", "warning", "distance", "lag", *(("jaw/servo_jp",) if m else ()))
         }
+        self.outputs = dict(self._silence)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -193,7 +198,7 @@ class _Arm:
     def step(self, t: int, h: int, inputs: Inputs) -> dict[str, Value]:
         """Command the simulated arm to the newest sample, and compare the two."""
         name = self._name
-        self.outputs.update(dict.fromkeys(self.outputs, ()))
+        self.outputs |= self._silence
         for state in cast("tuple[OperatingState, ...]", inputs.events(f"{name}/operating_state")):
             self.state.ready = crtk.is_ready(state)
         n, real = len(self._chain.joints), inputs[f"real/{name}/measured_js"]
@@ -205,13 +210,13 @@ class _Arm:
         self.state.follows = fresh and self.state.ready
         if self.state.follows:
             stamp = Time.from_ns(t + h)
-            self._send("servo_jp", self.state.sample, real, self._chain.joints, stamp)
+            self._send("servo_jp", self.state.sample, real, self._range, stamp)
             if self._jaw and not inputs.stale(f"real/{name}/jaw/measured_js"):
                 self._send(
                     "jaw/servo_jp",
                     self.state.jaw_sample,
                     inputs[f"real/{name}/jaw/measured_js"],
-                    self._jaw,
+                    self._jaw_range,
                     stamp,
                 )
             self._compare(real[:n], real[n : 2 * n], inputs[f"{name}/measured_js"][:n], h * 1e-9)
@@ -224,15 +229,14 @@ class _Arm:
         self.state.sample[:] = self.state.jaw_sample[:] = np.nan
 
     def _send(
-        self, command: str, sample: Vector, real: Vector, joints: tuple[Joint, ...], stamp: Time
+        self, command: str, sample: Vector, real: Vector, allowed: tuple[Vector, Vector], stamp: Time
     ) -> None:
-        """Send positions and velocities, if they are not those of the last `sample`."""
-        n = len(joints)
-        if np.array_equal(real[:n], sample):
+        """Send positions within what is `allowed`, and velocities, unless they are those of `sample`."""
+        n = len(sample)
+        if real[:n].tolist() == sample.tolist():
             return
         sample[:] = real[:n]
-        lower, upper = (np.array([getattr(joint, end) for joint in joints]) for end in ("lower", "upper"))
-        within = np.clip(real[:n], lower, upper)
+        within = np.clip(real[:n], *allowed)
         message = JointState(
             header=Header(stamp=stamp),
             position=within,
@@ -241,7 +245,7 @@ class _Arm:
         self.outputs[f"{self._name}/{command}"] = (message,)
 
     def _compare(self, real: Vector, velocity: Vector, simulated: Vector, h: float) -> None:
-        tips = [self._chain.forward(positions)[:3, 3] for positions in (real, simulated)]
+        tips = self._chain.forward(np.array([real, simulated]))[:, :3, 3]
         self.state.distance = float(np.linalg.norm(tips[0] - tips[1]))
         self.outputs[f"{self._name}/distance"] = (Float64Message(data=self.state.distance),)
         speed = velocity / self._chain.velocity

@@ -97,10 +97,10 @@ def from_matrices(r: Vector) -> Vector:
     They are those of `from_matrix` to the bit: the same operations in the same order.
     """
     entries = r[:, :3, :3].reshape(-1, 9)
-    x, y, z = np.moveaxis(_SQUARES * entries[:, None, ::4], -1, 0)
-    squares = 1.0 + x + y + z  # (m, 4)
+    signed = _SQUARES * entries[:, None, ::4]
+    squares = 1.0 + signed[..., 0] + signed[..., 1] + signed[..., 2]  # (m, 4)
     products = entries.take(_FIRST, -1) + _SIGNS * entries.take(_SECOND, -1)  # (m, 6)
-    parts = np.concatenate([squares, products], axis=-1)
-    rows = np.take_along_axis(parts, _ROWS.take(squares.argmax(axis=-1), 0), -1)
+    parts = np.concatenate([squares, products], axis=-1)  # (m, 10)
+    rows: Vector = parts[np.arange(len(r))[:, None], _ROWS.take(squares.argmax(axis=-1), 0)]
     x, y, z, w = (rows * rows).T
     return rows / np.sqrt(x + y + z + w)[:, None]

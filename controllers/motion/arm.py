@@ -15,6 +15,7 @@ from controllers.motion.equipment import Equipment
 from controllers.motion.frames import BaseFrame, base_in_world
 from controllers.motion.lifecycle import Lifecycle
 from controllers.motion.messages import Messages
+from controllers.motion.operating_state import State
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
 from controllers.motion.setpoint import Setpoint
@@ -58,7 +59,7 @@ class Arm:
         Args:
             name: its name.
             params: parameters of the controller.
-            camera: returns the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+            camera: as of `BaseFrame`.
             period: the controller's step, s.
             outputs: those of the controller; the arm puts its own among them, whose arrays stay the same.
         """
@@ -97,6 +98,8 @@ class Arm:
             for order, (command, handler) in enumerate(commands)
         }
         self._now, self._modes = ArmState(), np.array(self._drives.modes, np.float64)
+        self._condition: tuple[State, bool, bool] | None = None
+        """That of `Lifecycle` after the last step; None before the first."""
         self._rests = False
         """Whether a step without commands changes nothing but the setpoint, while the joints keep to that."""
         self.state = (
@@ -152,7 +155,7 @@ class Arm:
         arrived = () if inputs.quiet else inputs.event_ports & self._commanded.keys()
         if self._rests and not arrived and not self._lifecycle.is_lost:
             return self._drives.step(self._period)
-        before = self._condition() if self._now.started else None
+        before = self._condition
         if before is None:
             self._now.started = True
             self._messages.desired_state(self._lifecycle.desired_state)
@@ -161,8 +164,8 @@ class Arm:
         awaited = self._execute(inputs, arrived)
         self._lifecycle.step(self._period)
         following = self._drives.step(self._period)
-        state, homed, busy = condition = self._condition()
-        if awaited or condition != before:
+        state, homed, busy = self._condition = self._lifecycle.condition
+        if awaited or self._condition != before:
             self._messages.operating_state(state, homed=homed, busy=busy)
         self._update_modes()
         self._rests = not busy
@@ -172,7 +175,8 @@ class Arm:
         """Write to `row` what the states are computed from that are not published at every step."""
         drives, settings = self._drives, self._commands.settings
         joints = drives.joints
-        row.setpoint[:], row.measured[:] = joints.commanded, joints.measured
+        row.setpoint[0], row.setpoint[1] = joints.setpoint.position, joints.setpoint.velocity
+        row.setpoint[2], row.measured[:] = joints.effort, joints.measured
         row.base[:], row.ratio[:] = self._base.pose, settings.ratio
         row.switches[0] = drives.control.absolute
         row.switches[1] = joints.mode is not Mode.OFF and settings.gravity_compensation
@@ -183,6 +187,7 @@ class Arm:
         """Compute what follows from `state` after it was restored."""
         for axes in self._drives.groups:
             axes.setpoint.restored()
+        self._condition = self._lifecycle.condition if self._now.started else None
         self._update_modes()
         self._rests = False
 
@@ -190,9 +195,6 @@ class Arm:
         self._modes[:] = self._drives.modes
         if self._modes[0] and not self._commands.settings.gravity_compensation:
             self._modes[0] += _BARE
-
-    def _condition(self) -> tuple[Any, bool, bool]:
-        return self._lifecycle.state, self._lifecycle.is_homed, self._lifecycle.is_busy
 
     def _execute(self, inputs: Inputs, ports: Collection[str]) -> bool:
         """Execute what has arrived on `ports`; return whether clients now wait for the operating state."""

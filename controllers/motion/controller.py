@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from controllers.motion.following import follow
+from controllers.motion.following import Followers
 from controllers.motion.frames import base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
 from controllers.motion.setup_joints import SetupJoints
 from controllers.motion.telemetry import Telemetry
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import CART_FRAME
 from schemas.errors import MissingExtraError
 from schemas.ports import Port
@@ -38,10 +38,11 @@ class MotionController(Controller):
     def __init__(self, name: str, params: MotionParams) -> None:
         super().__init__(name, params)
         self._arms: dict[str, Arm] = {}
-        self._sets: list[tuple[Telemetry, list[Arm]]] = []
+        self._telemetry: Telemetry | None = None
+        self._followers: Followers | None = None
         self._period = 0.0
         self._camera_stand = base_in_world("ECM", params) if "ECM" in params.arms.driven else None
-        self._camera_pose, self._camera_seen = np.eye(4), b""
+        self._world_seen, self._camera_seen = np.eye(4), b""
         self._outputs: dict[str, Any] = {}
         self._setup_joints = SetupJoints(params, self._outputs)
 
@@ -75,15 +76,14 @@ class MotionController(Controller):
             name: Arm(name, self.params, self._camera, period, self._outputs)
             for name in self.params.arms.driven
         }
-        self._sets = _sets(self._arms)
-        self._publish()
-        for telemetry, _ in self._sets:
-            self._outputs |= telemetry.outputs
+        self._telemetry = Telemetry([(name, arm.chain, arm.weight) for name, arm in self._arms.items()])
+        self._publish(self._telemetry)
+        self._outputs |= self._telemetry.outputs
         self.keep(*(part for arm in self._arms.values() for part in arm.state), *self._setup_joints.state)
         return self._outputs
 
     def _camera(self) -> Vector | None:
-        """Return the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+        """Return the pose of the world in the frame of the ECM's tip, shape (4, 4), if there is an ECM.
 
         It is the same array until the ECM moves.
         """
@@ -92,8 +92,8 @@ class MotionController(Controller):
         position = self._arms["ECM"].position
         if (seen := position.tobytes()) != self._camera_seen:
             self._camera_seen = seen
-            self._camera_pose = self._camera_stand @ self._arms["ECM"].chain.forward(position)
-        return self._camera_pose
+            self._world_seen = inverse_pose(self._camera_stand @ self._arms["ECM"].chain.forward(position))
+        return self._world_seen
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Execute commands and advance all setpoints by `h` nanoseconds."""
@@ -102,18 +102,19 @@ class MotionController(Controller):
             arm.sense(inputs)
         following = [setpoint for arm in arms for setpoint in arm.step(t, h, inputs)]
         if following:
-            follow(following, self._period)
-        if not (t + h) % self.params.publish_period:
-            self._publish()
+            if self._followers is None or self._followers.setpoints != following:
+                self._followers = Followers(following, self._period)
+            self._followers.step()
+        if self._telemetry is not None and not (t + h) % self.params.publish_period:
+            self._publish(self._telemetry)
         self._setup_joints.step(t, h, inputs)
         return self._outputs
 
-    def _publish(self) -> None:
+    def _publish(self, telemetry: Telemetry) -> None:
         """Update the states that are not published at every step."""
-        for telemetry, arms in self._sets:
-            for arm, row in zip(arms, telemetry.rows, strict=True):
-                arm.publish(row)
-            telemetry.update()
+        for name, arm in self._arms.items():
+            arm.publish(telemetry.rows[name])
+        telemetry.update()
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state, of trajectories from their start, goal and age."""
@@ -125,16 +126,5 @@ class MotionController(Controller):
     def close(self) -> None:
         """Release the arms."""
         self._arms.clear()
-        self._sets.clear()
+        self._telemetry = self._followers = None
         self._outputs.clear()
-
-
-def _sets(arms: Mapping[str, Arm]) -> list[tuple[Telemetry, list[Arm]]]:
-    """Return the arms whose states are computed together: those with joints of the same kinds."""
-    sets: dict[tuple[str, ...], dict[str, Arm]] = {}
-    for name, arm in arms.items():
-        sets.setdefault(tuple(joint.kind for joint in arm.chain.joints), {})[name] = arm
-    return [
-        (Telemetry([(name, arm.chain, arm.weight) for name, arm in alike.items()]), list(alike.values()))
-        for alike in sets.values()
-    ]

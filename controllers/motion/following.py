@@ -15,7 +15,7 @@ from schemas.vectors import Vector
 if TYPE_CHECKING:
     from controllers.motion.setpoint import Setpoint
 
-__all__ = ["clip", "fastest", "follow", "steer"]
+__all__ = ["Followers", "clip", "fastest", "steer"]
 
 
 def clip(value: Vector, lower: Vector, upper: Vector) -> Vector:
@@ -23,45 +23,53 @@ def clip(value: Vector, lower: Vector, upper: Vector) -> Vector:
     return np.minimum(np.maximum(value, lower), upper)  # a third of the cost of np.clip
 
 
-def follow(setpoints: Sequence[Setpoint], h: float) -> None:
-    """Take a step of `h` seconds towards the goals of `setpoints`, of N joints in all.
+class Followers:
+    """Setpoints that follow together, of N joints in all, and what stays the same while they do."""
 
-    Of a stream each goal is reached when the next is due.
-    """
-    courses = [setpoint.course for setpoint in setpoints]
-    position, velocity, _, goal, arrival = np.concatenate(courses, axis=1)  # (N,) each
-    limits = np.concatenate([setpoint.limits for setpoint in setpoints], axis=1)
-    lower, upper, _, most = limits
-    waits = [max(setpoint.state.waiting, h) for setpoint in setpoints]
-    stated = [setpoint.state.stated for setpoint in setpoints]
-    sizes = [course.shape[1] for course in courses]
-    wait = np.repeat(waits, sizes)
-    left = goal - position
-    away = left - wait * arrival  # from where a setpoint that is in time would be now
-    most_away, most_to_goal, most_down, most_up = fastest(
-        np.array([np.abs(away), np.abs(left), position - lower, upper - position]), most, h
-    )
-    faster, bends = away / wait, np.repeat(stated, sizes) if any(stated) else None
-    if bends is not None:
-        faster = np.where(bends, _bend(left, velocity, arrival, wait, h), faster)
-    target = arrival + clip(faster, -most_away, most_away)
-    if not all(stated):
-        # while it catches up: the next goal may be late or turn back, so it must be able to come to rest
-        # as near to this one as from the velocity of arrival there, and what a step adds to that
-        allowed = np.hypot(most_to_goal, np.abs(arrival) + h * most)
-        slowed = clip(target, -allowed, allowed)
-        target = slowed if bends is None else np.where(bends, target, slowed)
-    moved = steer(position, velocity, target, limits, most_down, most_up, h)
-    start = 0
-    for setpoint, course, waited in zip(setpoints, courses, waits, strict=True):
-        end, state = start + course.shape[1], setpoint.state
-        course[:3] = moved[:, start:end]
-        state.since += h
-        state.waiting = max(waited - h, 0.0)
-        if not state.waiting:
-            course[4] = 0.0
-            state.stated = False
-        start = end
+    def __init__(self, setpoints: Sequence[Setpoint], h: float) -> None:
+        """Take the setpoints, and the step (s)."""
+        self.setpoints, self._h = list(setpoints), h
+        self._courses = [setpoint.course for setpoint in setpoints]
+        sizes = [course.shape[1] for course in self._courses]
+        self._owner = np.repeat(np.arange(len(sizes)), sizes)  # (N,)
+        self._limits = np.concatenate([setpoint.limits for setpoint in setpoints], axis=1)  # (4, N)
+        self._room = h * self._limits[3]
+        self._moved = np.zeros((3, sum(sizes)))  # position, velocity, acceleration
+        ends = np.cumsum(sizes).tolist()
+        self._shares = [self._moved[:, end - size : end] for end, size in zip(ends, sizes, strict=True)]
+
+    def step(self) -> None:
+        """Take a step towards the goals; of a stream each goal is reached when the next is due."""
+        h, room = self._h, self._room
+        position, velocity, _, goal, arrival = np.concatenate(self._courses, axis=1)  # (N,) each
+        lower, upper, _, most = self._limits
+        states = [setpoint.state for setpoint in self.setpoints]
+        waits = [max(state.waiting, h) for state in states]
+        stated = [state.stated for state in states]
+        wait = np.array(waits).take(self._owner)
+        left = goal - position
+        away = left - wait * arrival  # from where a setpoint that is in time would be now
+        most_away, most_to_goal, most_down, most_up = fastest(
+            np.array([np.abs(away), np.abs(left), position - lower, upper - position]), most, h
+        )
+        faster, bends = away / wait, np.array(stated).take(self._owner) if any(stated) else None
+        if bends is not None:
+            faster = np.where(bends, _bend(left, velocity, arrival, wait, h), faster)
+        target = arrival + clip(faster, -most_away, most_away)
+        if not all(stated):
+            # while it catches up: the next goal may be late or turn back, so it must be able to come to rest
+            # as near to this one as from the velocity of arrival there, and what a step adds to that
+            allowed = np.hypot(most_to_goal, np.abs(arrival) + room)
+            slowed = clip(target, -allowed, allowed)
+            target = slowed if bends is None else np.where(bends, target, slowed)
+        steer(position, velocity, target, self._limits, most_down, most_up, h, out=self._moved)
+        for state, course, share, waited in zip(states, self._courses, self._shares, waits, strict=True):
+            course[:3] = share
+            state.since += h
+            state.waiting = waited - h
+            if waited == h:
+                course[4] = 0.0
+                state.stated = False
 
 
 def _bend(left: Vector, velocity: Vector, arrival: Vector, wait: Vector, h: float) -> Vector:
@@ -80,8 +88,9 @@ def steer(
     most_down: Vector,
     most_up: Vector,
     h: float,
-) -> Vector:
-    """Return position, velocity and acceleration, shape (3, N), after `h` seconds.
+    out: Vector,
+) -> None:
+    """Write position, velocity and acceleration after `h` seconds to `out`, shape (3, N).
 
     The velocity is the allowed one that is nearest to `target`; allowed is what `limits` (`Setpoint.limits`)
     and the way left to either side permit.
@@ -90,7 +99,8 @@ def steer(
     room = h * most
     target = clip(clip(target, -fast, fast), velocity - room, velocity + room)
     velocity = clip(target, -most_down, most_up)
-    return np.array([clip(position + h * velocity, lower, upper), velocity, np.zeros_like(velocity)])
+    np.minimum(np.maximum(position + h * velocity, lower), upper, out=out[0])
+    out[1], out[2] = velocity, 0.0
 
 
 def fastest(distance: Vector, most: Vector, h: float) -> Vector:

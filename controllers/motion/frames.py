@@ -13,7 +13,6 @@ import numpy as np
 from controllers.motion.params import MotionParams
 from robots import rotation
 from robots.dvrk import crtk, setup_joints
-from robots.dvrk.cart import inverse_pose
 from robots.dvrk.setup_joints import CartArm
 from schemas.errors import MotionError
 from schemas.vectors import Vector
@@ -70,7 +69,8 @@ class BaseFrame:
         Args:
             arm: its name.
             params: parameters of the controller.
-            camera: returns the pose of the ECM's tip in the world, shape (4, 4), if there is an ECM.
+            camera: returns the pose of the world in the frame of the ECM's tip, shape (4, 4), if there is an
+            ECM; the same array until that moves.
         """
         self.reference, self.local = reference_frame(arm, params), crtk.base_frame(arm)
         """`frame_id` of ports that are not `local/`, and of those that are."""
@@ -88,7 +88,7 @@ class BaseFrame:
         if camera is None:
             return self._world
         if camera is not self._seen_by:  # beside a camera no client sets where an arm stands
-            self._seen_by, self._in_camera = camera, inverse_pose(camera) @ self._world
+            self._seen_by, self._in_camera = camera, camera @ self._world
         return self._in_camera
 
     def place(self, base: Vector) -> None:

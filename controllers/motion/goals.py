@@ -46,7 +46,7 @@ def joint_values(
     values: Vector = getattr(message, part)
     if values.shape != (len(names),):
         raise MotionError(f"{values.size} values of {part}, expected {len(names)}: {', '.join(names)}")
-    if message.name:
+    if message.name and message.name != names:
         if sorted(message.name) != sorted(names):
             raise MotionError(f"joints {', '.join(message.name)}, expected {', '.join(names)}")
         values = values[[message.name.index(name) for name in names]]
@@ -56,7 +56,9 @@ def joint_values(
 
 def stated_velocity(chain: SerialChain, message: JointState) -> Vector | None:
     """Return the velocities at a goal, shape (n,); None where none are stated, or zeros alone."""
-    return joint_values(chain, message, "velocity") if message.velocity.any() else None
+    if not any(message.velocity.tolist()):
+        return None
+    return joint_values(chain, message, "velocity")
 
 
 def efforts(chain: SerialChain, message: JointState) -> Vector:
@@ -121,7 +123,7 @@ def vector(message: Point | Vector3, part: str) -> Vector:
     """Return the vector, shape (3,); `part` names it in the error if it is not finite or too large."""
     values = np.array([message.x, message.y, message.z])
     _check_finite(values, part)
-    if (np.abs(values) > _MOST).any():
+    if max(abs(message.x), abs(message.y), abs(message.z)) > _MOST:
         raise MotionError(f"{part} {values.tolist()}: allowed are numbers up to {_MOST:g}")
     return values
 

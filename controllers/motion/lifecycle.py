@@ -96,18 +96,11 @@ class Lifecycle:
         return self._now.state
 
     @property
-    def is_homed(self) -> bool:
-        """Whether the arm knows where it is and may move."""
-        return self._now.homed
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether the arm powers, homes or moves."""
-        return (
-            self._now.powering > 0.0
-            or (self._now.homing and self.state is not State.PAUSED)
-            or self._drives.is_moving
-        )
+    def condition(self) -> tuple[State, bool, bool]:
+        """The operating state, whether the arm is homed, and whether it is busy: powers, homes or moves."""
+        now, state = self._now, self._now.state
+        busy = now.powering > 0.0 or (now.homing and state is not State.PAUSED) or self._drives.is_moving
+        return state, now.homed, busy
 
     @property
     def desired_state(self) -> str:
@@ -118,12 +111,13 @@ class Lifecycle:
     def is_lost(self) -> bool:
         """Whether the drives hold a position and a joint is too far from its own."""
         joints = self._drives.joints
-        return joints.mode is Mode.POSITION and any(
-            abs(goal - position) > most
-            for goal, position, most in zip(
-                joints.setpoint.position.tolist(), joints.position.tolist(), self._tolerance, strict=True
-            )
-        )
+        if joints.mode is not Mode.POSITION:
+            return False
+        goals, positions = joints.setpoint.position.tolist(), joints.position.tolist()
+        for goal, position, most in zip(goals, positions, self._tolerance, strict=True):
+            if abs(goal - position) > most:
+                return True
+        return False
 
     def not_ready(self) -> str:
         """Return why the arm refuses motion commands; empty if it does not."""

@@ -16,11 +16,20 @@ from schemas.ros import BoolMessage, Header, StringMessage, Time
 
 __all__ = ["Messages"]
 
-_STREAMS = tuple(filter(crtk.is_stream, crtk.COMMANDS)) + tuple(
-    f"{gripper}/{command}"
-    for gripper in ("jaw", "hand")
-    for command in filter(crtk.is_stream, crtk.GRIPPER_COMMANDS)
-)
+_STREAMS = {
+    command: row
+    for row, command in enumerate(
+        (
+            *filter(crtk.is_stream, crtk.COMMANDS),
+            *(
+                f"{gripper}/{command}"
+                for gripper in ("jaw", "hand")
+                for command in filter(crtk.is_stream, crtk.GRIPPER_COMMANDS)
+            ),
+        )
+    )
+}
+"""Commands that come as a stream, and the row of each in `Messages.state`."""
 
 
 class Messages:
@@ -83,16 +92,16 @@ class Messages:
         For a stream the same refusal is reported once in two seconds, with the number of commands.
         """
         count = 1
-        if command in _STREAMS:
-            count = refusals_to_report(self.state[_STREAMS.index(command)], reason, self._now_ns)
+        if (stream := _STREAMS.get(command)) is not None:
+            count = refusals_to_report(self.state[stream], reason, self._now_ns)
         if count:
             text = f"{command} refused: {reason}" + (f" ({count} times)" if count > 1 else "")
             (self.error if ready else self.warning)(text)
 
     def executed(self, command: str) -> None:
         """Note that a command was executed, so that its next refusal is reported at once."""
-        if command in _STREAMS:
-            self.state[_STREAMS.index(command)] = 0.0
+        if (stream := _STREAMS.get(command)) is not None:
+            self.state[stream] = 0.0
 
     def _put(self, name: str, message: Message) -> None:
         self._outputs[self._ports[name]] += (message,)

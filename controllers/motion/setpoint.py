@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from controllers.motion.following import clip, fastest, follow, steer
+from controllers.motion.following import Followers, clip, fastest, steer
 from hub.participant import Record, array, choice, flag, number
 from robots.serial_chain import Joint
 from schemas.vectors import Vector
@@ -92,7 +92,7 @@ class Setpoint:
         self._lower, self._upper, self._velocity, self._acceleration, self._jerk = np.array(
             [(joint.lower, joint.upper, joint.velocity, joint.acceleration, joint.jerk) for joint in joints]
         ).T.copy()
-        self._most = FOLLOWING_ACCELERATION * self._acceleration
+        self._most, self._backwards = FOLLOWING_ACCELERATION * self._acceleration, -self._velocity
         self.limits = np.array([self._lower, self._upper, self._velocity, self._most])
         """Of position to either side, velocity, and acceleration while following, shape (4, n)."""
         self.state = SetpointState(n=n)
@@ -114,7 +114,7 @@ class Setpoint:
 
     def reset(self, position: Vector) -> None:
         """Stand at `position`, shape (n,), or as near to it as the ranges allow."""
-        self.position[:] = clip(position, self._lower, self._upper)
+        np.minimum(np.maximum(position, self._lower), self._upper, out=self.position)
         self.goal[:] = self.position
         self._rest()
 
@@ -131,18 +131,23 @@ class Setpoint:
             h: the step, s.
             velocity: at the goal, shape (n,), if the sender states it.
         """
-        state = self.state
-        streaming = state.activity is Activity.FOLLOW and state.since <= STREAM_GAP
-        early = streaming and (state.waiting > _EARLY * h or state.since < 0.5 * h)
-        interval = state.waiting if early else max(state.since, h) if streaming else h
+        state, since = self.state, self.state.since
+        streaming = state.activity is Activity.FOLLOW and since <= STREAM_GAP
+        early = streaming and (state.waiting > _EARLY * h or since < 0.5 * h)
         state.stated = velocity is not None
         if velocity is None and streaming:
-            velocity = (goal - self.goal) / max(state.since, h)
+            velocity = (goal - self.goal) / max(since, h)
             if early:
-                velocity = clip(velocity, -np.abs(self._arrival), np.abs(self._arrival))
-        self._arrival[:] = 0.0 if velocity is None else clip(velocity, -self._velocity, self._velocity)
+                fastest_before = np.abs(self._arrival)
+                velocity = clip(velocity, -fastest_before, fastest_before)
+        if velocity is None:
+            self._arrival[:] = 0.0
+        else:
+            np.minimum(np.maximum(velocity, self._backwards), self._velocity, out=self._arrival)
         self.goal[:] = goal
-        state.waiting, state.since, state.pending = interval, 0.0, False
+        if not early:
+            state.waiting = max(since, h) if streaming else h
+        state.since, state.pending = 0.0, False
         state.activity = Activity.FOLLOW
 
     def drift(self, velocity: Vector) -> None:
@@ -181,14 +186,21 @@ class Setpoint:
         if activity is Activity.MOVE:
             return self._go_on(h)
         if activity is Activity.FOLLOW:
-            follow((self,), h)
+            Followers((self,), h).step()
             return False
         if activity is Activity.DRIFT and self.state.since <= STREAM_GAP:
             most_down, most_up = fastest(
                 np.array([self.position - self._lower, self._upper - self.position]), self._most, h
             )
-            self.course[:3] = steer(
-                self.position, self.velocity, self._arrival, self.limits, most_down, most_up, h
+            steer(
+                self.position,
+                self.velocity,
+                self._arrival,
+                self.limits,
+                most_down,
+                most_up,
+                h,
+                out=self.course[:3],
             )
             self.state.since += h
             return False
@@ -200,7 +212,7 @@ class Setpoint:
             self._plan()
 
     def _rest(self) -> None:
-        self.velocity[:] = self.state.acceleration[:] = 0.0
+        self.course[1:3] = 0.0
         self.state.activity, self.state.pending = Activity.HOLD, False
 
     def _plan(self) -> bool:

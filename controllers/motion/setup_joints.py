@@ -43,6 +43,7 @@ class SetupJoints:
         arms = tuple(params.arms.driven) if params.mounting == "cart" else ()
         self._power_time = params.power_time * 1e-9
         self._messages = {arm: Messages(f"SUJ/{arm}", setup_joint_event_names(), outputs) for arm in arms}
+        self._commands = {f"SUJ/{arm}/{name}" for arm in arms for name in crtk.SETUP_JOINT_COMMANDS}
         self._now = SetupJointState()
         if params.initial_state == "homed":
             self._now.state = State.ENABLED
@@ -65,7 +66,7 @@ class SetupJoints:
 
     def step(self, t: int, h: int, inputs: Inputs) -> None:
         """Execute the commands that have arrived, from `t` to `t + h` (ns)."""
-        if self._rests and inputs.quiet:
+        if self._rests and inputs.event_ports.isdisjoint(self._commands):
             return
         news = not self._now.published
         for arm, messages in self._messages.items():

@@ -28,6 +28,8 @@ __all__ = ["STANDARD_GRAVITY", "Dynamics", "of_ecm", "of_psm"]
 STANDARD_GRAVITY = 9.81
 """m/s^2, as in the identified model and the real controller's gravity compensation."""
 
+_UNMOVED = np.eye(4)
+
 
 class _Motion(NamedTuple):
     """How a body moves against its parent.
@@ -63,6 +65,10 @@ class Dynamics:
             twist = _twist(np.array(axis), np.array(passive.pivot), is_revolute)
             index[passive.name] = len(self._motions)
             self._motions.append(_Motion(parent, leader, passive.ratio, twist, is_revolute))
+        self._ratios = np.array([motion.ratio for motion in self._motions])
+        self._leaders = np.array([motion.joint for motion in self._motions])
+        self._turning = np.array([motion.is_revolute for motion in self._motions])
+        self._twists = np.array([motion.twist for motion in self._motions])  # (motions, 4, 4)
         self._moved_by = [index.get(name, self._joints - 1) for name in bodies]
         self._pseudo = np.array([body.pseudo_inertia for body in bodies.values()])  # (bodies, 4, 4)
 
@@ -75,15 +81,27 @@ class Dynamics:
         """
         self._chain.check_form(q)
         n = self._joints
-        poses, slopes = np.empty((len(self._motions), 4, 4)), np.zeros((len(self._motions), n, 4, 4))
-        for i, motion in enumerate(self._motions):
-            step = _exponential(motion.twist, motion.ratio * float(q[motion.joint]), motion.is_revolute)
-            above = poses[motion.parent] if motion.parent >= 0 else np.eye(4)
-            poses[i] = above @ step
-            if motion.parent >= 0:
-                slopes[i] = slopes[motion.parent] @ step
-            slopes[i, motion.joint] += motion.ratio * above @ motion.twist @ step
+        steps = self._exponentials(self._ratios * q.take(self._leaders))
+        above, poses = np.empty_like(steps), np.empty_like(steps)
+        for i, (parent, *_) in enumerate(self._motions):
+            above[i] = poses[parent] if parent >= 0 else _UNMOVED
+            np.matmul(above[i], steps[i], out=poses[i])
+        own = (self._ratios[:, None, None] * above) @ self._twists @ steps
+        slopes = np.zeros((len(steps), n, 4, 4))
+        for i, (parent, joint, *_) in enumerate(self._motions):
+            if parent >= 0:
+                np.matmul(slopes[parent], steps[i], out=slopes[i])
+            slopes[i, joint] += own[i]
         return slopes[self._moved_by]
+
+    def _exponentials(self, q: Vector) -> Vector:
+        """Return exp(q T), shape (motions, 4, 4), for the twist T and the way q of each motion.
+
+        For a rotation it is 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q T.
+        """
+        once = np.where(self._turning, np.sin(q), q)[:, None, None]
+        twice = np.where(self._turning, 1.0 - np.cos(q), 0.0)[:, None, None]
+        return _UNMOVED + once * self._twists + twice * self._twists @ self._twists
 
     def inertia_matrix(self, q: Vector) -> Vector:
         """Return the joint-space inertia matrix at `q`, shape (n, n): kg m^2, kg m, kg."""
@@ -132,13 +150,3 @@ def _twist(axis: Vector, point: Vector, is_revolute: bool) -> Vector:
     else:
         result[:3, 3] = axis
     return result
-
-
-def _exponential(twist: Vector, q: float, is_revolute: bool) -> Vector:
-    """Return exp(q twist).
-
-    For a rotation it is 1 + sin q T + (1 - cos q) T^2 (Rodrigues), for a translation 1 + q T.
-    """
-    if not is_revolute:
-        return np.eye(4) + q * twist
-    return np.eye(4) + np.sin(q) * twist + (1.0 - np.cos(q)) * twist @ twist

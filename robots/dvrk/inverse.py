@@ -21,6 +21,8 @@ need at its velocity limit.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
 from math import degrees, pi, radians
 
 import numpy as np
@@ -51,7 +53,9 @@ _FAR = 1e3
 _POINT = 1e-9
 """m: two axes that pass each other so closely meet."""
 _RCM_ROWS = tuple((joint.kind, joint.alpha, joint.a, joint.theta) for joint in psm.ARM_JOINTS)
-_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+_BOTTOM, _ONE = np.array([0.0, 0.0, 0.0, 1.0]), np.eye(3)
+_YZX_ZXY, _ZXY_YZX = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
+"""Whose products are those of a cross product: the first three less the last three."""
 _TURN = 2.0 * pi
 _BRANCH_SIGNS = (
     np.array([1.0, -1.0, 1.0, -1.0])[:, None, None],
@@ -59,6 +63,35 @@ _BRANCH_SIGNS = (
 )
 """Of x5 and of the shaft's direction, in the four branches of a PSM."""
 _WRIST_ALPHAS = (0.0, -pi / 2, -pi / 2)
+_CHAINS = 64
+"""Whose constants are kept: some times the arms of a session."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """What the closed form takes from a chain of n joints."""
+
+    from_tip: Vector
+    """Pose of the last link in the tip's frame, shape (4, 4)."""
+    theta: Vector
+    """Of the joints after the insertion."""
+    lowest: Vector
+    highest: Vector
+    """Ends of the joint ranges, widened by `ANGLE_TOLERANCE`, shape (n,)."""
+    middle: Vector
+    """Of the joint ranges, shape (n,)."""
+
+
+@lru_cache(maxsize=_CHAINS)
+def _form(chain: SerialChain) -> _Form:
+    _require(chain, ecm.JOINTS[3:] if len(chain.joints) == len(ecm.JOINTS) else chain.joints[3:])
+    return _Form(
+        inverse_pose(chain.tip),
+        np.array([joint.theta for joint in chain.joints[3:]]),
+        chain.lower - ANGLE_TOLERANCE,
+        chain.upper + ANGLE_TOLERANCE,
+        (chain.lower + chain.upper) / 2,
+    )
 
 
 def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
@@ -77,32 +110,30 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
     """
     n = len(chain.joints)
     poses, start = _goals(chain, pose, near)
-    ends = poses @ inverse_pose(chain.tip)
+    ends = poses @ _form(chain).from_tip
     if n == len(ecm.JOINTS):
-        _require(chain, ecm.JOINTS[3:])
         branches = _branches_without_wrist(chain, poses[:, :3, 3], ends[:, :3, :3])
     else:
-        _require(chain, chain.joints[3:])
         branches = _psm_branches(chain, ends, start)
     branches = _unwind(chain, branches, start)
     excess = np.maximum(chain.lower - branches, branches - chain.upper)  # (branches, N, n)
     cost = np.where(
-        (excess <= chain.tolerance).all(axis=-1),
-        (((branches - start) / chain.velocity) ** 2).sum(axis=-1),
+        np.logical_and.reduce(excess <= chain.tolerance, axis=-1),
+        np.add.reduce(((branches - start) / chain.velocity) ** 2, axis=-1),
         np.inf,
     )
     best, each = cost.argmin(axis=0), np.arange(len(poses))
     reached = np.isfinite(cost[best, each])
-    if not reached.all():
+    if _any(~reached):
         raise _unreachable(chain, branches[:, reached.argmin()], reached.argmin(), len(poses))
-    q = np.clip(branches[best, each], chain.lower, chain.upper)
+    q = np.minimum(np.maximum(branches[best, each], chain.lower), chain.upper)
     if n == len(ecm.JOINTS):
-        _check_orientation(chain.forward(q), poses)
+        _check_orientation(chain.frames(q)[:, -1], poses)
     return q.reshape(*np.shape(pose)[:-2], n)
 
 
 def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vector]:
-    """Return poses, shape (N, 4, 4), and where they are looked for, shape (N, n), once they make sense."""
+    """Return poses, (N, 4, 4), and where they are looked for, (N, n) or (1, n), once they make sense."""
     n, many = len(chain.joints), np.shape(pose)[:-2]
     if np.shape(pose)[-2:] != (4, 4):
         raise MotionError(f"pose of shape {np.shape(pose)}, expected (..., 4, 4), a homogeneous transform")
@@ -111,23 +142,33 @@ def _goals(chain: SerialChain, pose: Vector, near: Vector) -> tuple[Vector, Vect
         allowed = " or ".join(dict.fromkeys([f"({n},)", str((*many, n))]))
         raise MotionError(f"positions `near` of shape {np.shape(near)}, expected {allowed}: {names}")
     poses = np.asarray(pose, np.float64).reshape(-1, 4, 4)
-    start = np.broadcast_to(np.asarray(near, np.float64), (*many, n)).reshape(-1, n)
-    if not (np.isfinite(poses).all() and np.isfinite(start).all()):
+    start = np.asarray(near, np.float64).reshape(-1, n)  # (N, n), or (1, n) for all
+    if _any(~np.isfinite(poses)) or _any(~np.isfinite(start)):
         raise MotionError("a pose or a joint position that is not finite cannot be reached")
-    if (np.abs(poses[:, :3, 3]) > _FAR).any():
+    if _any(np.abs(poses[:, :3, 3]) > _FAR):
         raise MotionError(f"a position more than {_FAR:g} m away from the base cannot be reached")
-    rotation = poses[:, :3, :3]
-    unrigid = np.abs(rotation.swapaxes(-1, -2) @ rotation - np.eye(3)).max(axis=(-2, -1))
-    unrigid = np.maximum(unrigid, np.abs(poses[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=-1))
-    wrong = (unrigid > _RIGID) | (np.linalg.det(rotation) < 0.0)
-    if wrong.any():
-        i = int(wrong.argmax())
+    if (i := _first_unrigid(poses)) is not None:
         where = f" {i}" if len(poses) > 1 else ""
         raise MotionError(
             f"pose{where} is no rigid transform: {poses[i].tolist()}; allowed are a rotation matrix, a"
             " position and (0, 0, 0, 1) below"
         )
     return poses, start
+
+
+def _any(flags: NDArray[np.bool_]) -> bool:
+    return 1 in flags.tobytes()  # a quarter of the cost of flags.any()
+
+
+def _first_unrigid(poses: Vector) -> int | None:
+    """Return the index of the first of `poses`, shape (N, 4, 4), that is no rigid transform."""
+    rotation = poses[:, :3, :3]
+    away = np.abs(rotation.swapaxes(-1, -2) @ rotation - _ONE) > _RIGID
+    below = np.abs(poses[:, 3] - _BOTTOM) > _RIGID
+    mirrored = _dot(_cross(rotation[:, :, 0], rotation[:, :, 1]), rotation[:, :, 2]) < 0.0
+    if not (_any(away) or _any(below) or _any(mirrored)):
+        return None
+    return int((away.any(axis=(-2, -1)) | below.any(axis=-1) | mirrored).argmax())
 
 
 def branches(chain: SerialChain, pose: Vector) -> Vector:
@@ -142,7 +183,7 @@ def branches(chain: SerialChain, pose: Vector) -> Vector:
         pose: of the tip in the chain's base frame, shape (..., 4, 4), finite.
     """
     _require(chain, chain.joints[3:])
-    ends = (pose @ inverse_pose(chain.tip)).reshape(-1, 4, 4)
+    ends = (pose @ _form(chain).from_tip).reshape(-1, 4, 4)
     near = np.zeros((1, len(chain.joints)))
     return _unwind(chain, _psm_branches(chain, ends, near), near).reshape(
         4, *pose.shape[:-2], len(chain.joints)
@@ -173,7 +214,7 @@ def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vect
 
     `rotation`, shape (N, 3, 3), is the one asked for of the last link.
     """
-    distance = np.linalg.norm(position, axis=-1, keepdims=True)
+    distance = _length(position)
     outwards = np.where(distance > _POINT, position / np.maximum(distance, _POINT), rotation[:, :, 2])
     shaft = outwards * _BRANCH_SIGNS[0][:2]  # (2, N, 3)
     q = np.empty((2, len(position), 4))
@@ -187,22 +228,26 @@ def _branches_without_wrist(chain: SerialChain, position: Vector, rotation: Vect
 
 def _psm_branches(chain: SerialChain, ends: Vector, near: Vector) -> Vector:
     """Return the joint positions, shape (4, N, 6), of poses of the wrist yaw link, shape (N, 4, 4)."""
-    roll, pitch, yaw = chain.joints[3:]
+    yaw = chain.joints[5]
     x6, y6, yaw_axis, centre = ends[:, :3, 0], ends[:, :3, 1], ends[:, :3, 2], ends[:, :3, 3]
     across = centre - _dot(centre, yaw_axis)[:, None] * yaw_axis
-    distance = np.linalg.norm(across, axis=-1, keepdims=True)
-    angle = near[:, 5:] + yaw.theta
-    kept = np.cos(angle) * x6 - np.sin(angle) * y6  # x5 at the wrist yaw of `near`
-    x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept)
+    distance = _length(across)
+    if _any(distance <= _POINT):
+        angle = near[:, 5:] + yaw.theta
+        kept = np.cos(angle) * x6 - np.sin(angle) * y6  # x5 at the wrist yaw of `near`
+        x5 = np.where(distance > _POINT, across / np.maximum(distance, _POINT), kept)
+    else:
+        x5 = across / distance
     x5 = x5 * _BRANCH_SIGNS[0]  # (4, N, 3)
     z5 = _cross(x5, yaw_axis)
     wrist = centre - yaw.a * x5
     shaft = _shaft(chain, wrist, x5, z5, near) * _BRANCH_SIGNS[1]
     q = np.empty((4, len(ends), 6))
     x3, y3 = _shaft_joints(chain, shaft, _dot(shaft, wrist), q)
-    q[..., 3] = np.arctan2(-_dot(z5, x3), _dot(z5, y3)) - roll.theta
-    q[..., 4] = np.arctan2(-_dot(x5, shaft), _dot(x5, _cross(z5, shaft))) - pitch.theta
-    q[..., 5] = np.arctan2(-_dot(y6, x5), _dot(x6, x5)) - yaw.theta
+    np.arctan2(-_dot(z5, x3), _dot(z5, y3), out=q[..., 3])
+    np.arctan2(-_dot(x5, shaft), _dot(x5, _cross(z5, shaft)), out=q[..., 4])
+    np.arctan2(-_dot(y6, x5), _dot(x6, x5), out=q[..., 5])
+    q[..., 3:] -= _form(chain).theta
     return q
 
 
@@ -211,15 +256,16 @@ def _shaft(chain: SerialChain, wrist: Vector, x5: Vector, z5: Vector, near: Vect
 
     It is perpendicular to the wrist pitch axis z5.
     """
-    distance = np.linalg.norm(wrist, axis=-1, keepdims=True)
-    yaw, pitch = near[:, 0], near[:, 1]
-    old = np.stack([np.cos(pitch) * np.sin(yaw), -np.sin(pitch), -np.cos(pitch) * np.cos(yaw)], axis=-1)
-    y5 = _cross(z5, x5)
-    joint = chain.joints[4]
-    bend = np.clip(np.arctan2(-_dot(old, y5), _dot(old, x5)), joint.lower, joint.upper)[..., None]
-    free = np.cos(bend) * x5 - np.sin(bend) * y5
-    shaft = np.where(distance > _POINT, wrist - _dot(wrist, z5)[..., None] * z5, free)
-    return shaft / np.linalg.norm(shaft, axis=-1, keepdims=True)
+    distance = _length(wrist)
+    shaft = wrist - _dot(wrist, z5)[..., None] * z5
+    if _any(distance <= _POINT):
+        yaw, pitch = near[:, 0], near[:, 1]
+        old = np.stack([np.cos(pitch) * np.sin(yaw), -np.sin(pitch), -np.cos(pitch) * np.cos(yaw)], axis=-1)
+        y5 = _cross(z5, x5)
+        joint = chain.joints[4]
+        bend = np.clip(np.arctan2(-_dot(old, y5), _dot(old, x5)), joint.lower, joint.upper)[..., None]
+        shaft = np.where(distance > _POINT, shaft, np.cos(bend) * x5 - np.sin(bend) * y5)
+    return shaft / _length(shaft)
 
 
 def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -> tuple[Vector, Vector]:
@@ -229,13 +275,20 @@ def _shaft_joints(chain: SerialChain, shaft: Vector, depth: Vector, q: Vector) -
 
     The shaft's direction is (cos q2 sin q1, -sin q2, -cos q2 cos q1).
     """
-    across = np.hypot(shaft[..., 0], shaft[..., 2])
-    q[..., 0] = np.arctan2(shaft[..., 0], -shaft[..., 2])
-    q[..., 1] = np.arctan2(-shaft[..., 1], across)
+    x, y, z = shaft[..., 0], shaft[..., 1], shaft[..., 2]
+    np.arctan2(x, -z, out=q[..., 0])
+    np.arctan2(-y, np.hypot(x, z), out=q[..., 1])
     q[..., 2] = depth - chain.joints[3].d - chain.joints[2].d
-    s1, c1, s2, c2 = np.sin(q[..., 0]), np.cos(q[..., 0]), np.sin(q[..., 1]), np.cos(q[..., 1])
-    x3 = np.stack([-s1 * s2, -c2, c1 * s2], axis=-1)
+    sines, cosines = np.sin(q[..., :2]), np.cos(q[..., :2])
+    s1, c1, s2, c2 = sines[..., 0], cosines[..., 0], sines[..., 1], cosines[..., 1]
+    x3 = np.empty_like(shaft)
+    x3[..., 0], x3[..., 1], x3[..., 2] = -s1 * s2, -c2, c1 * s2
     return x3, _cross(shaft, x3)
+
+
+def _length(a: Vector) -> Vector:
+    """Return the length of vectors, shape (..., 1)."""
+    return np.sqrt(np.add.reduce(a * a, axis=-1, keepdims=True))
 
 
 def _dot(a: Vector, b: Vector) -> Vector:
@@ -244,8 +297,8 @@ def _dot(a: Vector, b: Vector) -> Vector:
 
 
 def _cross(a: Vector, b: Vector) -> Vector:
-    # a quarter of the cost of np.cross
-    return a.take(_YZX, -1) * b.take(_ZXY, -1) - a.take(_ZXY, -1) * b.take(_YZX, -1)
+    products = a.take(_YZX_ZXY, -1) * b.take(_ZXY_YZX, -1)  # a fifth of the cost of np.cross
+    return products[..., :3] - products[..., 3:]
 
 
 def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
@@ -253,14 +306,12 @@ def _unwind(chain: SerialChain, branches: Vector, near: Vector) -> Vector:
 
     If that is out of range, nearest to the middle of the range.
     """
-    revolute = [i for i, joint in enumerate(chain.joints) if joint.kind == "revolute"]
-    q, lower, upper = branches[..., revolute], chain.lower[revolute], chain.upper[revolute]
-    nearest = q + _TURN * np.round((near[:, revolute] - q) / _TURN)
-    central = q + _TURN * np.round(((lower + upper) / 2 - q) / _TURN)
-    unwound = branches.copy()
-    unwound[..., revolute] = np.where(
-        (nearest >= lower - ANGLE_TOLERANCE) & (nearest <= upper + ANGLE_TOLERANCE), nearest, central
-    )
+    form = _form(chain)
+    nearest = branches + _TURN * np.rint((near - branches) / _TURN)
+    central = branches + _TURN * np.rint((form.middle - branches) / _TURN)
+    unwound = np.where((nearest >= form.lowest) & (nearest <= form.highest), nearest, central)
+    for joint in chain.prismatic:
+        unwound[..., joint] = branches[..., joint]
     return unwound
 
 
@@ -276,7 +327,8 @@ def _unreachable(chain: SerialChain, branches: Vector, index: np.intp, count: in
 
 def _check_orientation(reached: Vector, asked: Vector) -> None:
     """Refuse goals whose orientation four joints miss by more than `ORIENTATION_TOLERANCE`."""
-    difference = np.linalg.norm(reached[:, :3, :3] - asked[:, :3, :3], axis=(-2, -1))
+    away = reached[:, :3, :3] - asked[:, :3, :3]
+    difference = np.sqrt(np.add.reduce(away * away, axis=(-2, -1)))
     angles: NDArray[np.float64] = 2.0 * np.arcsin(np.minimum(difference / np.sqrt(8.0), 1.0))
     worst = int(angles.argmax())
     if angles[worst] > ORIENTATION_TOLERANCE + ANGLE_TOLERANCE:

@@ -85,6 +85,16 @@ def test_many_poses_give_what_each_gives_alone():
     )
 
 
+def test_singular_poses_change_no_bit_of_those_beside_them():
+    pitch_axis, yaw_axis = 0.4318 - 0.4162, 0.4318 - 0.4162 - 0.0091  # insertions at which they pass the RCM
+    q = random_configurations(PSM, 12)
+    singular = np.array([[0.3, -0.2, pitch_axis, 0.5, -0.4, 0.25], [0.3, -0.2, yaw_axis, 0.5, 0.0, 0.25]])
+    both = np.concatenate([singular, q])
+    together = inverse(PSM, PSM.forward(both), both)
+    assert together[2:].tobytes() == inverse(PSM, PSM.forward(q), q).tobytes()
+    assert np.allclose(together, both, atol=1e-9)
+
+
 def test_roll_goes_the_short_way_inside_its_range():
     roll = 2.5  # also at 2.5 - 2 pi
     pose = PSM.forward(np.add(HOME, [0, 0, 0, roll, 0, 0]))

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from controllers.motion.following import Followers
 from controllers.motion.setpoint import FOLLOWING_ACCELERATION, Activity, Setpoint
 from robots.dvrk import arms
 
@@ -211,3 +212,25 @@ def test_a_goal_where_the_joints_are_moves_nothing(activity):
     q, v = run(made, 5)
     assert np.allclose(q, START, atol=1e-15)
     assert not v.any()
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 2), st.floats(-0.4, 0.4), st.none() | st.floats(-2.0, 2.0)), max_size=12
+    )
+)
+@settings(max_examples=40, deadline=None)
+def test_setpoints_that_follow_together_go_where_each_goes_alone(orders):
+    jaw = CHAIN.joints[-1:]
+    alone, together = [[setpoint(), setpoint(-START), Setpoint(jaw)] for _ in range(2)]
+    for made in (*alone, *together):
+        made.follow(made.position.copy(), H)
+    followers = Followers(together, H)
+    for i, goal, velocity in orders:
+        for made in (alone[i], together[i]):
+            made.follow(made.position + goal, H, None if velocity is None else velocity + 0.0 * made.position)
+        for _ in range(3):
+            for made in alone:
+                made.step(H)
+            followers.step()
+    assert [one.state.values.tobytes() for one in alone] == [two.state.values.tobytes() for two in together]
