@@ -1,8 +1,6 @@
 """Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside them.
 
-The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three
-times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so
-the many message headers and index entries of a chunk are written here by numpy. Format:
+The records are those of the `mcap` package; the many index entries of a chunk are made by numpy. Format:
 https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 """
 
@@ -11,8 +9,7 @@ from __future__ import annotations
 import errno
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, BinaryIO
@@ -36,61 +33,16 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
+from hub.recording.chunk import ChunkData
 from schemas.errors import RecordingError
 
-__all__ = ["ChunkData", "McapFile", "chunk_data", "create_bag", "write_rosbag2_metadata"]
+__all__ = ["McapFile", "create_bag", "write_rosbag2_metadata"]
 
-_MESSAGE = np.dtype(
-    [
-        ("opcode", "<u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-    ]
-)
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
-_RECORD_HEADER_BYTES = 9
 _COPIED_BYTES = 2**20
 """Of the chunks' indexes at once, when a file is finished."""
-
-
-@dataclass(frozen=True)
-class ChunkData:
-    """The records of one chunk, uncompressed, and the channel, time and offset of each message.
-
-    The arrays have the shape (messages,).
-    """
-
-    records: bytes
-    channels: NDArray[np.int64]
-    times_ns: NDArray[np.int64]
-    offsets: NDArray[np.int64]
-
-
-def chunk_data(messages: Sequence[tuple[int, int, bytes]]) -> ChunkData:
-    """Return `messages`, each (channel, time in ns, payload), as the records of one chunk."""
-    channels, times, payloads = zip(*messages, strict=True)
-    sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
-    headers = np.zeros(len(payloads), _MESSAGE)
-    headers["opcode"] = Opcode.MESSAGE
-    headers["length"] = sizes + (_MESSAGE.itemsize - _RECORD_HEADER_BYTES)
-    headers["channel"] = channels
-    headers["log_time"] = headers["publish_time"] = times
-    parts: list[bytes] = [b""] * (2 * len(payloads))
-    parts[0::2] = headers.view(f"V{_MESSAGE.itemsize}").tolist()
-    parts[1::2] = payloads
-    ends = np.cumsum(sizes + _MESSAGE.itemsize)
-    return ChunkData(
-        b"".join(parts),
-        np.asarray(channels, np.int64),
-        np.asarray(times, np.int64),
-        ends - sizes - _MESSAGE.itemsize,
-    )
 
 
 class McapFile:

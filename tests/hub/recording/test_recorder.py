@@ -21,7 +21,8 @@ from rosbags.highlevel import AnyReader
 
 from hub.recording import recorder as recorder_module
 from hub.recording.bag import Bag, located_messages
-from hub.recording.mcap_file import chunk_data, create_bag
+from hub.recording.chunk import chunk_data
+from hub.recording.mcap_file import create_bag
 from hub.recording.recorder import Recorder
 from hub.recording.recover import recover
 from schemas.codec import decode, encode
