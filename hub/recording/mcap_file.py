@@ -15,7 +15,6 @@ from tempfile import TemporaryFile
 from typing import Any, BinaryIO
 
 import lz4.frame
-import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -23,7 +22,6 @@ from mcap.records import (
     AttachmentIndex,
     Channel,
     Chunk,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -36,11 +34,11 @@ from mcap.writer import MCAP0_MAGIC
 from ruamel.yaml import YAML
 
 from hub.recording.chunk import ChunkData
+from hub.recording.message_index import chunk_index, message_index
 from schemas.errors import RecordingError
 
 __all__ = ["McapFile", "create_bag", "write_rosbag2_metadata"]
 
-_INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _COPIED_BYTES = 2**20
 """Of the chunks' indexes at once, when a file is finished."""
 
@@ -85,45 +83,17 @@ class McapFile:
         compressed = lz4.frame.compress(data.records)
         start, end = int(data.times_ns.min()), int(data.times_ns.max())
         chunk = _bytes_of(Chunk("lz4", compressed, end, start, zlib.crc32(data.records), len(data.records)))
-        index = bytearray()
-        offsets: dict[int, int] = {}
-        counts = np.bincount(data.channels)
-        by_channel = np.argsort(data.channels, kind="stable")
-        entries = np.empty(len(by_channel), _INDEX_ENTRY)
-        entries["time"], entries["offset"] = data.times_ns[by_channel], data.offsets[by_channel]
-        at = 0
-        for channel in np.flatnonzero(counts).tolist():
-            group = entries[at : at + int(counts[channel])].tobytes()
-            offsets[channel] = self.size + len(chunk) + len(index)
-            index += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(group), channel, len(group)) + group
-            at += int(counts[channel])
-        self._add_index(
-            ChunkIndex(
-                len(chunk),
-                self.size,
-                "lz4",
-                len(compressed),
-                end,
-                len(index),
-                offsets,
-                start,
-                len(data.records),
-            ),
-            chunk + bytes(index),
-        )
+        index = message_index(data)
+        record = chunk_index(data, index, self.size, len(chunk), len(compressed))
+        self._index.seek(self._index_size)
+        _write(self._index, record)
+        self._append(chunk + index.records)  # if this fails, the record is overwritten by the next one
+        self._index_size += len(record)
         self._start_ns = min(self._start_ns, start) if self._chunks else start
         self._end_ns = max(self._end_ns, end)
         self._chunks += 1
-        for channel in offsets:
-            self._counts[channel] = self._counts.get(channel, 0) + int(counts[channel])
-
-    def _add_index(self, index: ChunkIndex, chunk: bytes) -> None:
-        """Append a chunk, and keep its index; both or, with OSError, neither."""
-        record = _bytes_of(index)
-        self._index.seek(self._index_size)
-        _write(self._index, record)
-        self._append(chunk)
-        self._index_size += len(record)
+        for channel, count in zip(index.channels.tolist(), index.counts.tolist(), strict=True):
+            self._counts[channel] = self._counts.get(channel, 0) + count
 
     @property
     def statistics(self) -> Statistics:
