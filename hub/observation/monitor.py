@@ -262,22 +262,24 @@ class Monitor:
             channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
             self._acks.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
 
-    def books(self, time_ns: int) -> list[CouplingEnergy]:
-        """Record acks and values so far, and return (and record) the energy books when they are due."""
+    def flush(self) -> None:
+        """Give the recorder the acks and values so far."""
         if self._recorder is not None and (self._acks or self._values):
             self._recorder.write_all([*self._acks, *self._values])
             self._acks.clear()
             self._values.clear()
+
+    def books(self, time_ns: int) -> dict[str, bytes]:
+        """Return the energy book of each bond, in CDR, and record them; empty unless they are due."""
         if time_ns < self._next_energy_ns:
-            return []
+            return {}
         self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
-        messages = self.energy.messages(time_ns)
+        books = {message.bond: encode(message) for message in self.energy.messages(time_ns)}
         if self._recorder is not None:
-            for message in messages:
-                self._recorder.write(
-                    self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message)
-                )
-        return messages
+            for bond, payload in books.items():
+                channel = self._channel(self._keys.energy(bond), CouplingEnergy.ros_type)
+                self._recorder.write(channel, time_ns, payload)
+        return books
 
     def status(self, status: SessionStatus) -> None:
         """Record a status of the session."""

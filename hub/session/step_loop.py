@@ -14,7 +14,6 @@ from hub.planning.plan import PlannedParticipant
 from hub.session.run import Run
 from hub.session.run_profile import RunProfile
 from hub.transport.publisher import Publisher
-from schemas.codec import encode
 from schemas.lockstep import Ack, Grant, pack_grant
 from schemas.trocar_msgs import GrantMessage
 
@@ -52,8 +51,12 @@ class StepLoop:
             session, keys.grant, zenoh.CongestionControl.BLOCK, lambda: None, always=others
         )
         self._energy = {
-            bond.bond.name: session.declare_publisher(
-                keys.energy(bond.bond.name), encoding=zenoh.Encoding.APPLICATION_CDR
+            bond.bond.name: Publisher(
+                session,
+                keys.energy(bond.bond.name),
+                zenoh.CongestionControl.DROP,
+                lambda: None,
+                always=False,
             )
             for bond in plan.bonds
         }
@@ -186,12 +189,14 @@ class StepLoop:
         return self._schedules[key]
 
     def book_acks(self) -> None:
-        """Book the acks that have arrived, and publish the energy books when they are due."""
+        """Book the acks that have arrived, and publish the energy books when they are due and of use."""
         monitor, bookkeeping = self._run.monitor, self._run.bookkeeping
         for planned, ack, payload in self._unbooked:
             monitor.ack(planned, ack, bookkeeping.book(planned, ack), payload)
             if self._on_ack is not None:
                 self._on_ack(planned, ack)
         self._unbooked.clear()
-        for message in monitor.books(self._run.clock.time_ns):
-            self._energy[message.bond].put(encode(message))
+        monitor.flush()
+        if self._run.recorded or any(publisher.needed for publisher in self._energy.values()):
+            for bond, payload in monitor.books(self._run.clock.time_ns).items():
+                self._energy[bond].put(payload)
