@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -20,6 +19,17 @@ __all__ = ["FIRST_BLOCK", "ChunkData", "Queued", "chunk_data"]
 
 FIRST_BLOCK = 2**16
 """Blocks have numbers from here on; a channel's has 16 bits."""
+
+_ALONE = FIRST_BLOCK - 1
+"""Stands for all channels: their messages are laid out together."""
+_AT_START = np.zeros(1, np.int64)
+
+_Part = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+"""Entries of a queue with equally many messages each.
+
+Their places in the queue, shape (entries,); the channels of their messages, shape (messages,) or (entries,
+messages); where messages begin in an entry's records, shape (messages,).
+"""
 
 Queued = tuple[int, int, bytes]
 """Number, time (ns) and bytes: of a channel a message, of a block its vectors one after the other."""
@@ -40,48 +50,40 @@ class ChunkData:
 
 def chunk_data(queued: Sequence[Queued], blocks: Sequence[VectorBlock] = ()) -> ChunkData:
     """Return what was queued, in this order, as the records of one chunk."""
-    alone: list[int] = []
-    in_blocks: dict[int, list[int]] = {}
-    for place, (number, _, _) in enumerate(queued):
-        (alone if number < FIRST_BLOCK else in_blocks.setdefault(number, [])).append(place)
+    numbers, times, contents = zip(*queued, strict=True)
+    of_number: dict[int, list[int]] = {}
+    for place, number in enumerate(numbers):
+        of_number.setdefault(max(number, _ALONE), []).append(place)
+    times_ns = np.array(times, np.int64)
     records = [b""] * len(queued)
-    times_ns = np.empty(len(queued), np.int64)
     parts: list[_Part] = []
-    if alone:
-        part = [queued[place] for place in alone]
-        _fill(records, alone, _messages(part))
-        times_ns[alone] = [time_ns for _, time_ns, _ in part]
-        channels = np.array([channel for channel, _, _ in part])
-        parts.append(_Part(np.array(alone), channels[:, None], np.zeros(1, np.int64)))
-    for number, places in in_blocks.items():
-        block, part = blocks[number - FIRST_BLOCK], [queued[place] for place in places]
-        times_ns[places] = times = np.array([time_ns for _, time_ns, _ in part])
-        _fill(records, places, block.records(times, [vectors for _, _, vectors in part]))
-        channels = np.broadcast_to(block.channels, (len(places), len(block.channels)))
-        parts.append(_Part(np.array(places), channels, block.offsets))
+    for number, places in of_number.items():
+        if number == _ALONE:
+            made = _messages([queued[place] for place in places])
+            channels, offsets = np.array([numbers[place] for place in places])[:, None], _AT_START
+        else:
+            block = blocks[number - FIRST_BLOCK]
+            made = block.records(times_ns[places], [contents[place] for place in places])
+            channels, offsets = block.channels, block.offsets
+        for place, record in zip(places, made, strict=True):
+            records[place] = record
+        parts.append((np.array(places), channels, offsets))
+    return _located(records, times_ns, parts)
+
+
+def _located(records: Sequence[bytes], times_ns: NDArray[np.int64], parts: Sequence[_Part]) -> ChunkData:
+    """Return the chunk of `records`, each with one time and one or more messages."""
     sizes = np.fromiter(map(len, records), np.int64, len(records))
     starts = np.cumsum(sizes) - sizes
-    offsets = np.concatenate([(starts[part.places, None] + part.offsets).ravel() for part in parts])
-    order = np.argsort(offsets)
-    places = np.concatenate([np.repeat(part.places, len(part.offsets)) for part in parts])
-    channels = np.concatenate([part.channels.ravel() for part in parts])
-    return ChunkData(b"".join(records), channels[order], times_ns[places[order]], offsets[order])
-
-
-class _Part(NamedTuple):
-    """Entries of the queue with equally many messages each."""
-
-    places: NDArray[np.int64]
-    """Of the entries in the queue, shape (entries,)."""
-    channels: NDArray[np.int64]
-    """Of the messages, shape (entries, messages)."""
-    offsets: NDArray[np.int64]
-    """Of the messages in the records of an entry, shape (messages,)."""
-
-
-def _fill(records: list[bytes], places: Sequence[int], made: Sequence[bytes]) -> None:
-    for place, record in zip(places, made, strict=True):
-        records[place] = record
+    found = np.empty((3, sum(len(places) * len(offsets) for places, _, offsets in parts)), np.int64)
+    at = 0
+    for places, channels, offsets in parts:
+        end = at + len(places) * len(offsets)
+        part = found[:, at:end].reshape(3, len(places), len(offsets))
+        part[0], part[1], part[2] = channels, times_ns[places, None], starts[places, None] + offsets
+        at = end
+    channels, times, offsets = found[:, found[2].argsort()]
+    return ChunkData(b"".join(records), channels, times, offsets)
 
 
 def _messages(queued: Sequence[Queued]) -> list[bytes]:

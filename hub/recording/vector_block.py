@@ -51,15 +51,16 @@ class VectorBlock:
         """Of each message in the records of one step, shape (vectors,)."""
         self.size = int(ends[-1])
         """Bytes of the records of one step."""
-        records = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
-        self._template = np.frombuffer(records, np.uint8)
+        self._template = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
+        self._vectors = slice(self.size, self.size + sum(8 * codec.size for _, codec in vectors))
         self._sources = self._places(vectors)
         """For each byte of the records, its place in template, vectors and time, one after the other."""
+        self._rows = self._new_rows(0)
+        """Template, vectors and time of each step, shape (steps, bytes); the template stays."""
 
     def _places(self, vectors: Sequence[tuple[int, VectorCodec]]) -> NDArray[np.intp]:
         places = np.arange(self.size)
-        number = self.size
-        time = number + sum(8 * codec.size for _, codec in vectors)
+        number, time = self._vectors.start, self._vectors.stop
         stamp = time + 8
         for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
             payload = start + MESSAGE.itemsize
@@ -71,19 +72,23 @@ class VectorBlock:
             number += 8 * codec.size
         return places
 
+    def _new_rows(self, steps: int) -> NDArray[np.uint8]:
+        rows = np.empty((steps, self._vectors.stop + _TIME.itemsize), np.uint8)
+        rows[:, : self.size] = np.frombuffer(self._template, np.uint8)
+        return rows
+
     def records(self, times_ns: NDArray[np.int64], vectors: Sequence[bytes]) -> list[bytes]:
         """Return the records of each step: of its time, and the bytes of its vectors one after the other."""
-        times = np.empty(len(times_ns), _TIME)
+        steps = len(vectors)
+        if len(self._rows) < steps:
+            self._rows = self._new_rows(steps)
+        rows = self._rows[:steps]
+        times = np.empty(steps, _TIME)
         times["ns"] = times_ns
         times["sec"], times["nanosec"] = np.divmod(times_ns, 10**9)
-        rows = (len(times_ns), -1)
-        parts = (
-            np.broadcast_to(self._template, (len(times_ns), self.size)),
-            np.frombuffer(b"".join(vectors), np.uint8).reshape(rows),
-            times.view(np.uint8).reshape(rows),
-        )
-        made = np.concatenate(parts, axis=1).take(self._sources, axis=1)
-        return made.view(f"V{self.size}").ravel().tolist()
+        rows[:, self._vectors] = np.frombuffer(b"".join(vectors), np.uint8).reshape(steps, -1)
+        rows[:, self._vectors.stop :] = times.view(np.uint8).reshape(steps, -1)
+        return rows.take(self._sources, axis=1).view(f"V{self.size}").ravel().tolist()
 
 
 def _header(channel: int, codec: VectorCodec) -> bytes:
