@@ -55,25 +55,29 @@ def chunk_data(queued: Sequence[Queued], blocks: Sequence[VectorBlock] = ()) -> 
     for place, number in enumerate(numbers):
         of_number.setdefault(max(number, _ALONE), []).append(place)
     times_ns = np.array(times, np.int64)
-    records = [b""] * len(queued)
+    heads, records = [b""] * len(queued), list[bytes](contents)
     parts: list[_Part] = []
     for number, places in of_number.items():
         if number == _ALONE:
-            made = _messages([queued[place] for place in places])
+            filled, made = heads, _headers([queued[place] for place in places])
             channels, offsets = np.array([numbers[place] for place in places])[:, None], _AT_START
         else:
             block = blocks[number - FIRST_BLOCK]
-            made = block.records(times_ns[places], [contents[place] for place in places])
+            filled, made = records, block.records(times_ns[places], [contents[place] for place in places])
             channels, offsets = block.channels, block.offsets
-        for place, record in zip(places, made, strict=True):
-            records[place] = record
+        for place, one in zip(places, made, strict=True):
+            filled[place] = one
         parts.append((np.array(places), channels, offsets))
-    return _located(records, times_ns, parts)
+    pieces = [b""] * (2 * len(queued))  # not joined by twos: an image would be copied once more
+    pieces[0::2], pieces[1::2] = heads, records
+    sizes = np.fromiter(map(len, pieces), np.int64, len(pieces)).reshape(-1, 2).sum(axis=1)
+    return _located(b"".join(pieces), sizes, times_ns, parts)
 
 
-def _located(records: Sequence[bytes], times_ns: NDArray[np.int64], parts: Sequence[_Part]) -> ChunkData:
-    """Return the chunk of `records`, each with one time and one or more messages."""
-    sizes = np.fromiter(map(len, records), np.int64, len(records))
+def _located(
+    records: bytes, sizes: NDArray[np.int64], times_ns: NDArray[np.int64], parts: Sequence[_Part]
+) -> ChunkData:
+    """Return the chunk of `records`, of entries with their sizes, shape (entries,), and times, the same."""
     starts = np.cumsum(sizes) - sizes
     found = np.empty((3, sum(len(places) * len(offsets) for places, _, offsets in parts)), np.int64)
     at = 0
@@ -83,16 +87,15 @@ def _located(records: Sequence[bytes], times_ns: NDArray[np.int64], parts: Seque
         part[0], part[1], part[2] = channels, times_ns[places, None], starts[places, None] + offsets
         at = end
     channels, times, offsets = found[:, found[2].argsort()]
-    return ChunkData(b"".join(records), channels, times, offsets)
+    return ChunkData(records, channels, times, offsets)
 
 
-def _messages(queued: Sequence[Queued]) -> list[bytes]:
-    """Return the record of each message, which stands alone."""
+def _headers(queued: Sequence[Queued]) -> list[bytes]:
+    """Return what is in front of the payload of each message, which stands alone."""
     channels, times, payloads = zip(*queued, strict=True)
     headers = np.zeros(len(payloads), MESSAGE)
     headers["opcode"] = Opcode.MESSAGE
     headers["length"] = [len(payload) + (MESSAGE.itemsize - RECORD_HEADER_BYTES) for payload in payloads]
     headers["channel"] = channels
     headers["log_time"] = headers["publish_time"] = times
-    given = zip(headers.view(f"V{MESSAGE.itemsize}").tolist(), payloads, strict=True)
-    return [header + payload for header, payload in given]
+    return headers.view(f"V{MESSAGE.itemsize}").tolist()

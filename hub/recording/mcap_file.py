@@ -21,7 +21,6 @@ from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
-    Chunk,
     DataEnd,
     Footer,
     Header,
@@ -35,10 +34,13 @@ from ruamel.yaml import YAML
 
 from hub.recording.chunk import ChunkData
 from hub.recording.message_index import chunk_index, message_index
+from hub.recording.vector_block import RECORD_HEADER_BYTES
 from schemas.errors import RecordingError
 
 __all__ = ["McapFile", "create_bag", "write_rosbag2_metadata"]
 
+_CHUNK = struct.Struct("<BQQQQII3sQ")
+"""What is in front of a chunk's compressed records (https://mcap.dev/spec#chunk-op0x06)."""
 _COPIED_BYTES = 2**20
 """Of the chunks' indexes at once, when a file is finished."""
 
@@ -82,12 +84,15 @@ class McapFile:
         """Compress and append one chunk with its message indexes. Raises OSError with nothing appended."""
         compressed = lz4.frame.compress(data.records)
         start, end = int(data.times_ns.min()), int(data.times_ns.max())
-        chunk = _bytes_of(Chunk("lz4", compressed, end, start, zlib.crc32(data.records), len(data.records)))
+        size, checksum = len(data.records), zlib.crc32(data.records)
+        length = _CHUNK.size - RECORD_HEADER_BYTES + len(compressed)
+        head = _CHUNK.pack(Opcode.CHUNK, length, start, end, size, checksum, 3, b"lz4", len(compressed))
         index = message_index(data)
-        record = chunk_index(data, index, self.size, len(chunk), len(compressed))
+        record = chunk_index(data, index, self.size, len(head) + len(compressed), len(compressed))
         self._index.seek(self._index_size)
         _write(self._index, record)
-        self._append(chunk + index.records)  # if this fails, the record is overwritten by the next one
+        # if this fails, the record is overwritten by the next one
+        self._append(b"".join((head, compressed, index.records)))
         self._index_size += len(record)
         self._start_ns = min(self._start_ns, start) if self._chunks else start
         self._end_ns = max(self._end_ns, end)
