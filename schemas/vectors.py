@@ -117,13 +117,15 @@ class VectorCodec:
             (template.index(struct.pack("<d", marks[block.start])), 8 * block.start, 8 * block.stop)
             for _, _, block in self._blocks
         ]
-        # where each block begins and ends in the message, and which of the vector's bytes it is
-        self._spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
+        self.spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
+        """Where each block begins and ends in the message, and which of the vector's bytes it is."""
         self._has_stamp = "header" in self.model.model_fields
+        self.stamp = slice(4, 12) if self._has_stamp else None
+        """Where the stamp is in the message: seconds (int32) and nanoseconds (uint32)."""
         self._fixed: list[tuple[int, int, bytes]] = []
         at = 0
         for start, stop in [
-            *sorted((start, stop) for start, stop, _ in self._spans),
+            *sorted((start, stop) for start, stop, _ in self.spans),
             (len(template), len(template)),
         ]:
             if at == 0 and self._has_stamp:
@@ -131,16 +133,17 @@ class VectorCodec:
                 at = 12
             self._fixed.append((at, start, bytes(template[at:start])))
             at = stop
-        self._template = bytes(template)
+        self.template = bytes(template)
+        """A message in CDR, in which stamp and blocks are to be filled in."""
         self._length = len(template)
 
     def encode(self, value: Vector, time_ns: int) -> bytes:
         """Return `value`, shape (size,), as CDR with stamp `time_ns`."""
-        buffer = bytearray(self._template)
+        buffer = bytearray(self.template)
         if self._has_stamp:
             struct.pack_into("<iI", buffer, 4, *divmod(time_ns, 10**9))
         raw = value.tobytes()
-        for start, stop, block in self._spans:
+        for start, stop, block in self.spans:
             buffer[start:stop] = raw[block]
         return bytes(buffer)
 
@@ -158,7 +161,7 @@ class VectorCodec:
                 f"port '{self.port.name}': frame, names or layout differ from what the port declares"
             )
         # a third of the cost of np.concatenate
-        numbers = bytearray().join([payload[start:stop] for start, stop, _ in self._spans])
+        numbers = bytearray().join([payload[start:stop] for start, stop, _ in self.spans])
         return self.checked(np.frombuffer(numbers))
 
     def decode_all(self, payloads: Sequence[bytes]) -> NDArray[np.float64]:
@@ -177,7 +180,7 @@ class VectorCodec:
             )
         if self._has_stamp and (np.ascontiguousarray(table[:, 8:12]).view("<u4") >= 10**9).any():
             raise MessageError(f"port '{self.port.name}': a stamp of more than 999999999 ns")
-        numbers = np.concatenate([table[:, start:stop] for start, stop, _ in self._spans], axis=1)
+        numbers = np.concatenate([table[:, start:stop] for start, stop, _ in self.spans], axis=1)
         values = numbers.view(np.float64)  # (n, size)
         if not np.isfinite(values).all():
             raise MessageError(f"port '{self.port.name}': not all values are finite")

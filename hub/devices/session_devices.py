@@ -18,7 +18,7 @@ from hub.devices.network_link_control import NetworkLinkControl
 from hub.devices.run_info import RunInfo
 from hub.devices.simulated_devices import SimulatedDevices
 from hub.devices.uplink import DeviceUplink
-from hub.observation.observers import Observers
+from hub.observation.monitor import Monitor
 from hub.participant import Device, Sample
 from hub.participant.token_bucket import TokenBucket
 from hub.transport.envelope import Stamp
@@ -44,7 +44,7 @@ class SessionDevices:
         session: The hub's Zenoh session.
         devices: Those of this process, not yet open.
         inputs: What those among them that live in simulated time are written.
-        observers: What records and measures device samples.
+        monitor: What records and measures device samples.
         refusals: Counts the samples that are refused.
         failed: Is called with a device's name and the cause when it has failed.
     """
@@ -55,13 +55,13 @@ class SessionDevices:
         session: zenoh.Session,
         devices: Mapping[str, Device],
         inputs: Mapping[str, DeviceInputs],
-        observers: Observers,
+        monitor: Monitor,
         refusals: Refusals,
         failed: Callable[[str, str], None],
     ) -> None:
         plan, keys = run.plan, run.keys
         participants = plan.participants
-        self._plan, self._observers, self._refusals = plan, observers, refusals
+        self._plan, self._monitor, self._refusals = plan, monitor, refusals
         self._connected = {(inlet.source, inlet.source_port) for inlet in plan.from_devices}
         self._time_ns = 0
         self._switch_s = sys.getswitchinterval()
@@ -87,7 +87,7 @@ class SessionDevices:
         ]
 
     def _received(self) -> list[tuple[str, str]]:
-        """Return device and port of every output of a wall-time device that is connected or observed."""
+        """Return device and port of every output of a wall-time device that is connected or watched."""
         outputs = [
             (planned.name, port.name)
             for planned in self._plan.participants.values()
@@ -95,7 +95,7 @@ class SessionDevices:
             for port in planned.ports
             if port.causality == "output"
         ]
-        return [source for source in outputs if source in self._connected or self._observers.watches(*source)]
+        return [source for source in outputs if source in self._connected or self._monitor.watches(*source)]
 
     def open(self, directory: Path) -> None:
         """Open the devices of this process, and start to read those that live in wall time."""
@@ -137,8 +137,8 @@ class SessionDevices:
         enters = (device, port) in self._connected
         if enters:
             self.inlets.offer(device, port, payload, now_ns, stamp)
-        if self._observers.watches(device, port):
-            self._observers.device(device, port, self._time_ns, payload, enters=enters)
+        if self._monitor.watches(device, port):
+            self._monitor.device(device, port, self._time_ns, payload, enters=enters)
 
     def _listener(self, device: str, port: str) -> Callback[zenoh.Sample]:
         limit = TokenBucket(self._plan.participants[device].rate_limit)

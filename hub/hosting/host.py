@@ -43,7 +43,7 @@ class Host:
         plan: The plan of the session.
         participants: The host's participants by name, not yet configured.
         wire: Carries values to and from other processes; None if there are none.
-        listeners: Returns what is called with every value of an output.
+        listeners: Returns what is called with the values of outputs; None: nothing is.
         place: Of one element, where `run` notes the place of the participant that it steps; IDLE after it.
     """
 
@@ -54,7 +54,7 @@ class Host:
         participants: Mapping[str, Stepped],
         *,
         wire: Wire | None = None,
-        listeners: Listeners = lambda _participant, _port: None,
+        listeners: Listeners | None = None,
         place: memoryview[int] | None = None,
     ) -> None:
         self.name = name

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 from hub.hosting.hosted_participant import HostedParticipant, hosted
-from hub.hosting.outputs import DueOutputs, Listener, Output
+from hub.hosting.outputs import DueOutputs, Listener, Output, VectorsListener
 from hub.participant import Stepped
 from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
 from hub.transport.bundle import Bundle, bundled
 from hub.transport.cells import INITIAL, Cell, RemoteCell
+from hub.transport.lane import has_lane
 from hub.transport.port_codec import PortCodec
 from hub.transport.reader import DeviceInputs, Queue, Reader, as_messages
 from hub.transport.wire import Wire
@@ -18,8 +20,18 @@ from schemas.ports import Port
 
 __all__ = ["HostLayout", "Listeners"]
 
-Listeners = Callable[[PlannedParticipant, Port], Listener | None]
-"""Returns what is called with every value of an output; None if nothing is."""
+
+class Listeners(Protocol):
+    """Returns what is called with every value of some outputs; None if nothing is."""
+
+    def listener(self, planned: PlannedParticipant, port: Port) -> Listener | None:
+        """Return the listener of messages or events."""
+        ...
+
+    def vectors_listener(self, planned: PlannedParticipant, ports: Sequence[Port]) -> VectorsListener | None:
+        """Return the listener of vectors that are due together."""
+        ...
+
 
 _MANY = 32
 """Values of one port that may wait for their reader; the sender waits at some 160, a socket of Linux."""
@@ -29,7 +41,7 @@ class HostLayout:
     """The participants of host `name`, connected as `plan` says.
 
     The attributes are complete when it is made. `wire` carries values to and from other processes,
-    `listeners` returns who listens to an output.
+    `listeners` returns what listens to outputs.
     """
 
     def __init__(
@@ -38,7 +50,7 @@ class HostLayout:
         plan: Plan,
         participants: Mapping[str, Stepped],
         wire: Wire | None,
-        listeners: Listeners,
+        listeners: Listeners | None,
     ) -> None:
         self._name, self._plan, self._wire, self._listeners = name, plan, wire, listeners
         self.participants = [
@@ -55,7 +67,10 @@ class HostLayout:
         for one in self.participants:
             one.readers = self._readers(one)
         for one in self.participants:
-            one.outputs = [(stride, DueOutputs(its, wire)) for stride, its in by_stride[one.name].items()]
+            listener = partial(self._vectors_listener, one.planned)
+            one.outputs = [
+                (stride, DueOutputs(its, wire, listener)) for stride, its in by_stride[one.name].items()
+            ]
         readers = {
             planned.name: [self._reader(connection) for connection in self._feeding(planned.name)]
             for planned in plan.participants.values()
@@ -92,13 +107,14 @@ class HostLayout:
                     bundles=indices.get(port.name, ()),
                     stride_ns=stride * plan.step_ns,
                 )
+            codec, listeners = PortCodec(port).vector, self._listeners
             output = self._outputs[planned.name, port.name] = Output(
                 port,
-                PortCodec(port).vector,
+                codec,
                 stride > planned.period,
                 Cell(planned.period, stride, depth) if depth else None,
                 publisher,
-                self._listeners(planned, port),
+                listeners.listener(planned, port) if listeners is not None and codec is None else None,
             )
             # an observer misses steps: of each that it takes, all is published
             outputs = by_stride.setdefault(1 if planned.observer else stride, [])
@@ -209,17 +225,21 @@ class HostLayout:
                 declared,
                 self._plan.stride(source, port),
                 self._depth(source, port),
-                self._remote_listener(planned, declared),
+                self._lane_listener(planned, declared),
             )
         return self.remote_cells[source, port]
 
-    def _remote_listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, Any], None] | None:
-        """Return what calls the listener with the values of another host."""
-        listener, step_ns = self._listeners(planned, port), self._plan.step_ns
+    def _vectors_listener(self, planned: PlannedParticipant, ports: Sequence[Port]) -> VectorsListener | None:
+        return None if self._listeners is None else self._listeners.vectors_listener(planned, ports)
+
+    def _lane_listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, Any], None] | None:
+        """Return what calls the listener with the vectors of another host that arrive by a lane."""
+        lane = has_lane(port, planned.host, self._name)
+        listener, step_ns = self._vectors_listener(planned, [port]) if lane else None, self._plan.step_ns
         if listener is None:
             return None
         return lambda tag, value: listener(
-            tag, (tag + planned.period) * step_ns if tag > INITIAL else 0, value
+            tag, (tag + planned.period) * step_ns if tag > INITIAL else 0, value.tobytes()
         )
 
     def _seldom_read(

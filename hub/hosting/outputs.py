@@ -23,10 +23,13 @@ from schemas.errors import MessageError
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec, joined
 
-__all__ = ["DueOutputs", "Listener", "Output"]
+__all__ = ["DueOutputs", "Listener", "Output", "VectorsListener"]
 
 Listener = Callable[[int, int, Any], None]
 """Is called with every value of one output: step, time (ns) at which it is valid, value."""
+
+VectorsListener = Callable[[int, int, bytes], None]
+"""Is called with the vectors of outputs: step, time (ns) at which they are valid, and their bytes, joined."""
 
 
 @dataclass(slots=True)
@@ -43,6 +46,7 @@ class Output:
     publisher: PortPublisher | None
     """For readers in other processes."""
     listener: Listener | None
+    """Of messages and events."""
     inputs: list[tuple[dict[str, Any], str]] = field(default_factory=list[tuple[dict[str, Any], str]])
     """The inputs in this process that hold its newest value: the values of a participant, and the port."""
     queues: list[Queue] = field(default_factory=list[Queue])
@@ -82,7 +86,10 @@ class _Passage:
 class _Vectors:
     """Vectors that are due together."""
 
-    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+    def __init__(
+        self, outputs: Sequence[Output], wire: Wire | None, listener: VectorsListener | None
+    ) -> None:
+        self._listener = listener
         self._values: Sequence[Vector] = ()
         self._bytes = b""
         self._codecs = [output.codec for output in outputs if output.codec is not None]
@@ -109,6 +116,8 @@ class _Vectors:
             for i, output in self._shared:
                 output.set_inputs(values[i])
         self._passage.put(step, time_ns, values)
+        if self._listener is not None:
+            self._listener(step, time_ns, data)
 
     def _check(self, values: Sequence[Vector]) -> None:
         for codec, value in zip(self._codecs, values, strict=True):
@@ -152,17 +161,25 @@ class DueOutputs:
     Args:
         outputs: They, in the order in which they are published.
         wire: Carries values to other processes; None if there are none.
+        listener: Returns what is called with the vectors among some outputs.
     """
 
-    def __init__(self, outputs: Sequence[Output], wire: Wire | None) -> None:
+    def __init__(
+        self,
+        outputs: Sequence[Output],
+        wire: Wire | None,
+        listener: Callable[[Sequence[Port]], VectorsListener | None] = lambda _: None,
+    ) -> None:
         vectors = [output for output in outputs if output.codec is not None]
         events = [output for output in outputs if output.port.variability == "event"]
         messages = [output for output in outputs if output not in vectors and output not in events]
-        self._parts = [
-            (_values_of(part), kind(part, wire).put)
-            for kind, part in ((_Vectors, vectors), (_Messages, messages), (_Events, events))
-            if part
-        ]
+        self._parts: list[tuple[Callable[[Outputs], Sequence[Any]], Callable[[int, int, Any], None]]] = []
+        if vectors:
+            part = _Vectors(vectors, wire, listener([output.port for output in vectors]))
+            self._parts.append((_values_of(vectors), part.put))
+        for kind, part in ((_Messages, messages), (_Events, events)):
+            if part:
+                self._parts.append((_values_of(part), kind(part, wire).put))
         self._outputs = outputs
         self._initial: list[tuple[PortPublisher, Any]] = []
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from math import inf
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class _Meter:
         self._peak: float | None = None
         self._least = inf
         size = part.stop - part.start
+        self._is_norm = measure.kind == "peak-norm" or size > 1
         self._low: Vector = np.full(size, inf)
         self._high: Vector = np.full(size, -inf)
         self._drop = 0.0
@@ -41,16 +42,18 @@ class _Meter:
 
     def take(self, value: Vector, time_ns: int) -> None:
         part = value[self._part]
-        now = float(np.linalg.norm(part)) if self._kind == "peak-norm" or part.size > 1 else float(part[0])
-        self.now = now
+        # what np.linalg.norm does for a vector, at a fifth of its cost
+        self.now = now = sqrt(part.dot(part)) if self._is_norm else float(part[0])
         if time_ns < self._after:
             return
-        self._least = min(self._least, now)
+        if now < self._least:
+            self._least = now
         if self._kind == "swing":
             self._low, self._high = np.minimum(self._low, part), np.maximum(self._high, part)
         if self._peak is None or now > self._peak:
             self._peak, self._drop = now, 0.0
-        self._drop = max(self._drop, self._peak - now)
+        elif self._peak - now > self._drop:
+            self._drop = self._peak - now
         if self._level is not None:
             self._above = self._above + 1 if now >= self._level else 0
             self._longest = max(self._longest, self._above)

@@ -1,8 +1,6 @@
 """Writes MCAP files of ROS 2 messages, a whole chunk at a time, and the rosbag2 metadata beside them.
 
-The record types are those of the `mcap` package. Its `Writer` takes messages one by one, at two to three
-times the cost (docs/decisions/0005-recorder.md), and a recorder shares the interpreter with the step loop, so
-the many message headers and index entries of a chunk are written here by numpy. Format:
+The records are those of the `mcap` package; the many index entries of a chunk are made by numpy. Format:
 https://mcap.dev/spec; rosbag2 metadata version 9 as ROS 2 Jazzy writes it.
 """
 
@@ -11,22 +9,18 @@ from __future__ import annotations
 import errno
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, BinaryIO
 
 import lz4.frame
-import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
-    Chunk,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -36,61 +30,19 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
+from hub.recording.chunk import ChunkData
+from hub.recording.message_index import chunk_index, message_index
+from hub.recording.vector_block import RECORD_HEADER_BYTES
 from schemas.errors import RecordingError
 
-__all__ = ["ChunkData", "McapFile", "chunk_data", "create_bag", "write_rosbag2_metadata"]
+__all__ = ["McapFile", "create_bag", "write_rosbag2_metadata"]
 
-_MESSAGE = np.dtype(
-    [
-        ("opcode", "<u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-    ]
-)
-_INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
-_RECORD_HEADER_BYTES = 9
+_CHUNK = struct.Struct("<BQQQQII3sQ")
+"""What is in front of a chunk's compressed records (https://mcap.dev/spec#chunk-op0x06)."""
 _COPIED_BYTES = 2**20
 """Of the chunks' indexes at once, when a file is finished."""
-
-
-@dataclass(frozen=True)
-class ChunkData:
-    """The records of one chunk, uncompressed, and the channel, time and offset of each message.
-
-    The arrays have the shape (messages,).
-    """
-
-    records: bytes
-    channels: NDArray[np.int64]
-    times_ns: NDArray[np.int64]
-    offsets: NDArray[np.int64]
-
-
-def chunk_data(messages: Sequence[tuple[int, int, bytes]]) -> ChunkData:
-    """Return `messages`, each (channel, time in ns, payload), as the records of one chunk."""
-    channels, times, payloads = zip(*messages, strict=True)
-    sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
-    headers = np.zeros(len(payloads), _MESSAGE)
-    headers["opcode"] = Opcode.MESSAGE
-    headers["length"] = sizes + (_MESSAGE.itemsize - _RECORD_HEADER_BYTES)
-    headers["channel"] = channels
-    headers["log_time"] = headers["publish_time"] = times
-    parts: list[bytes] = [b""] * (2 * len(payloads))
-    parts[0::2] = headers.view(f"V{_MESSAGE.itemsize}").tolist()
-    parts[1::2] = payloads
-    ends = np.cumsum(sizes + _MESSAGE.itemsize)
-    return ChunkData(
-        b"".join(parts),
-        np.asarray(channels, np.int64),
-        np.asarray(times, np.int64),
-        ends - sizes - _MESSAGE.itemsize,
-    )
 
 
 class McapFile:
@@ -132,46 +84,21 @@ class McapFile:
         """Compress and append one chunk with its message indexes. Raises OSError with nothing appended."""
         compressed = lz4.frame.compress(data.records)
         start, end = int(data.times_ns.min()), int(data.times_ns.max())
-        chunk = _bytes_of(Chunk("lz4", compressed, end, start, zlib.crc32(data.records), len(data.records)))
-        index = bytearray()
-        offsets: dict[int, int] = {}
-        counts = np.bincount(data.channels)
-        by_channel = np.argsort(data.channels, kind="stable")
-        entries = np.empty(len(by_channel), _INDEX_ENTRY)
-        entries["time"], entries["offset"] = data.times_ns[by_channel], data.offsets[by_channel]
-        at = 0
-        for channel in np.flatnonzero(counts).tolist():
-            group = entries[at : at + int(counts[channel])].tobytes()
-            offsets[channel] = self.size + len(chunk) + len(index)
-            index += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(group), channel, len(group)) + group
-            at += int(counts[channel])
-        self._add_index(
-            ChunkIndex(
-                len(chunk),
-                self.size,
-                "lz4",
-                len(compressed),
-                end,
-                len(index),
-                offsets,
-                start,
-                len(data.records),
-            ),
-            chunk + bytes(index),
-        )
+        size, checksum = len(data.records), zlib.crc32(data.records)
+        length = _CHUNK.size - RECORD_HEADER_BYTES + len(compressed)
+        head = _CHUNK.pack(Opcode.CHUNK, length, start, end, size, checksum, 3, b"lz4", len(compressed))
+        index = message_index(data)
+        record = chunk_index(data, index, self.size, len(head) + len(compressed), len(compressed))
+        self._index.seek(self._index_size)
+        _write(self._index, record)
+        # if this fails, the record is overwritten by the next one
+        self._append(b"".join((head, compressed, index.records)))
+        self._index_size += len(record)
         self._start_ns = min(self._start_ns, start) if self._chunks else start
         self._end_ns = max(self._end_ns, end)
         self._chunks += 1
-        for channel in offsets:
-            self._counts[channel] = self._counts.get(channel, 0) + int(counts[channel])
-
-    def _add_index(self, index: ChunkIndex, chunk: bytes) -> None:
-        """Append a chunk, and keep its index; both or, with OSError, neither."""
-        record = _bytes_of(index)
-        self._index.seek(self._index_size)
-        _write(self._index, record)
-        self._append(chunk)
-        self._index_size += len(record)
+        for channel, count in zip(index.channels.tolist(), index.counts.tolist(), strict=True):
+            self._counts[channel] = self._counts.get(channel, 0) + count
 
     @property
     def statistics(self) -> Statistics:

@@ -1,14 +1,15 @@
 """Records a session to a rosbag2 directory without slowing its steps.
 
-`write` puts a message into a bounded queue; a thread builds chunks of them, compresses and writes these
-(docs/decisions/0005-recorder.md). Nothing is lost silently: a message that does not fit into the queue, or
-arrives when the disk is full, is counted, logged once, and marks the recording as incomplete.
+`write` puts a message into a bounded queue, or many vectors at once; a thread builds chunks of them,
+compresses and writes these (docs/decisions/0005-recorder.md, docs/decisions/0049-recorder-by-blocks.md).
+Nothing is lost silently: a message that does not fit into the queue, or arrives when the disk is full, is
+counted, logged once, and marks the recording as incomplete.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Lock, Thread
@@ -18,9 +19,12 @@ from typing import Self
 from mcap.records import Channel, Schema
 
 from hub.recording.bag import MESSAGE_HEADER_BYTES
-from hub.recording.mcap_file import chunk_data, create_bag, write_rosbag2_metadata
+from hub.recording.chunk import FIRST_BLOCK, Queued, chunk_data
+from hub.recording.mcap_file import create_bag, write_rosbag2_metadata
+from hub.recording.vector_block import VectorBlock
 from schemas.codec import rihs01, ros2msg_definition, typestore
 from schemas.errors import RecordingError, did_you_mean
+from schemas.vectors import VectorCodec
 
 __all__ = ["Recorder", "RecorderSummary"]
 
@@ -39,8 +43,6 @@ MAX_QUEUED_MESSAGES = 250_000
 """If more than either waits for the disk, messages are dropped."""
 
 _log = logging.getLogger(__name__)
-
-_Queued = tuple[int, int, bytes]
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ class Recorder:
         self._lock = Lock()
         self._wake = Event()
         self._channels: list[tuple[str, str]] = []
-        self._queue: list[_Queued] = []
+        self._blocks: list[VectorBlock] = []
+        self._queue: list[Queued] = []
         self._queued_bytes = 0
         self._dropped = 0
         self._error: str | None = None
@@ -105,22 +108,45 @@ class Recorder:
                 self._channels.append((topic, type_name))
             return self._channels.index((topic, type_name)) + 1
 
-    def write(self, channel: int, time_ns: int, payload: bytes) -> None:
-        """Queue one message. Never waits for the disk; may be called from any thread."""
-        self.write_all([(channel, time_ns, payload)])
+    def block(self, vectors: Sequence[tuple[int, VectorCodec]]) -> int:
+        """Return the number under which vectors, each of a channel, are written together, as their bytes."""
+        with self._lock:
+            self._blocks.append(VectorBlock(vectors))
+            return FIRST_BLOCK + len(self._blocks) - 1
 
-    def write_all(self, messages: Sequence[tuple[int, int, bytes]]) -> None:
-        """Queue messages, each (channel, time in ns, payload), all or none of them, as `write` does one."""
-        size = sum(MESSAGE_HEADER_BYTES + len(payload) for _, _, payload in messages)
+    def write(self, number: int, time_ns: int, content: bytes) -> None:
+        """Queue the message of a channel, or the vectors of a block, one after the other.
+
+        Never waits for the disk; may be called from any thread.
+        """
+        self.write_all([(number, time_ns, content)])
+
+    def write_all(self, queued: Sequence[Queued]) -> None:
+        """Queue messages and vectors, all or none of them, as `write` does one."""
+        size = sum(map(self._size, queued))
         with self._lock:
             before = self._queued_bytes
             if self._refusing or before > MAX_QUEUED_BYTES or len(self._queue) >= MAX_QUEUED_MESSAGES:
-                self._drop(len(messages))
+                self._drop(self._messages(queued))
                 return
-            self._queue += messages
+            self._queue += queued
             self._queued_bytes = after = before + size
         if before < CHUNK_BYTES <= after:
             self._wake.set()
+
+    def _size(self, one: Queued) -> int:
+        """Return the bytes of what was queued, as records."""
+        number, _, content = one
+        if number < FIRST_BLOCK:
+            return MESSAGE_HEADER_BYTES + len(content)
+        return self._blocks[number - FIRST_BLOCK].size
+
+    def _messages(self, queued: Iterable[Queued]) -> int:
+        """Return the number of messages."""
+        return sum(
+            1 if number < FIRST_BLOCK else len(self._blocks[number - FIRST_BLOCK].channels)
+            for number, _, _ in queued
+        )
 
     def close(self) -> RecorderSummary:
         """Write what is queued, the summary section and `metadata.yaml`. May be called twice."""
@@ -157,18 +183,31 @@ class Recorder:
             with self._lock:
                 queue, self._queue, self._queued_bytes = self._queue, [], 0
                 channels = list(self._channels)
-            if self._error is not None:  # what was queued before the error was known must leave no gap behind it
-                self._dropped += len(queue)
+            if (
+                self._error is not None
+            ):  # what was queued before the error was known must leave no gap behind it
+                self._dropped += self._messages(queue)
                 continue
             written = 0
             try:
                 self._declare(channels)
-                for part in _chunks(queue):
-                    self._file.add_chunk(chunk_data(part))
+                for part in self._chunks(queue):
+                    self._file.add_chunk(chunk_data(part, self._blocks))
                     written += len(part)
             except Exception as error:  # noqa: BLE001 - whatever it is, the session goes on and the recording is marked
                 self._fail(error)
-                self._dropped += len(queue) - written
+                self._dropped += self._messages(queue[written:])
+
+    def _chunks(self, queue: Sequence[Queued]) -> Iterator[Sequence[Queued]]:
+        """Cut `queue` into parts of at most about `CHUNK_BYTES`, each with at least one message."""
+        start, size = 0, 0
+        for end, one in enumerate(queue, 1):
+            size += self._size(one)
+            if size >= CHUNK_BYTES:
+                yield queue[start:end]
+                start, size = end, 0
+        if start < len(queue):
+            yield queue[start:]
 
     def _declare(self, channels: Sequence[tuple[str, str]]) -> None:
         """Write the channels that are not in the file yet."""
@@ -212,15 +251,3 @@ class Recorder:
                 self.directory,
                 self._error,
             )
-
-
-def _chunks(queue: Sequence[_Queued]) -> Iterator[Sequence[_Queued]]:
-    """Cut `queue` into parts of at most about `CHUNK_BYTES`, each with at least one message."""
-    start, size = 0, 0
-    for end, (_, _, payload) in enumerate(queue, 1):
-        size += MESSAGE_HEADER_BYTES + len(payload)
-        if size >= CHUNK_BYTES:
-            yield queue[start:end]
-            start, size = end, 0
-    if start < len(queue):
-        yield queue[start:]

@@ -22,7 +22,8 @@ from hub.recording.bag import (
     located_messages,
     reading,
 )
-from hub.recording.mcap_file import ChunkData, McapFile, create_bag, write_rosbag2_metadata
+from hub.recording.chunk import ChunkData
+from hub.recording.mcap_file import McapFile, create_bag, write_rosbag2_metadata
 from schemas.errors import RecordingError
 
 __all__ = ["RecoverSummary", "recover"]

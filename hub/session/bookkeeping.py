@@ -9,7 +9,7 @@ from time import monotonic_ns
 
 from hub.devices.session_devices import SessionDevices
 from hub.observation.latency import Histogram, by_way
-from hub.observation.observers import Observers
+from hub.observation.monitor import Monitor
 from hub.observation.summary import Progress, Summary
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.profiles import profile_numbers
@@ -34,7 +34,7 @@ class Bookkeeping:
         run: int,
         clock: Clock,
         refusals: Refusals,
-        observers: Observers,
+        monitor: Monitor,
         devices: SessionDevices,
         observer_reports: ObserverReports,
     ) -> None:
@@ -47,7 +47,7 @@ class Bookkeeping:
         self._run = run
         self._clock = clock
         self._refusals = refusals
-        self._observers = observers
+        self._monitor = monitor
         self._devices = devices
         self._observer_reports = observer_reports
         self._answers = Histogram()
@@ -86,7 +86,7 @@ class Bookkeeping:
             sim_s,
             factor,
             self._clock.late_steps,
-            self._observers.measures.live(),
+            self._monitor.measures.live(),
         )
 
     def status(self, pid: Callable[[str], int]) -> SessionStatus:
@@ -141,10 +141,10 @@ class Bookkeeping:
             state_hash=digest.hexdigest(),
             recording=None if recorded is None else str(recorded.path),
             recording_complete=None if recorded is None else recorded.complete,
-            energy_residual_j=self._observers.energy.residual_j,
+            energy_residual_j=self._monitor.energy.residual_j,
             latency=by_way(self._latencies),
             observers=self._observer_reports.observed(),
-            measures=self._observers.measures.results(),
+            measures=self._monitor.measures.results(),
             ending=self.detail or None,
             profile=None if profile is None else profile_numbers(profile),
         )
@@ -162,4 +162,4 @@ class Bookkeeping:
 
     @property
     def _dropped(self) -> int:
-        return self._refusals.total + self._observers.refusals.total
+        return self._refusals.total + self._monitor.refusals.total

@@ -19,7 +19,7 @@ from hub.hosting.host_processes import HostProcesses
 from hub.hosting.interrupt import Interrupt
 from hub.hosting.watchdog import Watchdog
 from hub.observation.measures import Measures
-from hub.observation.observers import Observers
+from hub.observation.monitor import Monitor
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
 from hub.recording.recorder import Recorder
@@ -111,7 +111,7 @@ class Run:
         stack.callback(self.processes.end)
         self.refusals = Refusals()
         self.clock = _clock(scenario, plan)
-        self.observers = Observers(plan, keys, self.number, Measures(scenario, plan), recorder)
+        self.monitor = Monitor(plan, keys, self.number, Measures(scenario, plan), recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
         self.acks = AckReceiver(
             session, keys, plan, self.number, self.refusals, ack_keys, self.processes.links
@@ -131,11 +131,11 @@ class Run:
             self.number,
             self.clock,
             self.refusals,
-            self.observers,
+            self.monitor,
             self.devices,
             self.observer_reports,
         )
-        watched = list(self.observers.away.values())
+        watched = list(self.monitor.away.values())
         self.joined_hosts = JoinedHosts(
             scenario,
             plan,
@@ -148,7 +148,7 @@ class Run:
             programs_endpoint=spec.programs_endpoint,
             profile=spec.profiled,
         )
-        self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.observers)
+        self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.monitor)
         answering.callback(self.status.undeclare)
         if self.profile is not None:
             answering.callback(self.profile.undeclare)
@@ -184,7 +184,7 @@ class Run:
 
     def _profile(self) -> RunProfile:
         return RunProfile(
-            self.session, self.keys, self.spec.plan, self.number, self.clock, self.observers, self.refusals
+            self.session, self.keys, self.spec.plan, self.number, self.clock, self.monitor, self.refusals
         )
 
     def _host(self) -> Host:
@@ -193,7 +193,7 @@ class Run:
         wire = Wire(self.session, self.keys, self.number, self.refusals, "hub", spin=spin)
         if self.profile is not None:
             self.profile.prepare(self.spec.stepped, wire)
-        return Host("hub", self.spec.plan, self.spec.stepped, wire=wire, listeners=self.observers.listener)
+        return Host("hub", self.spec.plan, self.spec.stepped, wire=wire, listeners=self.monitor)
 
     def _devices(self) -> SessionDevices:
         """Return the devices of the session, those of this process not yet open."""
@@ -206,7 +206,7 @@ class Run:
             self.session,
             devices,
             self.host.device_inputs,
-            self.observers,
+            self.monitor,
             self.refusals,
             self.failure.report,
         )
@@ -236,8 +236,8 @@ class Run:
             self.refusals,
         )
         answering.callback(control.undeclare)
-        for key in self.observers.away:
-            watch = session.declare_subscriber(key, Callback(self.observers.sample, indirect=False))
+        for key in self.monitor.away:
+            watch = session.declare_subscriber(key, Callback(self.monitor.sample, indirect=False))
             answering.callback(watch.undeclare)
 
 

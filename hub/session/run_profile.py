@@ -13,7 +13,7 @@ from hub.devices.session_devices import SessionDevices
 from hub.hosting.host import Host
 from hub.hosting.process_profile import ProcessProfile
 from hub.observation.late_steps import NO_CORE, LateSteps
-from hub.observation.observers import Observers
+from hub.observation.monitor import Monitor
 from hub.observation.stopwatch import Phase
 from hub.observation.thread_clocks import CoreQueue
 from hub.participant import Stepped
@@ -47,7 +47,7 @@ class RunProfile:
         plan: The plan of the session.
         run: The number of the run.
         clock: The clock of the run.
-        observers: Its observers, of which the recorder is one.
+        monitor: What records and measures it.
         refusals: Counts the answers of hosts that are refused.
     """
 
@@ -58,11 +58,11 @@ class RunProfile:
         plan: Plan,
         run: int,
         clock: Clock,
-        observers: Observers,
+        monitor: Monitor,
         refusals: Refusals,
     ) -> None:
         self._session, self._keys, self._plan, self._run = session, keys, plan, run
-        self._clock, self._observers, self._refusals = clock, observers, refusals
+        self._clock, self._monitor, self._refusals = clock, monitor, refusals
         self.process = ProcessProfile("hub", plan, Phase("hub", "hub"))
         self._wall_clock = self.process.watch.phase("waiting for the wall clock", "hub")
         self._late = LateSteps()
@@ -78,9 +78,10 @@ class RunProfile:
         """Time participants, values that arrive, and the recording; before a Host is made of them."""
         self.process.prepare(stepped, wire)
         recording = self.process.watch.phase("recording", "recorder")
-        for method in (self._observers.grant, self._observers.status):
+        for method in (self._monitor.grant, self._monitor.flush, self._monitor.status):
             self.process.watch.time(method, recording)
-        self.process.watch.time_returned(self._observers.listener, recording)
+        for method in (self._monitor.listener, self._monitor.vectors_listener):
+            self.process.watch.time_returned(method, recording)
 
     def watch(self, host: Host, devices: SessionDevices, state: RunState) -> None:
         """Time the parts of a run that the step loop uses."""
@@ -190,7 +191,7 @@ class RunProfile:
     def finish(self) -> Profile:
         """Return the profile of the whole run, and record it; the hosts are still there."""
         profile = self.message()
-        self._observers.profile(profile)
+        self._monitor.profile(profile)
         return profile
 
     def undeclare(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zenoh
 from zenoh.handlers import Callback
 
-from hub.observation.observers import Observers
+from hub.observation.monitor import Monitor
 from hub.session.bookkeeping import Bookkeeping
 from hub.session.joined_hosts import JoinedHosts
 from schemas.codec import encode
@@ -23,9 +23,9 @@ class StatusReporter:
         keys: Keys,
         bookkeeping: Bookkeeping,
         joined_hosts: JoinedHosts,
-        observers: Observers,
+        monitor: Monitor,
     ) -> None:
-        self._key, self._observers = keys.status, observers
+        self._key, self._monitor = keys.status, monitor
         self._bookkeeping, self._joined_hosts = bookkeeping, joined_hosts
         self._publisher = session.declare_publisher(keys.status, encoding=zenoh.Encoding.APPLICATION_CDR)
         self._queryable = session.declare_queryable(keys.status, Callback(self._answer))
@@ -38,7 +38,7 @@ class StatusReporter:
     def publish(self) -> None:
         """Publish and record the status."""
         status = self._bookkeeping.status(self._joined_hosts.pid)
-        self._observers.status(status)
+        self._monitor.status(status)
         self._publisher.put(encode(status))
 
     def undeclare(self) -> None:

@@ -14,7 +14,6 @@ from hub.planning.plan import PlannedParticipant
 from hub.session.run import Run
 from hub.session.run_profile import RunProfile
 from hub.transport.publisher import Publisher
-from schemas.codec import encode
 from schemas.lockstep import Ack, Grant, pack_grant
 from schemas.trocar_msgs import GrantMessage
 
@@ -52,8 +51,12 @@ class StepLoop:
             session, keys.grant, zenoh.CongestionControl.BLOCK, lambda: None, always=others
         )
         self._energy = {
-            bond.bond.name: session.declare_publisher(
-                keys.energy(bond.bond.name), encoding=zenoh.Encoding.APPLICATION_CDR
+            bond.bond.name: Publisher(
+                session,
+                keys.energy(bond.bond.name),
+                zenoh.CongestionControl.DROP,
+                lambda: None,
+                always=False,
             )
             for bond in plan.bonds
         }
@@ -100,7 +103,7 @@ class StepLoop:
     def _wait_for_values(self) -> None:
         """Wait until the recorder and the measures have the values of the last steps."""
         deadline = monotonic() + _VALUES_S
-        while not self._run.observers.received(self._run.clock.step):
+        while not self._run.monitor.received(self._run.clock.step):
             self._run.failure.check()
             if monotonic() > deadline:
                 log.warning("values of the last steps have not arrived within %g s", _VALUES_S)
@@ -147,7 +150,7 @@ class StepLoop:
             self._grants.put(payload)
         self.book_acks()
         if run.recorded:
-            run.observers.grant(grant, payload)
+            run.monitor.grant(grant, payload)
         run.host.run(grant, self._done_here)
         self._receive_acks([name for name in due if name in self._away], grant, steps)
         run.bookkeeping.acknowledged(granted_ns)
@@ -186,12 +189,14 @@ class StepLoop:
         return self._schedules[key]
 
     def book_acks(self) -> None:
-        """Book the acks that have arrived, and publish the energy books when they are due."""
-        observers, bookkeeping = self._run.observers, self._run.bookkeeping
+        """Book the acks that have arrived, and publish the energy books when they are due and of use."""
+        monitor, bookkeeping = self._run.monitor, self._run.bookkeeping
         for planned, ack, payload in self._unbooked:
-            observers.ack(planned, ack, bookkeeping.book(planned, ack), payload)
+            monitor.ack(planned, ack, bookkeeping.book(planned, ack), payload)
             if self._on_ack is not None:
                 self._on_ack(planned, ack)
         self._unbooked.clear()
-        for message in observers.books(self._run.clock.time_ns):
-            self._energy[message.bond].put(encode(message))
+        monitor.flush()
+        if self._run.recorded or any(publisher.needed for publisher in self._energy.values()):
+            for bond, payload in monitor.books(self._run.clock.time_ns).items():
+                self._energy[bond].put(payload)

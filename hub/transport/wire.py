@@ -119,7 +119,7 @@ class Wire:
     ) -> RemoteCell:
         """Return the cell of an output of a participant in another process.
 
-        `listener` is called with each value that arrives by a lane.
+        `listener` is called with each value.
         """
         if has_lane(port, planned.host, self.host):
             receiver = LaneReceiver(
@@ -133,7 +133,6 @@ class Wire:
                 self.run,
                 self.refusals,
             )
-            listener = None  # an observer subscribes to it
         self._receivers.append(receiver)
         cell = RemoteCell(planned.period, stride, depth, receiver, listener)
         self._cells.append(cell)

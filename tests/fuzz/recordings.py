@@ -21,7 +21,8 @@ from mcap.records import Channel, Schema
 
 from devices.ros.bags.export import export
 from hub.planning import registry
-from hub.recording.mcap_file import McapFile, chunk_data
+from hub.recording.chunk import chunk_data
+from hub.recording.mcap_file import McapFile
 from hub.recording.recording import Recording
 from hub.recording.recover import recover
 from hub.recording.replay import replay

@@ -51,6 +51,26 @@ def test_a_session_is_measured_with_its_hosts(scenario):
     assert cost.wall_s > 0.0
 
 
+LOOKING = """\
+name: looking
+step: 2 ms
+participants:
+  jelly: {kind: "toys:Jelly"}
+  camera: {kind: "toys:Camera", period: 20 ms, milliseconds: 30}
+connections:
+  - jelly.* -> camera.*
+"""
+
+
+def test_what_a_session_could_reach_is_measured_where_cameras_only_look(scenario, tmp_path):
+    assert live.run_attainable(live.Case("short", scenario), 0.03) is None
+    file = tmp_path / "looking.yaml"
+    file.write_text(LOOKING)
+    attainable = live.run_attainable(live.Case("looking", str(file)), 0.1)
+    assert attainable is not None
+    assert attainable > 1.0  # its steps do next to nothing; most of its time it waits for the wall clock
+
+
 def test_every_scenario_has_a_row_or_a_reason():
     rows = live.cases([])
     assert {row.scenario for row in rows} | live.LEFT_OUT.keys() == set(live.installed_scenarios())
@@ -62,9 +82,10 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(live, "DOCS", tmp_path / "live.md")
     row = {
         f"{of}{name}": 1.25
-        for of in ("", "bare_")
+        for of in ("", "bare_", "attainable_")
         for name in ("real_time_factor", "core_s_per_sim_s", "wall_ratio", "core_ratio")
     }
+    unwatched = {**row, "attainable_real_time_factor": None}
     figures = {
         "seconds": 2.0,
         "runs": 3,
@@ -72,7 +93,7 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
         "load_begin": [1.0, 2.0, 3.0],
         "load_end": [4.0, 5.0, 6.0],
         "left_out": {"keys": "why"},
-        "rows": [{"name": "short", **row}],
+        "rows": [{"name": "short", **row}, {"name": "blind", **unwatched}],
     }
     (tmp_path / "live.json").write_text(json.dumps(figures))
     live.DOCS.write_text(f"before\n{live.BEGIN}\nold\n{live.END}\nafter\n")
@@ -81,7 +102,8 @@ def test_the_table_is_redrawn_from_the_figures(tmp_path, monkeypatch, capsys):
     page = live.DOCS.read_text()
     assert page.startswith("before\n")
     assert page.endswith(f"{live.END}\nafter\n")
-    assert "| short | 1.25 | 1.25 | 1.25 | 1.25 | 1.250 | 1.250 |" in page
+    assert "| short | 1.25 | 1.25 | 1.25 | 1.25 | 1.25 | 1.250 | 1.250 |" in page
+    assert "| blind | 1.25 |  | 1.25 |" in page
     assert "at the end 4.0 5.0 6.0" in page
     assert "old" not in page
     assert "| short |" in capsys.readouterr().out

@@ -22,13 +22,18 @@ from rosbags.highlevel import AnyReader
 
 from hub.recording import recorder as recorder_module
 from hub.recording.bag import Bag, located_messages
-from hub.recording.mcap_file import chunk_data, create_bag
+from hub.recording.chunk import FIRST_BLOCK, chunk_data
+from hub.recording.mcap_file import create_bag
 from hub.recording.recorder import Recorder
 from hub.recording.recover import recover
+from hub.recording.vector_block import VectorBlock
 from schemas.codec import decode, encode
 from schemas.errors import RecordingError
+from schemas.ports import Port
 from schemas.ros import Float64Message, Header, PoseStamped, Time
 from schemas.trocar_msgs import AckMessage
+from schemas.vectors import VectorCodec
+from tests.strategies import ports, vectors
 
 POSE = "geometry_msgs/msg/PoseStamped"
 
@@ -129,6 +134,63 @@ def test_chunk_layout_round_trips(messages: list[tuple[int, int, bytes]]) -> Non
     located = list(located_messages(data.records))
     assert [(m.channel, m.time_ns, data.records[m.offset + 31 : m.end]) for m in located] == messages
     assert np.array_equal(data.offsets, [m.offset for m in located])
+
+
+PORTS = (
+    Port(name="tip", type=POSE, causality="output", frame="base"),
+    Port(name="force", type="std_msgs/msg/Float64", causality="output"),
+    Port(name="joints", type="sensor_msgs/msg/JointState", causality="output", names=("a", "b")),
+    Port(name="nodes", type="std_msgs/msg/Float64MultiArray", causality="output", shape=(2, 3)),
+)
+
+
+@given(st.data())
+def test_vectors_of_a_block_are_the_messages_that_their_codecs_make(data: st.DataObject) -> None:
+    codecs = [VectorCodec(port) for port in data.draw(st.lists(ports(), min_size=1, max_size=5))]
+    block = VectorBlock([(channel, codec) for channel, codec in enumerate(codecs, 1)])
+    steps = data.draw(
+        st.lists(
+            st.tuples(
+                st.integers(0, 2**31 * 10**9 - 1), st.booleans(), *(vectors(codec.size) for codec in codecs)
+            ),
+            min_size=1,
+            max_size=8,
+        )
+    )
+    queued: list[tuple[int, int, bytes]] = []
+    expected: list[tuple[int, int, bytes]] = []
+    for time_ns, with_another, *values in steps:
+        if with_another:
+            queued.append((9, time_ns, b"another message"))
+            expected.append(queued[-1])
+        queued.append((FIRST_BLOCK, time_ns, b"".join(value.tobytes() for value in values)))
+        expected += [
+            (channel, time_ns, codec.encode(value, time_ns))
+            for channel, (codec, value) in enumerate(zip(codecs, values, strict=True), 1)
+        ]
+    made, alone = chunk_data(queued, [block]), chunk_data(expected)
+    assert made.records == alone.records
+    assert np.array_equal(made.channels, alone.channels)
+    assert np.array_equal(made.times_ns, alone.times_ns)
+    assert np.array_equal(made.offsets, alone.offsets)
+
+
+def test_vectors_are_recorded_and_counted_as_messages(tmp_path: Path) -> None:
+    codecs = [VectorCodec(port) for port in PORTS]
+    with Recorder(tmp_path / "run", attachments={}) as recorder:
+        channels = [recorder.channel(f"/{codec.port.name}", codec.port.type) for codec in codecs]
+        block = recorder.block(list(zip(channels, codecs, strict=True)))
+        values = [codec.neutral + np.arange(codec.size) for codec in codecs]
+        for t in range(3000):
+            recorder.write(block, t, b"".join(value.tobytes() for value in values))
+        summary = recorder.close()
+        recorder.write(block, 0, b"")
+        assert recorder._dropped == len(codecs)
+    assert (summary.complete, summary.messages) == (True, 3000 * len(codecs))
+    bag = Bag(tmp_path / "run")
+    for codec, value in zip(codecs, values, strict=True):
+        found = [(m.time_ns, m.payload) for m in bag.messages(f"/{codec.port.name}")]
+        assert found == [(t, codec.encode(value, t)) for t in range(3000)]
 
 
 @settings(max_examples=50)

@@ -1,16 +1,23 @@
-"""The observers of a session, which do not take part in it: recorder, measures and energy books."""
+"""What watches a run without taking part in it: it passes on to recorder, measures and energy books.
+
+What is recorded costs a step little more than the bytes that are there already: the vectors of a participant
+that are due together are handed to the recorder as one row of bytes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
+import numpy as np
 import zenoh
 
 from hub.observation.energy import EnergyBooks
 from hub.observation.measures import Measures
 from hub.planning.plan import Plan, PlannedParticipant
+from hub.recording.chunk import Queued
 from hub.recording.recorder import Recorder
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
@@ -21,6 +28,7 @@ from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
 from schemas.lockstep import Ack, Grant, pack_ack
+from schemas.message import Message
 from schemas.ports import Port
 from schemas.trocar_msgs import (
     AckMessage,
@@ -31,7 +39,7 @@ from schemas.trocar_msgs import (
     SessionStatus,
 )
 
-__all__ = ["Observers"]
+__all__ = ["Monitor"]
 
 _ENERGY_PERIOD_NS = 10_000_000
 """The books change at every step; 100 Hz is enough for a plot."""
@@ -49,7 +57,7 @@ class _Watched:
     """The last step of which all values have arrived."""
 
 
-class Observers:
+class Monitor:
     """Receives every grant, ack and output value of one run, from this process or from others."""
 
     def __init__(
@@ -64,8 +72,10 @@ class Observers:
         self._recorder = recorder
         self._watched: dict[str, _Watched] = {}
         self._channels: dict[str, int] = {}
-        self._values: list[tuple[int, int, bytes]] = []
-        """Values of this process that are not yet given to the recorder: channel, time (ns), and bytes."""
+        self._acks: list[Queued] = []
+        """Acks that are not yet given to the recorder."""
+        self._values: list[Queued] = []
+        """Values of this process that are not yet given to the recorder; they follow the acks."""
         self._next_energy_ns = 0
         for planned in plan.participants.values():
             for port in planned.ports:
@@ -98,7 +108,7 @@ class Observers:
         }
 
     def _comes_by_lane(self, watched: _Watched) -> bool:
-        """Return whether the hub's own host receives the value past Zenoh, and passes it to `value`."""
+        """Return whether the hub's own host receives the value past Zenoh, and passes it on."""
         name, port = watched.planned.name, watched.port
         readers = {
             self._plan.participants[connection.target].host
@@ -118,24 +128,61 @@ class Observers:
             if self._watched[key].planned.in_step
         )
 
+    def vectors_listener(
+        self, planned: PlannedParticipant, ports: Sequence[Port]
+    ) -> Callable[[int, int, bytes], None] | None:
+        """Return what receives vectors of a participant in this process, or one from a lane.
+
+        It is called with step, time (ns) at which they are valid, and their bytes, one after the other. None:
+        nothing receives them.
+        """
+        watched = [self._output(planned, port) for port in ports]
+        vectors = [(one.channel, one.codec.vector) for one in watched if one.codec.vector is not None]
+        block = None if self._recorder is None else self._recorder.block(vectors)
+        ends = list(accumulate(8 * codec.size for _, codec in vectors))
+        measured = [
+            (port.name, slice(end - 8 * codec.size, end))
+            for port, end, (_, codec) in zip(ports, ends, vectors, strict=True)
+            if (planned.name, port.name) in self.measures.by_port
+        ]
+        if block is None and not measured:
+            return None
+
+        def receive(step: int, time_ns: int, data: bytes) -> None:
+            if block is not None:
+                self._values.append((block, time_ns, data))
+            for port, part in measured if step > INITIAL else ():
+                self.measures.take(planned.name, port, np.frombuffer(data[part]), time_ns)
+
+        return receive
+
     def listener(self, planned: PlannedParticipant, port: Port) -> Callable[[int, int, Any], None] | None:
-        """Return what receives an output of a participant in this process, or one from a lane.
+        """Return what receives a message or the events of a participant in this process.
 
         It is called with step, time (ns) at which the value is valid, and value. None: nothing receives it.
         """
-        recorder, is_measured = self._recorder, (planned.name, port.name) in self.measures.by_port
-        if recorder is None and not is_measured:
-            return None
-        watched = self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
+        recorded, channel = self._recorder is not None, self._output(planned, port).channel
+        is_measured = (planned.name, port.name) in self.measures.by_port
+        last: Message | None = None
+        payload = b""
+
+        def record(time_ns: int, message: Message) -> None:
+            nonlocal last, payload
+            if message is not last:  # a signal that stays the same object is encoded once
+                last, payload = message, encode(message)
+            self._values.append((channel, time_ns, payload))
 
         def receive(step: int, time_ns: int, value: Any) -> None:
-            for item in value if watched.codec.is_event else (value,):
+            for message in value if port.variability == "event" else (value,):
                 if is_measured and step > INITIAL:
-                    self.measures.take(planned.name, port.name, item, time_ns)
-                if recorder is not None:
-                    self._values.append((watched.channel, time_ns, watched.codec.encode(item, time_ns)))
+                    self.measures.take(planned.name, port.name, message, time_ns)
+                if recorded:
+                    record(time_ns, message)
 
-        return receive
+        return receive if recorded or is_measured else None
+
+    def _output(self, planned: PlannedParticipant, port: Port) -> _Watched:
+        return self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
 
     def received(self, end: int) -> bool:
         """Return whether all values of the steps before `end` have arrived from other processes.
@@ -213,23 +260,26 @@ class Observers:
         self.energy.take(planned.name, ack)
         if self._recorder is not None:
             channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
-            self._recorder.write(channel, time_ns, pack_ack(ack) if payload is None else payload)
+            self._acks.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
 
-    def books(self, time_ns: int) -> list[CouplingEnergy]:
-        """Record the values so far, and return (and record) the energy books when they are due."""
-        if self._recorder is not None and self._values:
-            self._recorder.write_all(self._values)
-            self._values = []
+    def flush(self) -> None:
+        """Give the recorder the acks and values so far."""
+        if self._recorder is not None and (self._acks or self._values):
+            self._recorder.write_all([*self._acks, *self._values])
+            self._acks.clear()
+            self._values.clear()
+
+    def books(self, time_ns: int) -> dict[str, bytes]:
+        """Return the energy book of each bond, in CDR, and record them; empty unless they are due."""
         if time_ns < self._next_energy_ns:
-            return []
+            return {}
         self._next_energy_ns = time_ns + _ENERGY_PERIOD_NS
-        messages = self.energy.messages(time_ns)
+        books = {message.bond: encode(message) for message in self.energy.messages(time_ns)}
         if self._recorder is not None:
-            for message in messages:
-                self._recorder.write(
-                    self._channel(self._keys.energy(message.bond), message.ros_type), time_ns, encode(message)
-                )
-        return messages
+            for bond, payload in books.items():
+                channel = self._channel(self._keys.energy(bond), CouplingEnergy.ros_type)
+                self._recorder.write(channel, time_ns, payload)
+        return books
 
     def status(self, status: SessionStatus) -> None:
         """Record a status of the session."""

@@ -1,0 +1,98 @@
+"""Vectors that are recorded together: of many steps, their bytes become message records at once.
+
+A message of a vector has a fixed length and layout, so all that differs from step to step are times and
+numbers. Where each byte of the records comes from is worked out once; then one call of numpy, which lets go
+of the interpreter, makes the records of many steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from schemas.vectors import VectorCodec
+
+__all__ = ["MESSAGE", "RECORD_HEADER_BYTES", "VectorBlock"]
+
+MESSAGE = np.dtype(
+    [
+        ("opcode", "<u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+    ]
+)
+"""What is in front of a message's payload (https://mcap.dev/spec)."""
+RECORD_HEADER_BYTES = 9
+"""Opcode and length, which the length does not count."""
+
+_TIME = np.dtype([("ns", "<u8"), ("sec", "<i4"), ("nanosec", "<u4")])
+"""A time as MCAP has it, and as a stamp in CDR."""
+
+
+class VectorBlock:
+    """The records of vectors that are valid at the same time, one after the other.
+
+    Args:
+        vectors: Channel and codec of each.
+    """
+
+    def __init__(self, vectors: Sequence[tuple[int, VectorCodec]]) -> None:
+        self.channels = np.array([channel for channel, _ in vectors])
+        """Of each message, shape (vectors,)."""
+        sizes = np.array([MESSAGE.itemsize + len(codec.template) for _, codec in vectors])
+        ends = np.cumsum(sizes)
+        self.offsets: NDArray[np.int64] = ends - sizes
+        """Of each message in the records of one step, shape (vectors,)."""
+        self.size = int(ends[-1])
+        """Bytes of the records of one step."""
+        self._template = b"".join(_header(channel, codec) + codec.template for channel, codec in vectors)
+        self._vectors = slice(self.size, self.size + sum(8 * codec.size for _, codec in vectors))
+        self._sources = self._places(vectors)
+        """For each byte of the records, its place in template, vectors and time, one after the other."""
+        self._rows = self._new_rows(0)
+        """Template, vectors and time of each step, shape (steps, bytes); the template stays."""
+
+    def _places(self, vectors: Sequence[tuple[int, VectorCodec]]) -> NDArray[np.intp]:
+        places = np.arange(self.size)
+        number, time = self._vectors.start, self._vectors.stop
+        stamp = time + 8
+        for start, (_, codec) in zip(self.offsets.tolist(), vectors, strict=True):
+            payload = start + MESSAGE.itemsize
+            places[payload - 16 : payload] = 2 * [*range(time, time + 8)]
+            if codec.stamp is not None:
+                places[payload + codec.stamp.start : payload + codec.stamp.stop] = range(stamp, stamp + 8)
+            for begin, end, part in codec.spans:
+                places[payload + begin : payload + end] = range(number + part.start, number + part.stop)
+            number += 8 * codec.size
+        return places
+
+    def _new_rows(self, steps: int) -> NDArray[np.uint8]:
+        rows = np.empty((steps, self._vectors.stop + _TIME.itemsize), np.uint8)
+        rows[:, : self.size] = np.frombuffer(self._template, np.uint8)
+        return rows
+
+    def records(self, times_ns: NDArray[np.int64], vectors: Sequence[bytes]) -> list[bytes]:
+        """Return the records of each step: of its time, and the bytes of its vectors one after the other."""
+        steps = len(vectors)
+        if len(self._rows) < steps:
+            self._rows = self._new_rows(steps)
+        rows = self._rows[:steps]
+        times = np.empty(steps, _TIME)
+        times["ns"] = times_ns
+        times["sec"], times["nanosec"] = np.divmod(times_ns, 10**9)
+        rows[:, self._vectors] = np.frombuffer(b"".join(vectors), np.uint8).reshape(steps, -1)
+        rows[:, self._vectors.stop :] = times.view(np.uint8).reshape(steps, -1)
+        return rows.take(self._sources, axis=1).view(f"V{self.size}").ravel().tolist()
+
+
+def _header(channel: int, codec: VectorCodec) -> bytes:
+    header = np.zeros(1, MESSAGE)
+    header["opcode"], header["channel"] = Opcode.MESSAGE, channel
+    header["length"] = MESSAGE.itemsize - RECORD_HEADER_BYTES + len(codec.template)
+    return header.tobytes()
