@@ -79,14 +79,13 @@ def from_matrix(r: Vector) -> Vector:
     (Bar-Itzhack's observation that q is the dominant eigenvector of this matrix, without the eigenvalues).
     """
     (a, b, c), (d, e, f), (g, h, i) = r[:3, :3].tolist()
-    rows = (
-        (1 + a - e - i, b + d, c + g, h - f),
-        (b + d, 1 - a + e - i, f + h, c - g),
-        (c + g, f + h, 1 - a - e + i, d - b),
-        (h - f, c - g, d - b, 1 + a + e + i),
-    )
-    largest = max(range(4), key=lambda k: rows[k][k])
-    x, y, z, w = rows[largest]
+    largest, x, y, z, w = 1 + a - e - i, 1 + a - e - i, b + d, c + g, h - f
+    if (square := 1 - a + e - i) > largest:
+        largest, x, y, z, w = square, b + d, square, f + h, c - g
+    if (square := 1 - a - e + i) > largest:
+        largest, x, y, z, w = square, c + g, f + h, square, d - b
+    if (square := 1 + a + e + i) > largest:
+        x, y, z, w = h - f, c - g, d - b, square
     length = sqrt(x * x + y * y + z * z + w * w)
     return np.array([x / length, y / length, z / length, w / length])
 

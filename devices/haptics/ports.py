@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from devices.samples import clock_of
+from devices.samples import clock_of, made
 from devices.vendor_axes import Vector3
 from hub.participant import Sample
 from schemas.ports import Port
-from schemas.ros import Header, Joy, PoseStamped, Time, TwistStamped, Wrench, WrenchStamped
-from schemas.ros import Vector3 as Vector3Message
+from schemas.ros import Joy, PoseStamped, TwistStamped, WrenchStamped
 from schemas.trocar_msgs import ContactModel
 
 __all__ = ["StylusPorts", "force_sample", "stylus_ports"]
@@ -75,5 +74,5 @@ def stylus_ports(participant: str, stylus: str, *, simulated_time: bool, max_age
 def force_sample(port: Port, time_ns: int, force: Vector3) -> Sample:
     """Return the force (N) on a hand, in the port's frame at `time_ns` of the port's clock."""
     x, y, z = force
-    header = Header(stamp=Time.from_ns(time_ns), frame_id=port.frame)
-    return Sample(port.name, WrenchStamped(header=header, wrench=Wrench(force=Vector3Message(x=x, y=y, z=z))))
+    wrench = {"force": {"x": x, "y": y, "z": z}}
+    return Sample(port.name, made(WrenchStamped, port, time_ns, wrench=wrench))

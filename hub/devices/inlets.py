@@ -42,10 +42,9 @@ class _Inlet:
     newest: tuple[int, int] = (0, 0)
     """Admission and sequence number."""
 
-    @property
-    def name(self) -> str:
-        """The stream's name in reports."""
-        return f"{self.source}.{self.port}"
+    def __post_init__(self) -> None:
+        """Note the stream's name in reports."""
+        self.name = f"{self.source}.{self.port}"
 
     def follow(self, stamp: Stamp) -> None:
         """Raise LateError for a sample that is not newer than the last one."""
@@ -150,12 +149,11 @@ class Inlets:
                 stale = inlet.stale
                 if inlet.arrived_ns is not None:
                     stale = bool(inlet.max_age_ns) and now_ns - inlet.arrived_ns > inlet.max_age_ns
+                offset_ns = self.offsets_ns.get(inlet.source)
                 for payload, arrived_ns, sent_ns in inlet.queue:
                     entering.append(_sample(inlet, payload, stale=stale, age_ns=now_ns - arrived_ns))
-                    if sent_ns is not None and inlet.source in self.offsets_ns:
-                        self.latencies.add(
-                            "device to grant", inlet.name, now_ns - sent_ns - self.offsets_ns[inlet.source]
-                        )
+                    if sent_ns is not None and offset_ns is not None:
+                        self.latencies.add("device to grant", inlet.name, now_ns - sent_ns - offset_ns)
                 if stale != inlet.stale and not inlet.queue:
                     entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
                 inlet.queue.clear()

@@ -24,6 +24,7 @@ from hub.participant.token_bucket import TokenBucket
 from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
+from schemas.codec import encode
 from schemas.errors import LateError, MessageError
 from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
 
@@ -81,21 +82,19 @@ class SessionDevices:
         self.network_links = NetworkLinkControl(plan, session, keys, self._simulated.links)
         self._diagnostics = DiagnosticsLog(plan, keys, session, refusals)
         self._statuses = DeviceStatuses(plan, keys, session, self.inlets, refusals)
+        self._wanted = self._connected | {
+            (planned.name, port.name)
+            for planned in participants.values()
+            if planned.role == "device"
+            for port in planned.ports
+            if port.causality == "output" and observers.watches(planned.name, port.name)
+        }
+        """Device and port of every output that is connected or observed."""
         self._subscribers = [
             session.declare_subscriber(keys.output("device", *source), self._listener(*source))
-            for source in self._received()
+            for source in sorted(self._wanted)
+            if not participants[source[0]].simulated_time
         ]
-
-    def _received(self) -> list[tuple[str, str]]:
-        """Return device and port of every output of a wall-time device that is connected or observed."""
-        outputs = [
-            (planned.name, port.name)
-            for planned in self._plan.participants.values()
-            if planned.role == "device" and not planned.simulated_time
-            for port in planned.ports
-            if port.causality == "output"
-        ]
-        return [source for source in outputs if source in self._connected or self._observers.watches(*source)]
 
     def open(self, directory: Path) -> None:
         """Open the devices of this process, and start to read those that live in wall time."""
@@ -127,9 +126,11 @@ class SessionDevices:
         own = *self.inlets.latencies.messages(), *self._simulated.latencies.messages()
         return [*own, *self._statuses.latencies]
 
-    def _take(self, device: str, sample: Sample, payload: bytes, arrival_ns: int, stamp: Stamp) -> None:
+    def _take(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
+        if (device, sample.port) not in self._wanted:
+            return
         try:
-            self._offer(device, sample.port, payload, arrival_ns, stamp)
+            self._offer(device, sample.port, encode(sample.message), arrival_ns, stamp)
         except LateError as error:
             self._refusals.refuse(f"{device}.{sample.port}", error)
 
