@@ -18,6 +18,7 @@ from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, 
 from robots import rotation
 from robots.limits import TOLERANCE, distinct
 from schemas.crtk import OperatingState
+from robots.inverse_kinematics import LastFrames
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Header, JointState, Joy, StringMessage, Time
 from schemas.trocar_msgs import ContactModel
@@ -28,6 +29,7 @@ __all__ = ["Teleoperation"]
 _POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
 """Of a pose."""
 _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
+_NONE = np.zeros(0)
 
 
 class TeleoperationState(Record):
@@ -69,8 +71,11 @@ class Teleoperation(Controller):
     def __init__(self, name: str, params: TeleoperationParams) -> None:
         super().__init__(name, params)
         self._chain, n = params.chain, len(params.chain.joints)
+        self._frames = LastFrames(self._chain)
         self._law = (
-            PoseLaw(params.chain, turns=params.orientation == "follow") if params.law == "pose" else None
+            PoseLaw(self._chain, turns=params.orientation == "follow", frames=self._frames)
+            if params.law == "pose"
+            else None
         )
         self._view, self._engagement = View(params), Engagement(params)
         self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
@@ -131,10 +136,11 @@ class Teleoperation(Controller):
             self._lead(inputs, to_base, seconds)
         self._lead_jaw(gripper, seconds)
         self._publish(warnings + self._engagement.warnings)
-        self._stream(Time.from_ns(t + h))
+        header = Header.model_construct(stamp=Time.from_ns(t + h), frame_id="")
+        self._stream(header)
         period = max(self.params.contact_period, h)
         if not (t + h) % period:
-            self._outputs["contact"] = self._feel(inputs, to_base, Time.from_ns(t + h), period * 1e-9)
+            self._outputs["contact"] = self._feel(inputs, to_base, header, period * 1e-9)
         return self._outputs
 
     def restore(self, state: bytes) -> None:
@@ -185,7 +191,7 @@ class Teleoperation(Controller):
         if (command := self._command.tobytes()) == self._found:
             return
         self._found = command
-        tip = self._chain.forward(self._command)
+        tip = self._frames(self._command)[-1]
         self._tip[:3], self._tip[3:] = tip[:3, 3], rotation.from_matrix(tip)
 
     def _set_scale(self, scale: float) -> list[str]:
@@ -242,13 +248,13 @@ class Teleoperation(Controller):
         )
         self._now.published_phase = phase
 
-    def _stream(self, stamp: Time) -> None:
+    def _stream(self, header: Header) -> None:
         """Send the commands to the arm's controller while it follows, otherwise nothing."""
         follows = self._engagement.phase is Phase.ENABLED
         for port, positions in self._streams.items():
-            self._outputs[port] = (_positions(positions, stamp),) if follows else ()
+            self._outputs[port] = (_positions(positions, header),) if follows else ()
 
-    def _feel(self, inputs: Inputs, to_base: Vector, stamp: Time, elapsed: float) -> ContactModel:
+    def _feel(self, inputs: Inputs, to_base: Vector, header: Header, elapsed: float) -> ContactModel:
         """Return what the hand feels, `elapsed` seconds after the last time."""
         hand, tip = inputs["master"], self._tip
         if self._law is None:  # as the hand's own frame is the tip's own
@@ -263,20 +269,11 @@ class Teleoperation(Controller):
             rigid_wrench=inputs["rigid_wrench"],
             elapsed=elapsed,
         )
-        return ContactModel.model_construct(header=_header(stamp), planes=planes)
+        return ContactModel.model_construct(header=header, planes=planes)
 
 
-def _header(stamp: Time) -> Header:
-    return Header.model_construct(stamp=stamp, frame_id="")
-
-
-def _positions(values: Vector, stamp: Time) -> JointState:
+def _positions(values: Vector, header: Header) -> JointState:
     """Return joint positions as a message, without validation: they are within the joints' ranges."""
-    none = np.zeros(0)
     return JointState.model_construct(
-        header=_header(stamp),
-        name=[],
-        position=values.copy(),
-        velocity=none,
-        effort=none,
+        header=header, name=[], position=values.copy(), velocity=_NONE, effort=_NONE
     )
