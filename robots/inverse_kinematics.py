@@ -102,12 +102,9 @@ def _error(tip: Vector, position: Vector, orientation: Vector, length: float) ->
 
     The displacement comes first, then the rotation vector in metres.
     """
-    error = np.empty(6)
-    error[:3] = position - tip[:3, 3]
-    error[3:] = length * rotation.log(
-        rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip)))
-    )
-    return error
+    (px, py, pz), (tx, ty, tz) = position.tolist(), tip[:3, 3].tolist()
+    rx, ry, rz = rotation.turn_to(orientation, tip)
+    return np.array([px - tx, py - ty, pz - tz, length * rx, length * ry, length * rz])
 
 
 def _correction(
