@@ -231,9 +231,10 @@ class SerialChain:
 
     def contains(self, q: Vector) -> bool:
         """Say whether each position of `q`, shape (n,), is a number inside its range, not at an end of it."""
-        return all(
-            lower < value < upper for value, (lower, upper) in zip(q.tolist(), self._ranges, strict=True)
-        )
+        for value, (lower, upper) in zip(q.tolist(), self._ranges, strict=True):
+            if not lower < value < upper:
+                return False
+        return True
 
     def forward(self, q: Vector) -> Vector:
         """Return the pose of the tip in the base frame, shape (..., 4, 4), at `q`, shape (..., n).

@@ -82,19 +82,21 @@ class SessionDevices:
         self.network_links = NetworkLinkControl(plan, session, keys, self._simulated.links)
         self._diagnostics = DiagnosticsLog(plan, keys, session, refusals)
         self._statuses = DeviceStatuses(plan, keys, session, self.inlets, refusals)
-        self._wanted = self._connected | {
-            (planned.name, port.name)
-            for planned in participants.values()
-            if planned.role == "device"
-            for port in planned.ports
-            if port.causality == "output" and observers.watches(planned.name, port.name)
-        }
-        """Device and port of every output that is connected or observed."""
         self._subscribers = [
             session.declare_subscriber(keys.output("device", *source), self._listener(*source))
-            for source in sorted(self._wanted)
-            if not participants[source[0]].simulated_time
+            for source in self._received()
         ]
+
+    def _received(self) -> list[tuple[str, str]]:
+        """Return device and port of every output of a wall-time device that is connected or observed."""
+        outputs = [
+            (planned.name, port.name)
+            for planned in self._plan.participants.values()
+            if planned.role == "device" and not planned.simulated_time
+            for port in planned.ports
+            if port.causality == "output"
+        ]
+        return [source for source in outputs if source in self._connected or self._observers.watches(*source)]
 
     def open(self, directory: Path) -> None:
         """Open the devices of this process, and start to read those that live in wall time."""
@@ -127,10 +129,11 @@ class SessionDevices:
         return [*own, *self._statuses.latencies]
 
     def _take(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
-        if (device, sample.port) not in self._wanted:
+        source = device, sample.port
+        if source not in self._connected and not self._observers.watches(*source):
             return
         try:
-            self._offer(device, sample.port, encode(sample.message), arrival_ns, stamp)
+            self._offer(*source, encode(sample.message), arrival_ns, stamp)
         except LateError as error:
             self._refusals.refuse(f"{device}.{sample.port}", error)
 
