@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from devices.vendor_axes import Quaternion, Vector3
 from hub.participant import Sample
 from schemas.message import Message
 from schemas.ports import Port
-from schemas.ros import Header, Joy, PoseStamped, Time, TwistStamped
+from schemas.ros import Header, Joy, Point, Pose, PoseStamped, Time, Twist, TwistStamped
+from schemas.ros import Quaternion as QuaternionMessage
+from schemas.ros import Vector3 as Vector3Message
 
 __all__ = [
     "Clock",
@@ -19,7 +21,6 @@ __all__ = [
     "SampleTimer",
     "button_sample",
     "clock_of",
-    "made",
     "pose_sample",
     "stamp_of",
     "stamped",
@@ -27,7 +28,6 @@ __all__ = [
 ]
 
 Clock = Literal["simulated", "wall"]
-M = TypeVar("M", bound=Message)
 
 _RETRY_NS = 1_000_000_000
 """A missing device is looked for once a second: to start a runtime or to log in takes seconds."""
@@ -41,8 +41,8 @@ def clock_of(*, simulated_time: bool) -> Clock:
 def pose_sample(port: Port, time_ns: int, position: Vector3, orientation: Quaternion) -> Sample:
     """Return a pose, m and quaternion (x, y, z, w), in the port's frame at `time_ns` of the port's clock."""
     (x, y, z), (qx, qy, qz, qw) = position, orientation
-    pose = {"position": {"x": x, "y": y, "z": z}, "orientation": {"x": qx, "y": qy, "z": qz, "w": qw}}
-    return Sample(port.name, made(PoseStamped, port, time_ns, pose=pose))
+    pose = Pose(position=Point(x=x, y=y, z=z), orientation=QuaternionMessage(x=qx, y=qy, z=qz, w=qw))
+    return Sample(port.name, PoseStamped(header=_header(port, time_ns), pose=pose))
 
 
 def twist_sample(port: Port, time_ns: int, linear: Vector3, angular: Vector3) -> Sample:
@@ -51,23 +51,17 @@ def twist_sample(port: Port, time_ns: int, linear: Vector3, angular: Vector3) ->
     Both are along the axes of the port's frame, at `time_ns` of the port's clock.
     """
     (vx, vy, vz), (wx, wy, wz) = linear, angular
-    twist = {"linear": {"x": vx, "y": vy, "z": vz}, "angular": {"x": wx, "y": wy, "z": wz}}
-    return Sample(port.name, made(TwistStamped, port, time_ns, twist=twist))
+    twist = Twist(linear=Vector3Message(x=vx, y=vy, z=vz), angular=Vector3Message(x=wx, y=wy, z=wz))
+    return Sample(port.name, TwistStamped(header=_header(port, time_ns), twist=twist))
 
 
 def button_sample(port: Port, time_ns: int, pressed: Sequence[bool]) -> Sample:
     """Return the buttons of a hand-held device."""
-    return Sample(port.name, made(Joy, port, time_ns, buttons=np.array(pressed, np.int32)))
+    return Sample(port.name, Joy(header=_header(port, time_ns), buttons=np.array(pressed, np.int32)))
 
 
-def made(model: type[M], port: Port, time_ns: int, **fields: Any) -> M:
-    """Return a message with a header, in the port's frame at `time_ns` of the port's clock.
-
-    Validated all at once, which takes half as long as one message after the other.
-    """
-    seconds, nanoseconds = divmod(time_ns, 10**9)
-    header = {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": port.frame}
-    return model.model_validate({"header": header, **fields})
+def _header(port: Port, time_ns: int) -> Header:
+    return Header(stamp=Time.from_ns(time_ns), frame_id=port.frame)
 
 
 def stamped(message: Message, stamp_ns: int) -> Message:

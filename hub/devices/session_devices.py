@@ -24,7 +24,6 @@ from hub.participant.token_bucket import TokenBucket
 from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
-from schemas.codec import encode
 from schemas.errors import LateError, MessageError
 from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
 
@@ -133,7 +132,7 @@ class SessionDevices:
         if source not in self._connected and not self._observers.watches(*source):
             return
         try:
-            self._offer(*source, encode(sample.message), arrival_ns, stamp)
+            self._offer(*source, sample.encode(), arrival_ns, stamp)
         except LateError as error:
             self._refusals.refuse(f"{device}.{sample.port}", error)
 
