@@ -17,8 +17,8 @@ from hub.planning.plan import Plan
 from hub.transport.envelope import Stamp
 from hub.transport.port_codec import PortCodec
 from schemas.errors import LateError, MessageError, did_you_mean
+from schemas.lockstep import Entering
 from schemas.ports import Port
-from schemas.trocar_msgs import InletSample
 
 __all__ = ["Inlets"]
 
@@ -136,12 +136,12 @@ class Inlets:
             inlet.arrived_ns = now_ns
             self._offered.add(inlet.number)
 
-    def sample(self, time_ns: int, wall_ns: int) -> list[InletSample]:
+    def sample(self, time_ns: int, wall_ns: int) -> list[Entering]:
         """Return what enters at a communication point: samples that are new, and changes of staleness.
 
         Samples of a device in simulated time age in `time_ns`, those of any other in `wall_ns`.
         """
-        entering: list[InletSample] = []
+        entering: list[Entering] = []
         with self._lock:
             for number in sorted(self._offered | self._aging):
                 inlet = self._all[number]
@@ -162,8 +162,5 @@ class Inlets:
         return entering
 
 
-def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> InletSample:
-    data = np.frombuffer(payload, np.uint8)
-    return InletSample.model_construct(
-        participant=inlet.source, port=inlet.port, stale=stale, payload=data, age_ns=age_ns
-    )
+def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> Entering:
+    return Entering(inlet.source, inlet.port, stale, np.frombuffer(payload, np.uint8), age_ns)

@@ -25,7 +25,8 @@ from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
 from schemas.errors import LateError, MessageError
-from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
+from schemas.lockstep import Entering
+from schemas.trocar_msgs import DeviceStatus, Latency
 
 __all__ = ["SessionDevices"]
 
@@ -106,7 +107,7 @@ class SessionDevices:
         for thread in self._threads.values():
             thread.start(directory)
 
-    def enter(self, time_ns: int, step: int) -> list[InletSample]:
+    def enter(self, time_ns: int, step: int) -> list[Entering]:
         """Return what enters the simulation at a communication point."""
         self._time_ns = time_ns
         self._simulated.exchange(time_ns, step, self._take)
