@@ -54,6 +54,7 @@ _LAYOUTS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 
 _QUATERNION_TOLERANCE = 1e-3
 _NANOSEC = struct.Struct("<I")
+_NONE: Vector = np.zeros(0)
 
 
 def has_vector(type_name: str) -> bool:
@@ -90,6 +91,7 @@ class VectorCodec:
         self._is_pose = "pose.orientation" in self.fields
         if self._is_pose:
             self.neutral[6] = 1.0
+        self._has_stamp = "header" in self.model.model_fields
         self._compile()
 
     def _layout(self) -> Iterator[tuple[str, tuple[str, ...], slice]]:
@@ -119,7 +121,6 @@ class VectorCodec:
         ]
         # where each block begins and ends in the message, and which of the vector's bytes it is
         self._spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
-        self._has_stamp = "header" in self.model.model_fields
         self._fixed: list[tuple[int, int, bytes]] = []
         at = 0
         for start, stop in [
@@ -226,12 +227,12 @@ class VectorCodec:
         return value
 
     def to_message(self, value: Vector, time_ns: int) -> Message:
-        """Return `value`, shape (size,), as a message."""
-        tree: dict[str, Any] = {}
-        if "header" in self.model.model_fields:
-            tree["header"] = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
+        """Return `value`, shape (size,), as a message; that of joints is not validated."""
         if self.port.type == JointState.ros_type:
-            tree["name"] = list(self.port.names)
+            return self._joint_state(value, time_ns)
+        tree: dict[str, Any] = {}
+        if self._has_stamp:
+            tree["header"] = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
         if self.port.shape:
             tree["layout"] = _layout_of(self.port.shape)
         for path, names, block in self._blocks:
@@ -242,6 +243,17 @@ class VectorCodec:
                 content = float(numbers[0])
             reduce(lambda node, key: node.setdefault(key, {}), parents, tree)[leaf] = content
         return self.model.model_validate(tree)
+
+    def _joint_state(self, value: Vector, time_ns: int) -> JointState:
+        """Return the positions of joints and the like as a message.
+
+        Commands go as such to the controller of an arm in every step; the vector was checked where it is from.
+        """
+        numbers = dict.fromkeys(("position", "velocity", "effort"), _NONE)
+        for path, _, block in self._blocks:
+            numbers[path] = value[block].copy()
+        header = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
+        return JointState.model_construct(header=header, name=list(self.port.names), **numbers)
 
     def from_message(self, message: Message) -> Vector:
         """Return the vector, shape (size,), of a validated message from outside.
