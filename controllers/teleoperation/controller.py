@@ -132,12 +132,14 @@ class Teleoperation(Controller):
         hand = inputs["master"][3:]
         fresh = not inputs.stale("master") and (self._law is not None or not inputs.stale("master_twist"))
         self._engagement.step(to_base, hand, self._tip[3:], gripper, seconds, fresh=fresh)
-        if self._engagement.phase is Phase.ENABLED:
+        phase = self._engagement.phase
+        follows = phase is Phase.ENABLED
+        if follows:
             self._lead(inputs, to_base, seconds)
-        self._lead_jaw(gripper, seconds)
-        self._publish(warnings + self._engagement.warnings)
+        self._lead_jaw(gripper, seconds, follows=follows)
+        self._publish(phase, warnings + self._engagement.warnings)
         header = Header.model_construct(stamp=Time.from_ns(t + h), frame_id="")
-        self._stream(header)
+        self._stream(header, follows=follows)
         period = max(self.params.contact_period, h)
         if not (t + h) % period:
             self._outputs["contact"] = self._feel(inputs, to_base, header, period * 1e-9)
@@ -154,8 +156,10 @@ class Teleoperation(Controller):
 
         An arm with a controller of its own may be moved by others meanwhile.
         """
-        follows = self._engagement.phase is Phase.ENABLED
-        return self._now.started and self._engagement.arm_is_ready and (follows or not self._now.shared)
+        engagement, now = self._engagement, self._now
+        return (
+            now.started and engagement.arm_is_ready and (engagement.phase is Phase.ENABLED or not now.shared)
+        )
 
     def _receive(self, inputs: Inputs) -> None:
         """Read the state of the arm, locks and buttons."""
@@ -196,7 +200,10 @@ class Teleoperation(Controller):
 
     def _set_scale(self, scale: float) -> list[str]:
         """Set the scale; return why it is refused, once."""
-        is_new, self._now.requested_scale = scale != self._now.requested_scale, scale
+        is_new = scale != self._now.requested_scale
+        if not is_new and scale == self._now.scale:
+            return []
+        self._now.requested_scale = scale
         if 0.0 < scale <= 1.0 + TOLERANCE:
             self._now.scale = min(scale, 1.0)
             return []
@@ -206,51 +213,53 @@ class Teleoperation(Controller):
 
     def _lead(self, inputs: Inputs, to_base: Vector, seconds: float) -> None:
         """Let the command follow the hand."""
-        hand, scale = inputs["master"], self._now.scale
+        now, hand = self._now, inputs["master"]
+        scale = now.scale
         if self._law is None:
             twist = twist_in_tip(hand[3:], inputs["master_twist"], scale)
             self._command[:] = advance(self._chain, self._command, twist, seconds)
             self._find_tip()
             return
-        if self._engagement.takes_over or self._now.relocked:
-            self._hand[:], self._now.relocked = hand, False
+        if self._engagement.takes_over or now.relocked:
+            self._hand[:], now.relocked = hand, False
             self._law.engage(hand, self._tip, to_base, scale)
-        if not self._now.rotation_locked:
+        turns, moves = not now.rotation_locked, not now.translation_locked
+        if turns and moves:
+            self._hand[:] = hand
+        elif turns:
             self._hand[_ORIENTATION] = hand[_ORIENTATION]
-        if not self._now.translation_locked:
+        elif moves:
             self._hand[_POSITION] = hand[_POSITION]
         self._command[:] = self._law.step(
             self._command, self._hand, self._tip, to_base, scale, seconds * self._chain.velocity
         )
         self._find_tip()
 
-    def _lead_jaw(self, gripper: float, seconds: float) -> None:
+    def _lead_jaw(self, gripper: float, seconds: float, *, follows: bool) -> None:
         """Let the jaw follow with the arm, and hold with it."""
         if self._ghost is None:
             return
-        if self._engagement.phase is Phase.ENABLED:
+        if follows:
             self._ghost.follow(gripper, seconds)
         else:
             self._ghost.release()
         self._jaw[:1] = self._ghost.angle
 
-    def _publish(self, warnings: list[str]) -> None:
+    def _publish(self, phase: Phase, warnings: list[str]) -> None:
         """Publish what the arm does."""
-        phase = self._engagement.phase
         follows = phase is Phase.ENABLED
         self._goal[:] = self._law.goal if follows and self._law is not None else self._tip
         self._outputs["following"] = _FOLLOWS if follows else _HOLDS
-        self._outputs["state"] = (
-            () if phase == self._now.published_phase else (StringMessage(data=phase.name),)
-        )
+        is_new = phase != self._now.published_phase
+        self._outputs["state"] = (StringMessage(data=phase.name),) if is_new else ()
         self._outputs["warning"] = (
             tuple(StringMessage(data=warning) for warning in warnings) if warnings else ()
         )
-        self._now.published_phase = phase
+        if is_new:
+            self._now.published_phase = phase
 
-    def _stream(self, header: Header) -> None:
+    def _stream(self, header: Header, *, follows: bool) -> None:
         """Send the commands to the arm's controller while it follows, otherwise nothing."""
-        follows = self._engagement.phase is Phase.ENABLED
         for port, positions in self._streams.items():
             self._outputs[port] = (_positions(positions, header),) if follows else ()
 
