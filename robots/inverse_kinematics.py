@@ -50,7 +50,7 @@ class LastFrames:
         self._frames = np.empty(0)
 
     def __call__(self, q: Vector) -> Vector:
-        """Return `SerialChain.frames(q)`, shape (n + 1, 4, 4), of positions of shape (n,): only to be read."""
+        """Return `SerialChain.frames(q)`, shape (n + 1, 4, 4), of `q`, shape (n,): only to be read."""
         if (positions := q.tobytes()) != self._positions:
             self._frames, self._positions = self._chain.frames(q), positions
         return self._frames

@@ -275,7 +275,7 @@ class SerialChain:
         return jacobian
 
     def _jacobian_of_one(self, frames: Vector) -> Vector:
-        """Return the same, shape (6, n), from frames of shape (n + 1, 4, 4): at so few numbers calls count."""
+        """Return the same, shape (6, n), from frames of shape (n + 1, 4, 4): for few numbers, few calls."""
         numbers = frames.reshape(-1)
         arms = numbers.take(self._crossed_tips) - numbers.take(self._crossed_origins)
         one, other = numbers.take(self._crossed_axes) * arms

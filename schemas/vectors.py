@@ -247,7 +247,7 @@ class VectorCodec:
     def _joint_state(self, value: Vector, time_ns: int) -> JointState:
         """Return the positions of joints and the like as a message.
 
-        Commands go as such to the controller of an arm in every step; the vector was checked where it is from.
+        Commands go as such to an arm's controller in every step; the vector was checked where it is from.
         """
         numbers = dict.fromkeys(("position", "velocity", "effort"), _NONE)
         for path, _, block in self._blocks:

@@ -16,9 +16,9 @@ from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, integer, number
 from robots import rotation
+from robots.inverse_kinematics import LastFrames
 from robots.limits import TOLERANCE, distinct
 from schemas.crtk import OperatingState
-from robots.inverse_kinematics import LastFrames
 from schemas.ports import Port
 from schemas.ros import BoolMessage, Header, JointState, Joy, StringMessage, Time
 from schemas.trocar_msgs import ContactModel

@@ -85,7 +85,9 @@ class PoseLaw:
         Arguments are those of `engage` and `robots.inverse_kinematics.pursue`.
         """
         seen = to_base.tobytes()
-        if scale != self.state.scale or (seen != self._to_base.tobytes() and (to_base != self._to_base).any()):
+        if scale != self.state.scale or (
+            seen != self._to_base.tobytes() and (to_base != self._to_base).any()
+        ):
             self.engage(self._hand.copy(), self.goal.copy(), to_base, scale)
         self._hand[:] = hand
         self._find_offset(to_base, seen)
