@@ -92,8 +92,8 @@ def from_matrix(r: Vector) -> Vector:
 def turn_to(goal: Vector, r: Vector) -> tuple[float, float, float]:
     """Return the rotation vector (rad) from the matrix `r`, (3, 3) or the corner of a (4, 4), to `goal`.
 
-    `goal` is a quaternion, shape (4,). The vector is log(product(goal, conjugate(from_matrix(r)))) to the bit, at
-    half of its cost.
+    `goal` is a quaternion, shape (4,). The vector is, to the bit, log(product(goal,
+    conjugate(from_matrix(r)))), at half of its cost.
     """
     x, y, z, w = _from_rows(*r[:3, :3].tolist())
     return _log(*_product(goal.tolist(), (-x, -y, -z, w)))
