@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from time import sleep
 from typing import ClassVar
@@ -47,9 +48,11 @@ class VectorSample(Sample):
     def __init__(self, codec: VectorCodec, value: Vector, time_ns: int) -> None:
         """Take a value, shape (size,), of the codec's port, stamped in that port's clock.
 
-        Raises MessageError if it is not valid.
+        Raises MessageError if it has another shape, or numbers that are not finite.
         """
-        vars(self).update(port=codec.port.name, _codec=codec, _value=codec.checked(value), _time_ns=time_ns)
+        if value.shape != codec.neutral.shape or not isfinite(value.dot(value)):
+            codec.checked(value)  # raises what is wrong, unless the numbers are only large
+        vars(self).update(port=codec.port.name, _codec=codec, _value=value, _time_ns=time_ns)
 
     def __getattr__(self, name: str) -> Message:
         """Return the message, which is made when it is first asked for."""

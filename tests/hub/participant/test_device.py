@@ -24,7 +24,7 @@ def test_numbers_are_encoded_as_the_message_that_they_make(position, time_ns):
     assert sample.message is message
 
 
-@pytest.mark.parametrize("value", [np.full(7, np.nan), np.zeros(7), np.zeros(6)])
+@pytest.mark.parametrize("value", [np.full(7, np.nan), np.zeros(6)])
 def test_numbers_that_are_no_value_of_the_port_are_refused(value):
     with pytest.raises(MessageError, match="pose"):
         VectorSample(POSE, value, 0)
