@@ -249,7 +249,7 @@ class VectorCodec:
 
         Commands go as such to an arm's controller in every step; the vector was checked where it is from.
         """
-        numbers = dict.fromkeys(("position", "velocity", "effort"), _NONE)
+        numbers: dict[str, Vector] = dict.fromkeys(("position", "velocity", "effort"), _NONE)
         for path, _, block in self._blocks:
             numbers[path] = value[block].copy()
         header = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
