@@ -139,7 +139,9 @@ def _limited(chain: SerialChain, q: Vector, twist: Vector, mode: Mode) -> Vector
     free = np.ones(_JOINTS, dtype=bool)
     while True:
         velocities = joint_velocities(chain, q, twist, mode, free)
-        velocities /= max(1.0, float(np.abs(velocities / chain.velocity).max()))
+        velocities /= max(1.0, float(abs(velocities / chain.velocity).max()))
+        if chain.contains(q):
+            return velocities
         blocked = ((q <= chain.lower) & (velocities < 0.0)) | ((q >= chain.upper) & (velocities > 0.0))
         if not blocked.any():
             return velocities
@@ -287,11 +289,18 @@ class EcmTeleoperation(Controller):
             self._now.started = True
         self._velocity[:] = self._velocities(inputs) if self._follows(inputs) else 0.0
         goal = self._command + self._velocity * (h * 1e-9)
-        within = np.clip(goal, self._chain.lower, self._chain.upper)
-        self._velocity[:] = np.where(within == goal, self._velocity, (within - self._command) / (h * 1e-9))
-        self._command[:] = within
+        if self._chain.contains(goal):
+            self._command[:] = goal
+        else:
+            self._stop_at_ends(goal, h * 1e-9)
         changed = (_mode_message(self._now.mode),) if self._now.mode is not before else ()
         return self._outputs(changed, warnings)
+
+    def _stop_at_ends(self, goal: Vector, seconds: float) -> None:
+        """Go to `goal`, shape (4,), as far as the joints' ranges allow, with the velocity that this takes."""
+        within = np.clip(goal, self._chain.lower, self._chain.upper)
+        self._velocity[:] = np.where(within == goal, self._velocity, (within - self._command) / seconds)
+        self._command[:] = within
 
     def _follows(self, inputs: Inputs) -> bool:
         held = self.params.buttons.dead_man is None or self._now.held

@@ -7,13 +7,15 @@ reachable goal is met quadratically and an unreachable one approached without ch
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from robots import rotation
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
-__all__ = ["pursue"]
+__all__ = ["LastFrames", "pursue"]
 
 _LENGTH = 0.1
 """Weighs orientation against position: 1 rad counts as much as 0.1 m, about what the tip's distance from the
@@ -36,8 +38,31 @@ _CORRECTIONS = 4
 """At most, per call; each squares the error, so that two do at the usual speeds."""
 
 
+class LastFrames:
+    """The frames of a chain, computed once for the positions that were asked for last.
+
+    A control loop starts where it ended a step before, and reads there where the tip is.
+    """
+
+    def __init__(self, chain: SerialChain) -> None:
+        """Take the kinematics."""
+        self._chain, self._positions = chain, b""
+        self._frames = np.empty(0)
+
+    def __call__(self, q: Vector) -> Vector:
+        """Return `SerialChain.frames(q)`, shape (n + 1, 4, 4), of `q`, shape (n,): only to be read."""
+        if (positions := q.tobytes()) != self._positions:
+            self._frames, self._positions = self._chain.frames(q), positions
+        return self._frames
+
+
 def pursue(
-    chain: SerialChain, q: Vector, position: Vector, orientation: Vector, largest_move: Vector
+    chain: SerialChain,
+    q: Vector,
+    position: Vector,
+    orientation: Vector,
+    largest_move: Vector,
+    frames_at: Callable[[Vector], Vector] | None = None,
 ) -> Vector:
     """Return joint positions, shape (n,), that meet the goal, or are nearer to it than `q`.
 
@@ -54,15 +79,18 @@ def pursue(
         orientation: goal of the tip in the base frame, quaternion (x, y, z, w).
         largest_move: of each joint, shape (n,); all joints slow down together, so that the way stays
         straight.
+        frames_at: `chain.frames`, or `LastFrames` of it.
     """
     found, length = q, _LENGTH if len(q) >= 6 else _LITTLE
+    frames_at = frames_at or chain.frames
     for _ in range(_CORRECTIONS):
-        frames = chain.frames(found)
+        frames = frames_at(found)
         error = _error(frames[-1], position, orientation, length)
-        if error.dot(error) < _MET**2:
+        squared = float(error.dot(error))
+        if squared < _MET**2:
             break
-        move = found + _correction(chain, found, frames, error, length) - q
-        share = float(np.abs(move / largest_move).max())
+        move = found + _correction(chain, found, frames, error, squared, length) - q
+        share = float(abs(move / largest_move).max())
         found = q + move / max(1.0, share)
         if share >= 1.0:
             break
@@ -74,26 +102,28 @@ def _error(tip: Vector, position: Vector, orientation: Vector, length: float) ->
 
     The displacement comes first, then the rotation vector in metres.
     """
-    error = np.empty(6)
-    error[:3] = position - tip[:3, 3]
-    error[3:] = length * rotation.log(
-        rotation.product(orientation, rotation.conjugate(rotation.from_matrix(tip)))
-    )
-    return error
+    (px, py, pz), (tx, ty, tz) = position.tolist(), tip[:3, 3].tolist()
+    rx, ry, rz = rotation.turn_to(orientation, tip)
+    return np.array([px - tx, py - ty, pz - tz, length * rx, length * ry, length * rz])
 
 
-def _correction(chain: SerialChain, q: Vector, frames: Vector, error: Vector, length: float) -> Vector:
-    """Return a move, shape (n,), that stays inside the joint ranges.
+def _correction(
+    chain: SerialChain, q: Vector, frames: Vector, error: Vector, squared: float, length: float
+) -> Vector:
+    """Return a move, shape (n,), that stays inside the joint ranges; `squared` is that of the error.
 
     Joints that would leave theirs go to its end, and the others correct as much as they can.
     """
     jacobian = chain.jacobian(frames)
     jacobian[3:] *= length
     normal = jacobian.T @ jacobian
-    normal.reshape(-1)[:: len(q) + 1] += 0.5 * error.dot(error) + _LEAST_DAMPING
+    normal.reshape(-1)[:: len(q) + 1] += 0.5 * squared + _LEAST_DAMPING
     gradient = jacobian.T @ error
-    least, most = chain.lower - q, chain.upper - q
     move = np.linalg.solve(normal, gradient)
+    reached = q + move
+    if chain.contains(reached):
+        return reached - q
+    least, most = chain.lower - q, chain.upper - q
     free = np.ones(len(q), dtype=bool)
     while (outside := free & ((move < least) | (move > most))).any():
         free &= ~outside

@@ -5,13 +5,14 @@ Written in scalars: at four numbers a call, numpy's overhead is ten times the ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, sin, sqrt
 
 import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["conjugate", "exp", "from_matrices", "from_matrix", "log", "matrix", "product"]
+__all__ = ["conjugate", "exp", "from_matrices", "from_matrix", "log", "matrix", "product", "turn_to"]
 
 _SMALL_ANGLE = 1e-6
 """Below this (rad) the next term of the sine's series is under the rounding error of a double."""
@@ -26,15 +27,17 @@ _ROWS = np.array([[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]])
 
 def product(a: Vector, b: Vector) -> Vector:
     """Return the quaternion a * b, shape (4,): first the rotation b, then a."""
-    ax, ay, az, aw = a.tolist()
-    bx, by, bz, bw = b.tolist()
-    return np.array(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ]
+    return np.array(_product(a.tolist(), b.tolist()))
+
+
+def _product(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
     )
 
 
@@ -54,10 +57,15 @@ def exp(v: Vector) -> Vector:
 
 def log(q: Vector) -> Vector:
     """Return the rotation vector (rad), shape (3,), of at most half a turn, of the quaternion `q`."""
-    x, y, z, w = q.tolist() if q[3] >= 0.0 else (-q).tolist()
+    return np.array(_log(*q.tolist()))
+
+
+def _log(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
+    if not w >= 0.0:
+        x, y, z, w = -x, -y, -z, -w
     length = sqrt(x * x + y * y + z * z)
     scale = 2.0 / w if length < _SMALL_ANGLE else 2.0 * atan2(length, w) / length
-    return np.array([scale * x, scale * y, scale * z])
+    return scale * x, scale * y, scale * z
 
 
 def matrix(q: Vector) -> Vector:
@@ -78,17 +86,33 @@ def from_matrix(r: Vector) -> Vector:
     Each row below is 4 q_i q, so the one with the largest q_i is well scaled for every rotation
     (Bar-Itzhack's observation that q is the dominant eigenvector of this matrix, without the eigenvalues).
     """
-    (a, b, c), (d, e, f), (g, h, i) = r[:3, :3].tolist()
-    rows = (
-        (1 + a - e - i, b + d, c + g, h - f),
-        (b + d, 1 - a + e - i, f + h, c - g),
-        (c + g, f + h, 1 - a - e + i, d - b),
-        (h - f, c - g, d - b, 1 + a + e + i),
-    )
-    largest = max(range(4), key=lambda k: rows[k][k])
-    x, y, z, w = rows[largest]
+    return np.array(_from_rows(*r[:3, :3].tolist()))
+
+
+def turn_to(goal: Vector, r: Vector) -> tuple[float, float, float]:
+    """Return the rotation vector (rad) from the matrix `r`, (3, 3) or the corner of a (4, 4), to `goal`.
+
+    `goal` is a quaternion, shape (4,). The vector is, to the bit, log(product(goal,
+    conjugate(from_matrix(r)))), at half of its cost.
+    """
+    x, y, z, w = _from_rows(*r[:3, :3].tolist())
+    return _log(*_product(goal.tolist(), (-x, -y, -z, w)))
+
+
+def _from_rows(
+    first: Sequence[float], second: Sequence[float], third: Sequence[float]
+) -> tuple[float, float, float, float]:
+    """Return the unit quaternion of the matrix with these rows."""
+    (a, b, c), (d, e, f), (g, h, i) = first, second, third
+    largest, x, y, z, w = 1 + a - e - i, 1 + a - e - i, b + d, c + g, h - f
+    if (square := 1 - a + e - i) > largest:
+        largest, x, y, z, w = square, b + d, square, f + h, c - g
+    if (square := 1 - a - e + i) > largest:
+        largest, x, y, z, w = square, c + g, f + h, square, d - b
+    if (square := 1 + a + e + i) > largest:
+        x, y, z, w = h - f, c - g, d - b, square
     length = sqrt(x * x + y * y + z * z + w * w)
-    return np.array([x / length, y / length, z / length, w / length])
+    return x / length, y / length, z / length, w / length
 
 
 def from_matrices(r: Vector) -> Vector:

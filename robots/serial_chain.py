@@ -132,6 +132,12 @@ class SerialChain:
         self.basis = basis.reshape(len(self.joints), 3, 16)
         """Of the links' transforms, whose factors are 1, cos q or 0, and sin q or q."""
         self._factors = np.ones((len(self.joints), 1, 3))
+        # Where the factors of the Jacobian's cross products are in the numbers of `frames`, (2, 3, n) each.
+        at = np.arange(0, 16 * len(self.joints), 16) + np.arange(0, 12, 4)[:, None]  # (3, n): first column
+        self._axes = at + 2
+        self._crossed_axes = np.stack([at[_YZX], at[_ZXY]]) + 2
+        self._crossed_origins = np.stack([at[_ZXY], at[_YZX]]) + 3
+        self._crossed_tips = self._crossed_origins % 16 + 16 * len(self.joints)
 
     @classmethod
     def from_standard(cls, joints: Sequence[Joint], tip: Vector) -> SerialChain:
@@ -221,13 +227,13 @@ class SerialChain:
 
         Raises MotionError as `check` does.
         """
-        if q.shape == self.lower.shape and self._is_inside(q):
+        if q.shape == self.lower.shape and self.contains(q):
             return q
         self.check(q)
         return np.clip(q, self.lower, self.upper)
 
-    def _is_inside(self, q: Vector) -> bool:
-        """Say whether each position is a number inside its range, not at an end of it."""
+    def contains(self, q: Vector) -> bool:
+        """Say whether each position of `q`, shape (n,), is a number inside its range, not at an end of it."""
         for value, (lower, upper) in zip(q.tolist(), self._ranges, strict=True):
             if not lower < value < upper:
                 return False
@@ -254,6 +260,8 @@ class SerialChain:
                 instead
                 (jhu-cisst/cisst, cisstRobot/code/robManipulator.cpp, JacobianSpatial).
         """
+        if frames.ndim == 3 and frame == "base":
+            return self._jacobian_of_one(frames)
         axes = frames[..., :-1, :3, 2]  # (..., n, 3)
         arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]  # (..., n, 3)
         across = axes.take(_YZX, -1) * arms.take(_ZXY, -1) - axes.take(_ZXY, -1) * arms.take(_YZX, -1)
@@ -267,6 +275,19 @@ class SerialChain:
             to_tip = frames[..., -1, :3, :3].swapaxes(-1, -2)
             jacobian[..., :3, :] = to_tip @ jacobian[..., :3, :]
             jacobian[..., 3:, :] = to_tip @ jacobian[..., 3:, :]
+        return jacobian
+
+    def _jacobian_of_one(self, frames: Vector) -> Vector:
+        """Return the same, shape (6, n), from frames of shape (n + 1, 4, 4): for few numbers, few calls."""
+        numbers = frames.reshape(-1)
+        arms = numbers.take(self._crossed_tips) - numbers.take(self._crossed_origins)
+        one, other = numbers.take(self._crossed_axes) * arms
+        jacobian = np.empty((6, len(self.joints)))
+        np.subtract(one, other, out=jacobian[:3])
+        jacobian[3:] = numbers.take(self._axes)
+        for joint in self.prismatic:
+            jacobian[:3, joint] = jacobian[3:, joint]
+            jacobian[3:, joint] = 0.0
         return jacobian
 
 

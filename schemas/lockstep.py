@@ -15,12 +15,23 @@ from typing import NamedTuple
 
 from schemas.codec import decode, encode
 from schemas.errors import MessageError
+from schemas.message import Bytes
 from schemas.trocar_msgs import AckMessage, GrantMessage, InletSample
 
-__all__ = ["Ack", "Grant", "pack_ack", "pack_grant", "unpack_ack", "unpack_grant"]
+__all__ = ["Ack", "Entering", "Grant", "pack_ack", "pack_grant", "unpack_ack", "unpack_grant"]
 
 _CDR = b"\x00\x01\x00\x00"
 _GRANT = struct.Struct("<4sQI4xqqqI")
+
+
+class Entering(NamedTuple):
+    """An `InletSample` as the step loop makes it: at a fifth of the cost of a message."""
+
+    participant: str
+    port: str
+    stale: bool
+    payload: Bytes
+    age_ns: int
 
 
 class Grant(NamedTuple):
@@ -31,7 +42,7 @@ class Grant(NamedTuple):
     step: int
     start_ns: int
     horizon_ns: int
-    inlets: Sequence[InletSample] = ()
+    inlets: Sequence[InletSample | Entering] = ()
 
 
 class Ack(NamedTuple):
@@ -52,7 +63,7 @@ class Ack(NamedTuple):
 def pack_grant(grant: Grant) -> bytes:
     """Return a `GrantMessage` in CDR."""
     if grant.inlets:
-        return encode(GrantMessage.model_construct(**grant._asdict()))
+        return encode(GrantMessage.model_construct(**grant._asdict()))  # which reads attributes alone
     return _GRANT.pack(_CDR, *grant[:5], 0)
 
 

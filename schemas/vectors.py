@@ -54,6 +54,7 @@ _LAYOUTS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 
 _QUATERNION_TOLERANCE = 1e-3
 _NANOSEC = struct.Struct("<I")
+_NONE: Vector = np.zeros(0)
 
 
 def has_vector(type_name: str) -> bool:
@@ -90,6 +91,7 @@ class VectorCodec:
         self._is_pose = "pose.orientation" in self.fields
         if self._is_pose:
             self.neutral[6] = 1.0
+        self._has_stamp = "header" in self.model.model_fields
         self._compile()
 
     def _layout(self) -> Iterator[tuple[str, tuple[str, ...], slice]]:
@@ -119,7 +121,6 @@ class VectorCodec:
         ]
         self.spans = [(start, start + end - begin, slice(begin, end)) for start, begin, end in starts]
         """Where each block begins and ends in the message, and which of the vector's bytes it is."""
-        self._has_stamp = "header" in self.model.model_fields
         self.stamp = slice(4, 12) if self._has_stamp else None
         """Where the stamp is in the message: seconds (int32) and nanoseconds (uint32)."""
         self._fixed: list[tuple[int, int, bytes]] = []
@@ -156,10 +157,20 @@ class VectorCodec:
             raise MessageError(
                 f"port '{self.port.name}': {len(payload)} bytes, a {self.port.type} here has {self._length}"
             )
-        if not self.fits(payload):
+        found = self.found(payload)
+        if found is None:
             raise MessageError(
                 f"port '{self.port.name}': frame, names or layout differ from what the port declares"
             )
+        return found
+
+    def found(self, payload: bytes) -> Vector | None:
+        """Return the vector, shape (size,), in bytes of which `fits` is true; otherwise None.
+
+        Raises MessageError for numbers that are not valid.
+        """
+        if not self.fits(payload):
+            return None
         # a third of the cost of np.concatenate
         numbers = bytearray().join([payload[start:stop] for start, stop, _ in self.spans])
         return self.checked(np.frombuffer(numbers))
@@ -198,7 +209,10 @@ class VectorCodec:
             self._has_stamp and not _NANOSEC.unpack_from(payload, 8)[0] < 10**9
         ):
             return False
-        return all(payload[start:stop] == expected for start, stop, expected in self._fixed)
+        for start, stop, expected in self._fixed:  # noqa: SIM110 - a generator would double the cost
+            if payload[start:stop] != expected:
+                return False
+        return True
 
     def checked(self, value: Vector) -> Vector:
         """Return `value` if it is valid: float64 of the right shape, finite, any quaternion a unit one."""
@@ -216,12 +230,12 @@ class VectorCodec:
         return value
 
     def to_message(self, value: Vector, time_ns: int) -> Message:
-        """Return `value`, shape (size,), as a message."""
-        tree: dict[str, Any] = {}
-        if "header" in self.model.model_fields:
-            tree["header"] = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
+        """Return `value`, shape (size,), as a message; that of joints is not validated."""
         if self.port.type == JointState.ros_type:
-            tree["name"] = list(self.port.names)
+            return self._joint_state(value, time_ns)
+        tree: dict[str, Any] = {}
+        if self._has_stamp:
+            tree["header"] = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
         if self.port.shape:
             tree["layout"] = _layout_of(self.port.shape)
         for path, names, block in self._blocks:
@@ -232,6 +246,17 @@ class VectorCodec:
                 content = float(numbers[0])
             reduce(lambda node, key: node.setdefault(key, {}), parents, tree)[leaf] = content
         return self.model.model_validate(tree)
+
+    def _joint_state(self, value: Vector, time_ns: int) -> JointState:
+        """Return the positions of joints and the like as a message.
+
+        Commands go as such to an arm's controller in every step; the vector was checked where it is from.
+        """
+        numbers: dict[str, Vector] = dict.fromkeys(("position", "velocity", "effort"), _NONE)
+        for path, _, block in self._blocks:
+            numbers[path] = value[block].copy()
+        header = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
+        return JointState.model_construct(header=header, name=list(self.port.names), **numbers)
 
     def from_message(self, message: Message) -> Vector:
         """Return the vector, shape (size,), of a validated message from outside.

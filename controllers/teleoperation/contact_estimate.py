@@ -71,22 +71,24 @@ class ContactEstimate(Record):
             scale: metres of the tip per metre of the hand.
             elapsed: time since the last call, s.
         """
+        mean_tip, mean_force = self.tip, self.force
         if not self.started:
-            self.tip[:], self.started = tip, True
+            mean_tip[:], self.started = tip, True
         share = 1.0 - exp(-elapsed / _MEAN)
-        move = share * (tip - self.tip)
-        self.tip += move
-        self.force += share * (force - self.force)
-        if self.known:
+        move = share * (tip - mean_tip)
+        mean_tip += move
+        mean_force += share * (force - mean_force)
+        known = self.known
+        if known:
             self._follow(move)
-        size = _length(self.force)
+        size = _length(mean_force)
         if size < _TOUCH:
             self.tip_depth = min(self.tip_depth, 0.0)
-            if _length(self.tip - self.touched) > _REACH * scale:
+            if known and _length(mean_tip - self.touched) > _REACH * scale:
                 self.known, self.stiffness, self.friction = False, 0.0, 0.0
             return
-        self._turn(self.force / size)
-        self.touched[:], self.known = self.tip, True
+        self._turn(mean_force / size)
+        self.touched[:], self.known = mean_tip, True
         push = float(self.normal @ self.force)
         depth = self.tip_depth = max(self.tip_depth, push / _STIFFEST)
         across = _length(self.force - push * self.normal)

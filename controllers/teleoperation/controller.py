@@ -16,6 +16,7 @@ from controllers.teleoperation.velocity_law import advance, twist_in_tip
 from controllers.teleoperation.view import View
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, flag, integer, number
 from robots import rotation
+from robots.inverse_kinematics import LastFrames
 from robots.limits import TOLERANCE, distinct
 from schemas.crtk import OperatingState
 from schemas.ports import Port
@@ -28,6 +29,7 @@ __all__ = ["Teleoperation"]
 _POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
 """Of a pose."""
 _FOLLOWS, _HOLDS = BoolMessage(data=True), BoolMessage(data=False)
+_NONE = np.zeros(0)
 
 
 class TeleoperationState(Record):
@@ -69,8 +71,11 @@ class Teleoperation(Controller):
     def __init__(self, name: str, params: TeleoperationParams) -> None:
         super().__init__(name, params)
         self._chain, n = params.chain, len(params.chain.joints)
+        self._frames = LastFrames(self._chain)
         self._law = (
-            PoseLaw(params.chain, turns=params.orientation == "follow") if params.law == "pose" else None
+            PoseLaw(self._chain, turns=params.orientation == "follow", frames=self._frames)
+            if params.law == "pose"
+            else None
         )
         self._view, self._engagement = View(params), Engagement(params)
         self._ghost = None if params.tool.jaw is None else JawGhost(params.tool.jaw)
@@ -127,14 +132,17 @@ class Teleoperation(Controller):
         hand = inputs["master"][3:]
         fresh = not inputs.stale("master") and (self._law is not None or not inputs.stale("master_twist"))
         self._engagement.step(to_base, hand, self._tip[3:], gripper, seconds, fresh=fresh)
-        if self._engagement.phase is Phase.ENABLED:
+        phase = self._engagement.phase
+        follows = phase is Phase.ENABLED
+        if follows:
             self._lead(inputs, to_base, seconds)
-        self._lead_jaw(gripper, seconds)
-        self._publish(warnings + self._engagement.warnings)
-        self._stream(Time.from_ns(t + h))
+        self._lead_jaw(gripper, seconds, follows=follows)
+        self._publish(phase, warnings + self._engagement.warnings)
+        header = Header.model_construct(stamp=Time.from_ns(t + h), frame_id="")
+        self._stream(header, follows=follows)
         period = max(self.params.contact_period, h)
         if not (t + h) % period:
-            self._outputs["contact"] = self._feel(inputs, to_base, Time.from_ns(t + h), period * 1e-9)
+            self._outputs["contact"] = self._feel(inputs, to_base, header, period * 1e-9)
         return self._outputs
 
     def restore(self, state: bytes) -> None:
@@ -148,8 +156,10 @@ class Teleoperation(Controller):
 
         An arm with a controller of its own may be moved by others meanwhile.
         """
-        follows = self._engagement.phase is Phase.ENABLED
-        return self._now.started and self._engagement.arm_is_ready and (follows or not self._now.shared)
+        engagement, now = self._engagement, self._now
+        return (
+            now.started and engagement.arm_is_ready and (engagement.phase is Phase.ENABLED or not now.shared)
+        )
 
     def _receive(self, inputs: Inputs) -> None:
         """Read the state of the arm, locks and buttons."""
@@ -185,12 +195,15 @@ class Teleoperation(Controller):
         if (command := self._command.tobytes()) == self._found:
             return
         self._found = command
-        tip = self._chain.forward(self._command)
+        tip = self._frames(self._command)[-1]
         self._tip[:3], self._tip[3:] = tip[:3, 3], rotation.from_matrix(tip)
 
     def _set_scale(self, scale: float) -> list[str]:
         """Set the scale; return why it is refused, once."""
-        is_new, self._now.requested_scale = scale != self._now.requested_scale, scale
+        is_new = scale != self._now.requested_scale
+        if not is_new and scale == self._now.scale:
+            return []
+        self._now.requested_scale = scale
         if 0.0 < scale <= 1.0 + TOLERANCE:
             self._now.scale = min(scale, 1.0)
             return []
@@ -200,55 +213,57 @@ class Teleoperation(Controller):
 
     def _lead(self, inputs: Inputs, to_base: Vector, seconds: float) -> None:
         """Let the command follow the hand."""
-        hand, scale = inputs["master"], self._now.scale
+        now, hand = self._now, inputs["master"]
+        scale = now.scale
         if self._law is None:
             twist = twist_in_tip(hand[3:], inputs["master_twist"], scale)
             self._command[:] = advance(self._chain, self._command, twist, seconds)
             self._find_tip()
             return
-        if self._engagement.takes_over or self._now.relocked:
-            self._hand[:], self._now.relocked = hand, False
+        if self._engagement.takes_over or now.relocked:
+            self._hand[:], now.relocked = hand, False
             self._law.engage(hand, self._tip, to_base, scale)
-        if not self._now.rotation_locked:
+        turns, moves = not now.rotation_locked, not now.translation_locked
+        if turns and moves:
+            self._hand[:] = hand
+        elif turns:
             self._hand[_ORIENTATION] = hand[_ORIENTATION]
-        if not self._now.translation_locked:
+        elif moves:
             self._hand[_POSITION] = hand[_POSITION]
         self._command[:] = self._law.step(
             self._command, self._hand, self._tip, to_base, scale, seconds * self._chain.velocity
         )
         self._find_tip()
 
-    def _lead_jaw(self, gripper: float, seconds: float) -> None:
+    def _lead_jaw(self, gripper: float, seconds: float, *, follows: bool) -> None:
         """Let the jaw follow with the arm, and hold with it."""
         if self._ghost is None:
             return
-        if self._engagement.phase is Phase.ENABLED:
+        if follows:
             self._ghost.follow(gripper, seconds)
         else:
             self._ghost.release()
         self._jaw[:1] = self._ghost.angle
 
-    def _publish(self, warnings: list[str]) -> None:
+    def _publish(self, phase: Phase, warnings: list[str]) -> None:
         """Publish what the arm does."""
-        phase = self._engagement.phase
         follows = phase is Phase.ENABLED
         self._goal[:] = self._law.goal if follows and self._law is not None else self._tip
         self._outputs["following"] = _FOLLOWS if follows else _HOLDS
-        self._outputs["state"] = (
-            () if phase == self._now.published_phase else (StringMessage(data=phase.name),)
-        )
+        is_new = phase != self._now.published_phase
+        self._outputs["state"] = (StringMessage(data=phase.name),) if is_new else ()
         self._outputs["warning"] = (
             tuple(StringMessage(data=warning) for warning in warnings) if warnings else ()
         )
-        self._now.published_phase = phase
+        if is_new:
+            self._now.published_phase = phase
 
-    def _stream(self, stamp: Time) -> None:
+    def _stream(self, header: Header, *, follows: bool) -> None:
         """Send the commands to the arm's controller while it follows, otherwise nothing."""
-        follows = self._engagement.phase is Phase.ENABLED
         for port, positions in self._streams.items():
-            self._outputs[port] = (_positions(positions, stamp),) if follows else ()
+            self._outputs[port] = (_positions(positions, header),) if follows else ()
 
-    def _feel(self, inputs: Inputs, to_base: Vector, stamp: Time, elapsed: float) -> ContactModel:
+    def _feel(self, inputs: Inputs, to_base: Vector, header: Header, elapsed: float) -> ContactModel:
         """Return what the hand feels, `elapsed` seconds after the last time."""
         hand, tip = inputs["master"], self._tip
         if self._law is None:  # as the hand's own frame is the tip's own
@@ -263,20 +278,11 @@ class Teleoperation(Controller):
             rigid_wrench=inputs["rigid_wrench"],
             elapsed=elapsed,
         )
-        return ContactModel.model_construct(header=_header(stamp), planes=planes)
+        return ContactModel.model_construct(header=header, planes=planes)
 
 
-def _header(stamp: Time) -> Header:
-    return Header.model_construct(stamp=stamp, frame_id="")
-
-
-def _positions(values: Vector, stamp: Time) -> JointState:
+def _positions(values: Vector, header: Header) -> JointState:
     """Return joint positions as a message, without validation: they are within the joints' ranges."""
-    none = np.zeros(0)
     return JointState.model_construct(
-        header=_header(stamp),
-        name=[],
-        position=values.copy(),
-        velocity=none,
-        effort=none,
+        header=header, name=[], position=values.copy(), velocity=_NONE, effort=_NONE
     )

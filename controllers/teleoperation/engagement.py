@@ -105,22 +105,25 @@ class Engagement:
             fresh: whether the hand's pose is.
         """
         self.warnings = []
-        before = self.phase
-        if self._must_hold and not fresh and not self._now.lost:
-            self._now.pressed = False  # until the button is received again
-        self._now.lost = not fresh
-        self._now.phase = self._decide(to_base, hand, tip, gripper, h, fresh=fresh)
-        if self.phase is Phase.DISABLED and before is not Phase.DISABLED:
+        now, before = self._now, self._now.phase
+        if fresh is now.lost:  # it was not, or is no longer
+            if self._must_hold and not fresh:
+                now.pressed = False  # until the button is received again
+            now.lost = not fresh
+        phase = self._decide(to_base, hand, tip, gripper, h, fresh=fresh)
+        if phase is not before:
+            now.phase = phase
+        if phase is Phase.DISABLED and before is not Phase.DISABLED:
             reason = (
                 f"its master has been silent for more than {self._max_age / 1e6:g} ms"
                 if self.arm_is_ready
                 else "it is not ENABLED and homed"
             )
             self.warnings.append(f"{self._arm} holds: {reason}")
-        self.takes_over = self.phase is Phase.ENABLED and (
-            before is not Phase.ENABLED or self._now.interrupted
-        )
-        self._now.interrupted = False
+        interrupted = now.interrupted
+        self.takes_over = phase is Phase.ENABLED and (before is not Phase.ENABLED or interrupted)
+        if interrupted:
+            now.interrupted = False
 
     def _decide(
         self, to_base: Vector, hand: Vector, tip: Vector, gripper: float, h: float, *, fresh: bool

@@ -15,10 +15,13 @@ past half a turn the nearest way there is the other way round.
 from __future__ import annotations
 
 from math import radians, sqrt
+from operator import mul
+
+import numpy as np
 
 from hub.participant import Record, array, number
 from robots import rotation
-from robots.inverse_kinematics import pursue
+from robots.inverse_kinematics import LastFrames, pursue
 from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
@@ -26,6 +29,8 @@ __all__ = ["PoseLaw"]
 
 _MOST_LAG = radians(90.0)
 """Of the tip's orientation behind its goal: half of where it would turn round; ours."""
+_LITTLE_LAG = 0.75
+"""Cosine of half an angle well below that."""
 
 
 class PoseLawState(Record):
@@ -45,13 +50,19 @@ class PoseLawState(Record):
 class PoseLaw:
     """From poses of the hand to joint positions."""
 
-    def __init__(self, chain: SerialChain, *, turns: bool) -> None:
-        """Take the arm's kinematics, and whether the tip turns with the hand or keeps its orientation."""
-        self._chain, self._turns = chain, turns
+    def __init__(self, chain: SerialChain, *, turns: bool, frames: LastFrames | None = None) -> None:
+        """Take the arm's kinematics, and whether the tip turns with the hand or keeps its orientation.
+
+        `frames` are those of the command, where somebody else reads them too.
+        """
+        self._chain, self._turns, self._frames = chain, turns, frames or LastFrames(chain)
         self.state = PoseLawState()
         self.goal, self._hand, self._to_base = self.state.goal, self.state.hand, self.state.to_base
         self._hand0, self._tip0 = self.state.hand_reference, self.state.tip_reference
         self.goal[6] = self._to_base[3] = 1.0
+        self._found: tuple[bytes, ...] = ()
+        """The reference that the next two follow from."""
+        self._turn_to_base, self._offset = np.eye(3), np.zeros(4)
 
     def engage(self, hand: Vector, tip: Vector, to_base: Vector, scale: float) -> None:
         """Take the reference: the hand at `hand` is the tip at `tip`, both (x, y, z, qx, qy, qz, qw).
@@ -73,20 +84,38 @@ class PoseLaw:
 
         Arguments are those of `engage` and `robots.inverse_kinematics.pursue`.
         """
-        if scale != self.state.scale or (to_base != self._to_base).any():
+        seen = to_base.tobytes()
+        if scale != self.state.scale or (
+            seen != self._to_base.tobytes() and (to_base != self._to_base).any()
+        ):
             self.engage(self._hand.copy(), self.goal.copy(), to_base, scale)
         self._hand[:] = hand
-        self.goal[:3] = self._tip0[:3] + scale * (
-            rotation.matrix(self._to_base) @ (hand[:3] - self._hand0[:3])
-        )
+        self._find_offset(to_base, seen)
+        goal = self.goal
+        goal[:3] = self._tip0[:3] + scale * (self._turn_to_base @ (hand[:3] - self._hand0[:3]))
         if self._turns:
-            offset = rotation.product(
-                rotation.conjugate(rotation.product(to_base, self._hand0[3:])), self._tip0[3:]
-            )
-            goal = rotation.product(rotation.product(to_base, hand[3:]), offset)
-            self.goal[3:] = goal / sqrt(goal.dot(goal))
-            lag = rotation.log(rotation.product(self.goal[3:], rotation.conjugate(tip[3:])))
-            if (angle := sqrt(lag.dot(lag))) > _MOST_LAG:
-                self.goal[3:] = rotation.product(rotation.exp(lag * (_MOST_LAG / angle)), tip[3:])
-                self.engage(hand, self.goal.copy(), to_base, scale)
-        return pursue(self._chain, command, self.goal[:3], self.goal[3:], largest_move)
+            turned = rotation.product(rotation.product(to_base, hand[3:]), self._offset)
+            goal[3:] = turned / sqrt(turned.dot(turned))
+            # of an angle below 83 degrees, whose half has a cosine above 0.75, nothing more is to be known
+            if not abs(sum(map(mul, goal[3:].tolist(), tip[3:].tolist()))) > _LITTLE_LAG:
+                self._limit_lag(hand, tip, to_base, scale)
+        return pursue(self._chain, command, goal[:3], goal[3:], largest_move, self._frames)
+
+    def _find_offset(self, to_base: Vector, seen: bytes) -> None:
+        """Compute what follows from the reference, unless that has the bits of the last time.
+
+        `seen` are the bits of `to_base`, which may differ from those in the state by a sign of zero.
+        """
+        reference = seen, self._to_base.tobytes(), self._hand0.tobytes(), self._tip0.tobytes()
+        if reference == self._found:
+            return
+        self._found, self._turn_to_base = reference, rotation.matrix(self._to_base)
+        hand0 = rotation.product(to_base, self._hand0[3:])
+        self._offset = rotation.product(rotation.conjugate(hand0), self._tip0[3:])
+
+    def _limit_lag(self, hand: Vector, tip: Vector, to_base: Vector, scale: float) -> None:
+        """Bring the goal's orientation back to where it is not too far from the tip's, as a new reference."""
+        lag = rotation.log(rotation.product(self.goal[3:], rotation.conjugate(tip[3:])))
+        if (angle := sqrt(lag.dot(lag))) > _MOST_LAG:
+            self.goal[3:] = rotation.product(rotation.exp(lag * (_MOST_LAG / angle)), tip[3:])
+            self.engage(hand, self.goal.copy(), to_base, scale)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from devices.samples import clock_of
-from devices.vendor_axes import Vector3
-from hub.participant import Sample
-from schemas.ports import Port
-from schemas.ros import Header, Joy, PoseStamped, Time, TwistStamped, Wrench, WrenchStamped
-from schemas.ros import Vector3 as Vector3Message
-from schemas.trocar_msgs import ContactModel
+import numpy as np
 
-__all__ = ["StylusPorts", "force_sample", "stylus_ports"]
+from devices.samples import clock_of
+from devices.vendor_axes import Quaternion, Vector3
+from hub.participant import Sample, VectorSample
+from schemas.ports import Port
+from schemas.ros import Joy, PoseStamped, TwistStamped, WrenchStamped
+from schemas.trocar_msgs import ContactModel
+from schemas.vectors import VectorCodec
+
+__all__ = ["StylusPorts", "StylusSamples", "stylus_ports"]
 
 
 class StylusPorts(NamedTuple):
@@ -72,8 +74,21 @@ def stylus_ports(participant: str, stylus: str, *, simulated_time: bool, max_age
     )
 
 
-def force_sample(port: Port, time_ns: int, force: Vector3) -> Sample:
-    """Return the force (N) on a hand, in the port's frame at `time_ns` of the port's clock."""
-    x, y, z = force
-    header = Header(stamp=Time.from_ns(time_ns), frame_id=port.frame)
-    return Sample(port.name, WrenchStamped(header=header, wrench=Wrench(force=Vector3Message(x=x, y=y, z=z))))
+class StylusSamples:
+    """What a stylus samples at every reading, in the frame of its ports, at a time (ns) of their clock."""
+
+    def __init__(self, ports: StylusPorts) -> None:
+        """Take the ports."""
+        self._pose, self._twist, self._force = map(VectorCodec, (ports.pose, ports.twist, ports.force))
+
+    def pose(self, time_ns: int, position: Vector3, orientation: Quaternion) -> Sample:
+        """Return the pose of the tip, m and quaternion (x, y, z, w)."""
+        return VectorSample(self._pose, np.array((*position, *orientation)), time_ns)
+
+    def twist(self, time_ns: int, linear: Vector3, angular: Vector3) -> Sample:
+        """Return the velocity (m/s) of the tip and its angular velocity (rad/s)."""
+        return VectorSample(self._twist, np.array((*linear, *angular)), time_ns)
+
+    def force(self, time_ns: int, force: Vector3) -> Sample:
+        """Return the force (N) on the hand."""
+        return VectorSample(self._force, np.array((*force, 0.0, 0.0, 0.0)), time_ns)

@@ -12,7 +12,7 @@ import numpy as np
 from devices.diagnosis import Diagnosis
 from devices.haptics.contact import ZERO, planes_of
 from devices.haptics.limits import TOUCH, DeviceLimits
-from devices.haptics.ports import force_sample, stylus_ports
+from devices.haptics.ports import StylusSamples, stylus_ports
 from devices.openhaptics import diagnoses
 from devices.openhaptics.exchange import State, model_doubles
 from devices.openhaptics.hdapi import find
@@ -20,7 +20,7 @@ from devices.openhaptics.params import StylusParams, TouchParams
 from devices.openhaptics.process import ServoProcess
 from devices.openhaptics.stylus import Phase
 from devices.openhaptics.supervisor import Lost, Supervisor
-from devices.samples import button_sample, pose_sample, twist_sample
+from devices.samples import button_sample
 from hub.participant import Device, Params, Sample, Value
 from robots import rotation
 from schemas.errors import MessageError, ScenarioError
@@ -127,6 +127,7 @@ class _Stylus:
     def __init__(self, participant: str, stylus: str, params: StylusParams, max_age_ns: int) -> None:
         self._name, self._params = stylus, params
         self._ports = stylus_ports(participant, stylus, simulated_time=False, max_age_ns=max_age_ns)
+        self._samples = StylusSamples(self._ports)
         self._diagnosis = Diagnosis(f"{participant}/{stylus}", f"{stylus}/diagnostics")
         self.ports = (*self._ports, self._diagnosis.port)
         self._hardware = self._refusal = ""
@@ -193,9 +194,9 @@ class _Stylus:
         time_ns = self._time_ns(state, offset_ns)
         x, y, z, w = rotation.from_matrix(np.array(state.rotation).reshape(3, 3)).tolist()
         return [
-            pose_sample(self._ports.pose, time_ns, state.position, (x, y, z, w)),
-            twist_sample(self._ports.twist, time_ns, state.linear, state.angular),
-            force_sample(self._ports.force, time_ns, state.force),
+            self._samples.pose(time_ns, state.position, (x, y, z, w)),
+            self._samples.twist(time_ns, state.linear, state.angular),
+            self._samples.force(time_ns, state.force),
             *diagnosis,
         ]
 
@@ -204,7 +205,7 @@ class _Stylus:
         if not self._posed:
             return []
         self._posed = False
-        return [force_sample(self._ports.force, self._stamp_ns, ZERO)]
+        return [self._samples.force(self._stamp_ns, ZERO)]
 
     def _time_ns(self, state: State, offset_ns: int) -> int:
         self._stamp_ns = max(self._stamp_ns, round(state.time * 1e9) + offset_ns)

@@ -13,9 +13,9 @@ from devices.haptics.contact import Plane, planes_of
 from devices.haptics.diagnoses import FORCE_DIAGNOSES
 from devices.haptics.limits import TOUCH
 from devices.haptics.loop import HapticLoop
-from devices.haptics.ports import StylusPorts, force_sample, stylus_ports
+from devices.haptics.ports import StylusPorts, StylusSamples, stylus_ports
 from devices.haptics.safety import Condition
-from devices.samples import button_sample, pose_sample, twist_sample
+from devices.samples import button_sample
 from devices.simulated_touch.hand import Hand
 from devices.simulated_touch.params import SimulatedStylusParams, SimulatedTouchParams
 from devices.simulated_touch.path import recorded, scripted
@@ -97,7 +97,7 @@ class _Stylus:
     def __init__(
         self, participant: str, stylus: str, params: SimulatedStylusParams, ports: StylusPorts
     ) -> None:
-        self._ports = ports
+        self._ports, self._samples = ports, StylusSamples(ports)
         self._diagnosis = _diagnosis(participant, stylus)
         self._path = (
             recorded(params.path, stylus, params.dead_man)
@@ -134,9 +134,9 @@ class _Stylus:
         orientation, angular = self._path.orientation(time_ns * 1e-9)
         return [
             *samples,
-            pose_sample(self._ports.pose, time_ns, self._hand.position, orientation),
-            twist_sample(self._ports.twist, time_ns, self._hand.velocity, angular),
-            force_sample(self._ports.force, time_ns, self._loop.force),
+            self._samples.pose(time_ns, self._hand.position, orientation),
+            self._samples.twist(time_ns, self._hand.velocity, angular),
+            self._samples.force(time_ns, self._loop.force),
         ]
 
     def _tick(self) -> list[Sample]:

@@ -38,11 +38,10 @@ class Hand:
 
     def move(self, force: Vector3, target: Vector3, velocity: Vector3) -> None:
         """Move for a tick under `force` (N), with spring and damper to `target` (m) and `velocity` (m/s)."""
-        one = [
-            self._axis(*axis)
-            for axis in zip(self.position, self.velocity, force, target, velocity, strict=True)
-        ]
-        (x, vx), (y, vy), (z, vz) = one
+        axis = self._axis
+        (x, y, z), (vx, vy, vz), (fx, fy, fz) = self.position, self.velocity, force
+        (tx, ty, tz), (ux, uy, uz) = target, velocity
+        (x, vx), (y, vy), (z, vz) = axis(x, vx, fx, tx, ux), axis(y, vy, fy, ty, uy), axis(z, vz, fz, tz, uz)
         self.position, self.velocity = (x, y, z), (vx, vy, vz)
 
     def _axis(self, x: float, v: float, force: float, target: float, velocity: float) -> tuple[float, float]:

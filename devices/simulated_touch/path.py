@@ -56,6 +56,9 @@ class HandPath:
         self._stops, self._presses, self._course = stops, presses, course
         self._times = [stop.time for stop in stops]
         self._pressed_at = [press.time for press in presses]
+        self._turning: tuple[_Stop, _Stop] | None = None
+        """The stops between which the hand rotates by `_turn`, a rotation vector (rad)."""
+        self._turn = np.zeros(3)
 
     def position(self, t: float) -> tuple[Vector3, Vector3]:
         """Return the target's position (m) and velocity (m/s)."""
@@ -68,7 +71,11 @@ class HandPath:
         """Return the orientation (x, y, z, w), and the angular velocity (rad/s), both in the base frame."""
         before, after, share, rate = self._between(t)
         start = np.array(before.orientation)
-        turn = rotation.log(rotation.product(np.array(after.orientation), rotation.conjugate(start)))
+        if self._turning != (before, after):
+            goal = np.array(after.orientation)
+            self._turn = rotation.log(rotation.product(goal, rotation.conjugate(start)))
+            self._turning = before, after
+        turn = self._turn
         x, y, z, w = rotation.product(rotation.exp(share * turn), start).tolist()
         wx, wy, wz = (rate * turn).tolist()
         return (x, y, z, w), (wx, wy, wz)

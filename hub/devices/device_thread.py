@@ -10,7 +10,7 @@ from time import monotonic_ns
 from typing import Protocol
 
 from hub.devices.simulated_devices import open_device
-from hub.participant import Device, Sample, Value
+from hub.participant import Device, Sample, Value, VectorSample
 from schemas.errors import MessageError
 from schemas.ros import DiagnosticStatus, Joy
 
@@ -103,7 +103,11 @@ class DeviceThread:
     def _read(self, t: int) -> bool:
         """Read the device and give its samples to the uplink; return whether a link delays anything."""
         samples = list(self._device.read(t))
-        lasting = [sample for sample in samples if isinstance(sample.message, Joy | DiagnosticStatus)]
+        lasting = [
+            sample
+            for sample in samples
+            if not isinstance(sample, VectorSample) and isinstance(sample.message, Joy | DiagnosticStatus)
+        ]
         with self._attaching:
             self._current.update((sample.port, sample) for sample in lasting)
             return self._uplink is not None and self._uplink.exchange(t, samples)

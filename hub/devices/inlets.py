@@ -17,8 +17,8 @@ from hub.planning.plan import Plan
 from hub.transport.envelope import Stamp
 from hub.transport.port_codec import PortCodec
 from schemas.errors import LateError, MessageError, did_you_mean
+from schemas.lockstep import Entering
 from schemas.ports import Port
-from schemas.trocar_msgs import InletSample
 
 __all__ = ["Inlets"]
 
@@ -42,10 +42,9 @@ class _Inlet:
     newest: tuple[int, int] = (0, 0)
     """Admission and sequence number."""
 
-    @property
-    def name(self) -> str:
-        """The stream's name in reports."""
-        return f"{self.source}.{self.port}"
+    def __post_init__(self) -> None:
+        """Note the stream's name in reports."""
+        self.name = f"{self.source}.{self.port}"
 
     def follow(self, stamp: Stamp) -> None:
         """Raise LateError for a sample that is not newer than the last one."""
@@ -137,12 +136,12 @@ class Inlets:
             inlet.arrived_ns = now_ns
             self._offered.add(inlet.number)
 
-    def sample(self, time_ns: int, wall_ns: int) -> list[InletSample]:
+    def sample(self, time_ns: int, wall_ns: int) -> list[Entering]:
         """Return what enters at a communication point: samples that are new, and changes of staleness.
 
         Samples of a device in simulated time age in `time_ns`, those of any other in `wall_ns`.
         """
-        entering: list[InletSample] = []
+        entering: list[Entering] = []
         with self._lock:
             for number in sorted(self._offered | self._aging):
                 inlet = self._all[number]
@@ -150,12 +149,11 @@ class Inlets:
                 stale = inlet.stale
                 if inlet.arrived_ns is not None:
                     stale = bool(inlet.max_age_ns) and now_ns - inlet.arrived_ns > inlet.max_age_ns
+                offset_ns = self.offsets_ns.get(inlet.source)
                 for payload, arrived_ns, sent_ns in inlet.queue:
                     entering.append(_sample(inlet, payload, stale=stale, age_ns=now_ns - arrived_ns))
-                    if sent_ns is not None and inlet.source in self.offsets_ns:
-                        self.latencies.add(
-                            "device to grant", inlet.name, now_ns - sent_ns - self.offsets_ns[inlet.source]
-                        )
+                    if sent_ns is not None and offset_ns is not None:
+                        self.latencies.add("device to grant", inlet.name, now_ns - sent_ns - offset_ns)
                 if stale != inlet.stale and not inlet.queue:
                     entering.append(_sample(inlet, b"", stale=stale, age_ns=0))
                 inlet.queue.clear()
@@ -164,8 +162,5 @@ class Inlets:
         return entering
 
 
-def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> InletSample:
-    data = np.frombuffer(payload, np.uint8)
-    return InletSample.model_construct(
-        participant=inlet.source, port=inlet.port, stale=stale, payload=data, age_ns=age_ns
-    )
+def _sample(inlet: _Inlet, payload: bytes, *, stale: bool, age_ns: int) -> Entering:
+    return Entering(inlet.source, inlet.port, stale, np.frombuffer(payload, np.uint8), age_ns)

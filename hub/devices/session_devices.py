@@ -25,7 +25,8 @@ from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
 from schemas.errors import LateError, MessageError
-from schemas.trocar_msgs import DeviceStatus, InletSample, Latency
+from schemas.lockstep import Entering
+from schemas.trocar_msgs import DeviceStatus, Latency
 
 __all__ = ["SessionDevices"]
 
@@ -106,7 +107,7 @@ class SessionDevices:
         for thread in self._threads.values():
             thread.start(directory)
 
-    def enter(self, time_ns: int, step: int) -> list[InletSample]:
+    def enter(self, time_ns: int, step: int) -> list[Entering]:
         """Return what enters the simulation at a communication point."""
         self._time_ns = time_ns
         self._simulated.exchange(time_ns, step, self._take)
@@ -127,9 +128,12 @@ class SessionDevices:
         own = *self.inlets.latencies.messages(), *self._simulated.latencies.messages()
         return [*own, *self._statuses.latencies]
 
-    def _take(self, device: str, sample: Sample, payload: bytes, arrival_ns: int, stamp: Stamp) -> None:
+    def _take(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
+        source = device, sample.port
+        if source not in self._connected and not self._observers.watches(*source):
+            return
         try:
-            self._offer(device, sample.port, payload, arrival_ns, stamp)
+            self._offer(*source, sample.encode(), arrival_ns, stamp)
         except LateError as error:
             self._refusals.refuse(f"{device}.{sample.port}", error)
 

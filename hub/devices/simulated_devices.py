@@ -13,13 +13,12 @@ from hub.transport.cells import INITIAL
 from hub.transport.envelope import Stamp
 from hub.transport.reader import DeviceInputs
 from hub.transport.refusals import Refusals
-from schemas.codec import encode
 from schemas.errors import ParticipantError
 
 __all__ = ["SimulatedDevices", "open_device"]
 
-Take = Callable[[str, Sample, bytes, int, Stamp], None]
-"""Is called with a sample: device, sample, its bytes, time of arrival (simulated ns), and its stamp."""
+Take = Callable[[str, Sample, int, Stamp], None]
+"""Is called with a sample: device, sample, time of arrival (simulated ns), and its stamp."""
 
 
 class SimulatedDevices:
@@ -58,8 +57,8 @@ class SimulatedDevices:
                 continue
             try:
                 one.write(time_ns, step, self.latencies)
-                for sample, payload, arrival_ns, stamp in one.read(time_ns):
-                    take(one.name, sample, payload, arrival_ns, stamp)
+                for sample, arrival_ns, stamp in one.read(time_ns):
+                    take(one.name, sample, arrival_ns, stamp)
             except Exception as error:
                 raise ParticipantError(one.name, step, f"{type(error).__name__}: {error}") from error
 
@@ -84,20 +83,30 @@ class _SimulatedDevice:
         self.link = NetworkLink(planned.network_link)
         self._inputs, self._refusals = inputs, refusals
         self._ports = {port.name: port for port in planned.ports}
+        self._streams = {port: f"{self.name}.{port}" for port in self._ports}
+        self._places = {port: place for place, port in enumerate(self._ports)}
         self._sequence = dict.fromkeys(self._ports, 0)
         self._newest_ns = dict.fromkeys(self._ports, INITIAL)
 
     def write(self, time_ns: int, step: int, latencies: Latencies) -> None:
         """Write what has arrived from the simulation."""
         self.link.settle(time_ns)
-        for port, valid_ns, value in self._inputs.due(step):
+        for port, valid_ns, value in self._arrived(time_ns, step):
+            self._write_one(port, valid_ns, value)
+            latencies.add("state to force", self._streams[port], time_ns - valid_ns)
+
+    def _arrived(self, time_ns: int, step: int) -> Iterator[tuple[str, int, Value]]:
+        """Yield port, time of validity (ns) and value of what has passed the link by `time_ns`."""
+        due = self._inputs.due(step)
+        if self.link.idle:
+            yield from sorted(due, key=lambda one: (self._places[one[0]], one[1]))
+            return
+        for port, valid_ns, value in due:
             self.link.line(self._ports[port]).send(valid_ns, (valid_ns, value))
         for port in self._ports.values():
-            if port.causality != "input":
-                continue
-            for _, (valid_ns, value) in self.link.line(port).arrived(time_ns):
-                self._write_one(port.name, valid_ns, value)
-                latencies.add("state to force", f"{self.name}.{port.name}", time_ns - valid_ns)
+            if port.causality == "input":
+                for _, (valid_ns, value) in self.link.line(port).arrived(time_ns):
+                    yield port.name, valid_ns, value
 
     def _write_one(self, port: str, valid_ns: int, value: Value) -> None:
         newest_ns = self._newest_ns[port]
@@ -110,17 +119,20 @@ class _SimulatedDevice:
         self._newest_ns[port] = valid_ns
         self.device.write(port, value)
 
-    def read(self, time_ns: int) -> Iterator[tuple[Sample, bytes, int, Stamp]]:
-        """Yield the samples that have arrived at the hub: sample, its bytes, time of arrival, stamp."""
+    def read(self, time_ns: int) -> Iterator[tuple[Sample, int, Stamp]]:
+        """Yield the samples that have arrived at the hub: sample, time of arrival, stamp."""
+        idle = self.link.idle
         for sample in self.device.read(time_ns):
             number = self._sequence[sample.port] = self._sequence[sample.port] + 1
-            stamped = sample, encode(sample.message), Stamp(0, number, time_ns)
-            self.link.line(self._ports[sample.port]).send(time_ns, stamped)
-        for port in self._ports.values():
-            if port.causality != "output":
-                continue
-            for arrival_ns, (sample, payload, stamp) in self.link.line(port).arrived(time_ns):
-                yield sample, payload, arrival_ns, stamp
+            stamp = Stamp(0, number, time_ns)
+            if idle:
+                yield sample, time_ns, stamp
+            else:
+                self.link.line(self._ports[sample.port]).send(time_ns, (sample, stamp))
+        for port in () if idle else self._ports.values():
+            if port.causality == "output":
+                for arrival_ns, (sample, stamp) in self.link.line(port).arrived(time_ns):
+                    yield sample, arrival_ns, stamp
 
 
 def open_device(name: str, device: Device, directory: Path) -> None:

@@ -77,7 +77,7 @@ class DeviceUplink:
         now_ns, idle = monotonic_ns(), self._link.idle
         for sample in samples:
             number = self._sequence[sample.port] = self._sequence[sample.port] + 1
-            stamped = encode(sample.message), Stamp(self._run.admission, number, now_ns).pack()
+            stamped = sample.encode(), Stamp(self._run.admission, number, now_ns).pack()
             if idle:
                 self._publish(sample.port, *stamped)
             else:

@@ -76,9 +76,10 @@ class Latencies:
     def add(self, way: str, stream: str, time_ns: int) -> None:
         """Count one time of a stream on its way: `device to grant`, `grant to state` or `state to force`."""
         with self._lock:
-            if (way, stream) not in self._histograms:
-                self._histograms[way, stream] = Histogram()
-            self._histograms[way, stream].add(time_ns)
+            histogram = self._histograms.get((way, stream))
+            if histogram is None:
+                histogram = self._histograms[way, stream] = Histogram()
+            histogram.add(time_ns)
 
     def messages(self) -> list[Latency]:
         """Return the percentiles of every stream, by way and name."""

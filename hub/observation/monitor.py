@@ -27,7 +27,7 @@ from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
-from schemas.lockstep import Ack, Grant, pack_ack
+from schemas.lockstep import Ack, Entering, Grant, pack_ack
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.trocar_msgs import (
@@ -250,7 +250,7 @@ class Monitor:
         for sample in grant.inlets:
             self._inlet(sample, grant.start_ns)
 
-    def _inlet(self, sample: InletSample, time_ns: int) -> None:
+    def _inlet(self, sample: InletSample | Entering, time_ns: int) -> None:
         watched = self._watched.get(self._keys.output("device", sample.participant, sample.port))
         if watched is not None and sample.payload.size and self._recorder is not None:
             self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())

@@ -3,7 +3,7 @@
 from hub.participant.base import Outputs, Params, Participant, Value
 from hub.participant.bond import ForceSide, MotionSide
 from hub.participant.controller import Controller
-from hub.participant.device import Device, Sample
+from hub.participant.device import Device, Sample, VectorSample
 from hub.participant.inputs import Inputs
 from hub.participant.state import Record, array, choice, flag, integer, number, restore_arrays, state_hash
 from hub.participant.stepped import BondPlan, Correction, Setup, Stepped
@@ -24,6 +24,7 @@ __all__ = [
     "Setup",
     "Stepped",
     "Value",
+    "VectorSample",
     "array",
     "choice",
     "flag",

@@ -5,14 +5,17 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from time import sleep
 from typing import ClassVar
 
 from hub.participant.base import Participant, Value
+from schemas.codec import encode
 from schemas.message import Message
+from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["Device", "Sample"]
+__all__ = ["Device", "Sample", "VectorSample"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,42 @@ class Sample:
 
     port: str
     message: Message
+
+    def encode(self) -> bytes:
+        """Return the message as CDR."""
+        return encode(self.message)
+
+
+class VectorSample(Sample):
+    """A sample of a signal as numbers, for devices that sample often: its message is made for who asks.
+
+    Examples:
+        VectorSample(VectorCodec(port), np.array([x, y, z, qx, qy, qz, qw]), t)
+    """
+
+    _codec: VectorCodec
+    _value: Vector
+    _time_ns: int
+
+    def __init__(self, codec: VectorCodec, value: Vector, time_ns: int) -> None:
+        """Take a value, shape (size,), of the codec's port, stamped in that port's clock.
+
+        Raises MessageError if it has another shape, or numbers that are not finite.
+        """
+        if value.shape != codec.neutral.shape or not isfinite(value.dot(value)):
+            codec.checked(value)  # raises what is wrong, unless the numbers are only large
+        vars(self).update(port=codec.port.name, _codec=codec, _value=value, _time_ns=time_ns)
+
+    def __getattr__(self, name: str) -> Message:
+        """Return the message, which is made when it is first asked for."""
+        if name != "message":
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+        made = vars(self)["message"] = self._codec.to_message(self._value, self._time_ns)
+        return made
+
+    def encode(self) -> bytes:
+        """Return the message as CDR."""
+        return self._codec.encode(self._value, self._time_ns)
 
 
 class Device(Participant):

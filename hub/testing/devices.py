@@ -12,7 +12,6 @@ from hub.participant import Device, Sample, Value
 from hub.planning.plan import has_simulated_time
 from hub.testing.contract import check_declarations, check_message, require
 from hub.transport.port_codec import PortCodec
-from schemas.codec import encode
 from schemas.errors import TrocarError
 from schemas.ros import Header
 
@@ -69,7 +68,7 @@ def _samples(
                     _write(device, codecs[port.name], inputs)
             for sample in device.read(time_ns):
                 _check_sample(sample, codecs, stamps)
-                samples.append((sample.port, encode(sample.message)))
+                samples.append((sample.port, sample.encode()))
         device.close()
         device.close()  # and a third time at the end of `with`
     return samples

@@ -38,8 +38,8 @@ class PortCodec:
 
         Raises MessageError if it is invalid.
         """
-        if self.vector is not None and self.vector.fits(payload):
-            return self.vector.decode(payload)
+        if self.vector is not None and (found := self.vector.found(payload)) is not None:
+            return found
         message = decode(self._model, payload)
         return self.vector.from_message(message) if self.vector is not None else message
 

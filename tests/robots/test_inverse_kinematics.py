@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from robots import rotation
 from robots.dvrk import psm
 from robots.dvrk.instruments import instrument
-from robots.inverse_kinematics import pursue
+from robots.inverse_kinematics import LastFrames, pursue
 
 CHAIN = psm.chain(instrument("palpation-probe"))
 MIDDLE = np.array(psm.HOME)
@@ -41,6 +41,18 @@ def test_limits_hold_for_any_goal(q, x, y, z):
         assert (after >= CHAIN.lower).all()
         assert (after <= CHAIN.upper).all()
         q = after
+
+
+@given(st.lists(near, min_size=2, max_size=5))
+def test_frames_that_are_kept_change_no_bit(goals):
+    frames = LastFrames(CHAIN)
+    found = MIDDLE
+    for q in goals:
+        assert frames(found).tobytes() == CHAIN.frames(found).tobytes()
+        plain = pursue(CHAIN, found, *goal_of(q), 1e-2 * CHAIN.velocity)
+        kept = pursue(CHAIN, found, *goal_of(q), 1e-2 * CHAIN.velocity, frames)
+        assert kept.tobytes() == plain.tobytes()
+        found = kept
 
 
 def test_at_the_goal_nothing_moves():

@@ -35,6 +35,13 @@ def test_product_is_that_of_the_matrices(a, b):
     )
 
 
+@given(quaternions, quaternions)
+def test_the_turn_to_a_goal_is_the_log_of_the_difference_to_the_bit(goal, start):
+    r = rotation.matrix(start)
+    turn = rotation.log(rotation.product(goal, rotation.conjugate(rotation.from_matrix(r))))
+    assert np.array(rotation.turn_to(goal, r)).tobytes() == turn.tobytes()
+
+
 @given(quaternions)
 def test_conjugate_is_the_inverse(q):
     assert np.allclose(rotation.product(q, rotation.conjugate(q)), [0, 0, 0, 1], atol=1e-12)

@@ -74,6 +74,7 @@ def test_many_configurations_give_what_each_gives_alone(name):
             [chain.jacobian(chain.frames(one), frame=frame) for one in q],
             atol=1e-14,
         )
+    assert np.array_equal(chain.jacobian(frames), [chain.jacobian(one) for one in frames])
     assert np.array_equal(chain.forward(q), frames[:, -1])
 
 

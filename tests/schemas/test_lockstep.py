@@ -7,6 +7,7 @@ from schemas.codec import decode, encode
 from schemas.errors import MessageError
 from schemas.lockstep import (
     Ack,
+    Entering,
     Grant,
     pack_ack,
     pack_grant,
@@ -120,3 +121,14 @@ def test_a_damaged_permission_is_refused_or_read_as_the_codec_reads_it(grant, da
     expected = decode(GrantMessage, payload)
     assert found[:5] == (expected.run, expected.epoch, expected.step, expected.start_ns, expected.horizon_ns)
     assert len(found.inlets) == len(expected.inlets)
+
+
+def test_a_sample_that_enters_is_packed_as_its_message():
+    rows = [
+        ("hand", "pose", False, np.arange(9, dtype=np.uint8), 3),
+        ("b", "c", True, np.zeros(0, np.uint8), 0),
+    ]
+    fields = InletSample.model_fields
+    as_messages = [InletSample.model_validate(dict(zip(fields, row, strict=True))) for row in rows]
+    entering = [Entering(*row) for row in rows]
+    assert pack_grant(Grant(1, 0, 2, 3, 4, entering)) == pack_grant(Grant(1, 0, 2, 3, 4, as_messages))

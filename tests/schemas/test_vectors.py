@@ -199,3 +199,9 @@ def test_a_matrix_stands_in_the_layout_row_after_row():
     message = decode(Float64MultiArray, codec.encode(value, 0))
     assert [(d.label, d.size, d.stride) for d in message.layout.dim] == [("rows", 3, 12), ("cols", 4, 4)]
     assert np.array_equal(codec.decode(encode(message)), value)
+
+
+@given(values(JOINTS, 6), stamps)
+def test_the_message_of_joints_is_a_valid_one(value: np.ndarray, time_ns: int) -> None:
+    message = VectorCodec(JOINTS).to_message(value, time_ns)
+    assert encode(JointState.model_validate(message.model_dump())) == encode(message)
