@@ -18,7 +18,7 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["EventTopic", "MessageSource", "PeriodicTopic", "Publications", "State"]
+__all__ = ["Arrivals", "EventTopic", "MessageSource", "PeriodicTopic", "Publications", "State", "StateTopic"]
 
 _MAX_AGE_NS = 1_000_000_000
 """An older state is not published any more: a program must see that nothing arrives, as a CRTK client does
@@ -34,20 +34,51 @@ class MessageSource(Protocol):
         ...
 
 
-class State:
-    """The newest value of a signal from the simulation. Written by one thread, read by another."""
+class Arrivals:
+    """When the last value of any state came, by the monotonic clock (ns); 0 before."""
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self) -> None:
+        self.newest_ns = 0
+
+    @property
+    def recent(self) -> bool:
+        """Whether the simulation runs: a value came within a second."""
+        return monotonic_ns() - self.newest_ns < _MAX_AGE_NS
+
+
+class State:
+    """The newest value of a signal from the simulation. Written by one thread, read by another.
+
+    While it is not `used`, values of it need not come, and none is kept: the next one could be long after it.
+    """
+
+    def __init__(self, port: Port, arrivals: Arrivals) -> None:
+        """`arrivals`: those of all states of the gateway."""
         self.port = port
         self._codec = VectorCodec(port)
+        self._arrivals = arrivals
         self._newest: tuple[Vector, int] | None = None
+        self.used = True
         self.writes = 0
         """Number of values so far."""
 
     def write(self, value: Vector) -> None:
         """Set the newest value."""
-        self._newest = value, monotonic_ns()
+        now_ns = self._arrivals.newest_ns = monotonic_ns()
+        if self.used:
+            self._newest = value, now_ns
         self.writes += 1
+
+    def use(self, *, used: bool) -> None:
+        """Say whether values of it are used from now on."""
+        if used != self.used:
+            self._newest = None
+            self.used = used
+
+    @property
+    def present(self) -> bool:
+        """Whether there is a value not older than a second, or would be, were it used."""
+        return self.value is not None if self.used else bool(self.writes) and self._arrivals.recent
 
     @property
     def written_ns(self) -> int:
@@ -56,9 +87,11 @@ class State:
 
     @property
     def value(self) -> Vector | None:
-        """The newest value; None if none was written within a second."""
+        """The newest value; None if none was written within a second, or it is not used."""
         newest = self._newest
-        return newest[0] if newest is not None and monotonic_ns() - newest[1] < _MAX_AGE_NS else None
+        if newest is None or not self.used:
+            return None
+        return newest[0] if monotonic_ns() - newest[1] < _MAX_AGE_NS else None
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the newest value as a message with this stamp; None if there is none."""
@@ -81,6 +114,31 @@ class PeriodicTopic:
             self._count.messages += 1
 
 
+class StateTopic:
+    """The topic of one state, published at the gateway's period while a program subscribes.
+
+    Every message is counted, those without a subscriber too: what is reported is what a program would get.
+    """
+
+    def __init__(self, state: State, publish: Publisher, count: Count) -> None:
+        self.state = state
+        self._publish, self._count = publish, count
+        self._stamps = Stamps()
+
+    @property
+    def wanted(self) -> bool:
+        """Whether a program subscribes, or may."""
+        return self._publish.wanted
+
+    def publish(self, period: int) -> None:  # noqa: ARG002
+        """Publish the newest value, if there is one and it is for anybody."""
+        if not self._publish.wanted:
+            self._count.messages += self.state.present
+        elif (payload := self.state.cdr(self._stamps.next_ns())) is not None:
+            self._publish(payload)
+            self._count.messages += 1
+
+
 class EventTopic:
     """One topic of which every message is published at once, in the thread that writes it."""
 
@@ -93,14 +151,15 @@ class EventTopic:
         for message in value if isinstance(value, tuple) else (value,):
             if isinstance(message, Message):
                 with self._publishing:
-                    self._publish(encode(stamped(message, self._stamps.next_ns())))
+                    if self._publish.wanted:
+                        self._publish(encode(stamped(message, self._stamps.next_ns())))
                     self._count.messages += 1
 
 
 class Publications:
     """The thread that publishes all states at the gateway's period, whatever the simulation's is."""
 
-    def __init__(self, name: str, topics: Sequence[PeriodicTopic], period_ns: int) -> None:
+    def __init__(self, name: str, topics: Sequence[PeriodicTopic | StateTopic], period_ns: int) -> None:
         """Start to publish; `name`: the gateway's."""
         self._topics, self._period_ns = topics, period_ns
         self._ending = threading.Event()

@@ -16,7 +16,9 @@ from schemas.ports import Port
 from schemas.ros import JointState
 from schemas.vectors import VectorCodec
 
-__all__ = ["periods_between", "robot_description", "whole_robot_sources"]
+__all__ = ["inputs_of_all", "periods_between", "robot_description", "whole_robot_sources"]
+
+_PARTS = ("", "jaw/", "hand/")
 
 
 def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, MessageSource]:
@@ -27,6 +29,17 @@ def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> M
     if params.profile != "dvrk":
         return {}
     return {"tf": TransformTree(params, states), "joint_states": _JointStates(params, states)}
+
+
+def inputs_of_all(params: GatewayParams) -> frozenset[str]:
+    """Return the ports that the gateway itself reads: for `/tf`, `/joint_states` and kinematics.
+
+    By them it knows, too, whether the simulation runs.
+    """
+    poses = ("{}/local/measured_cp", "SUJ/{}/measured_cp", "SUJ/{}/local/measured_cp")
+    joints = (f"{{}}/{part}measured_js" for part in _PARTS)
+    names = (*poses, *joints)
+    return frozenset(name.format(arm) for arm in params.arms.shown for name in names)
 
 
 def periods_between(name: str, period_ns: int) -> int:
@@ -57,9 +70,7 @@ class _JointStates:
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         found = (
-            (arm, states.get(f"{arm}/{part}measured_js"))
-            for arm in params.arms.shown
-            for part in ("", "jaw/", "hand/")
+            (arm, states.get(f"{arm}/{part}measured_js")) for arm in params.arms.shown for part in _PARTS
         )
         self._parts = [(arm, state) for arm, state in found if state is not None]
         self._known: tuple[str, ...] = ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from time import time_ns
+from typing import Any
 
 import zenoh
 from zenoh import ext
@@ -36,6 +37,19 @@ periodically, because a program that has stopped reading must not block the othe
 """
 
 
+class _Publisher:
+    """Numbers the messages of one topic."""
+
+    def __init__(self, publisher: zenoh.Publisher | ext.AdvancedPublisher, gid: bytes) -> None:
+        self._publisher, self._gid, self._sequence = publisher, gid, 0
+        self.wanted = True
+
+    def __call__(self, message: bytes) -> None:
+        self._sequence += 1
+        attached = Attachment(self._sequence, time_ns(), self._gid).pack()
+        self._publisher.put(message, attachment=attached)
+
+
 class ZenohTransport(Transport):
     """Publishes, listens and answers under rmw_zenoh's keys, as one node.
 
@@ -57,6 +71,7 @@ class ZenohTransport(Transport):
             | zenoh.Subscriber[None]
             | zenoh.Queryable[None]
             | zenoh.LivelinessToken
+            | zenoh.MatchingListener[None]
         ] = []
         self._number = 0
         self._closed = False
@@ -88,14 +103,24 @@ class ZenohTransport(Transport):
             )
         self._entities.append(publisher)
         gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
-        sequence = 0
+        advertised = _Publisher(publisher, gid)
+        if isinstance(publisher, zenoh.Publisher) and (row.periodic or row.is_picture):
+            self._watch(publisher, advertised)
+        return advertised
 
-        def publish(message: bytes) -> None:
-            nonlocal sequence
-            sequence += 1
-            publisher.put(message, attachment=Attachment(sequence, time_ns(), gid).pack())
+    def _watch(self, publisher: zenoh.Publisher, advertised: _Publisher) -> None:
+        """Keep up to date whether `advertised` is wanted."""
 
-        return publish
+        def match(status: zenoh.MatchingStatus) -> None:
+            advertised.wanted = bool(status.matching)
+            self.changed()
+
+        advertised.wanted = False
+        listener = publisher.declare_matching_listener(Callback(match, indirect=False))
+        self._entities.insert(0, listener)  # it ends before its publisher
+        now: Any = publisher.matching_status  # an object, whatever the stubs say
+        if now.matching:
+            advertised.wanted = True
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
         topic = row.topic

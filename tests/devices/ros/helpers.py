@@ -18,6 +18,11 @@ def joint_fields(values, stamp_ns=None):
     return {"header": header, "name": [], "position": list(values), "velocity": [], "effort": []}
 
 
+def wanted(gateway, topic):
+    """Return whether the gateway takes a state for wanted by a program."""
+    return next(one.wanted for one in gateway._optional if one.state.port.name == topic[1:])
+
+
 def received(gateway, topic):
     """Return the samples of `topic` that the gateway reads now."""
     return [sample for sample in gateway.read(0) if sample.port == topic[1:]]
