@@ -52,11 +52,11 @@ class State:
     While it is not `used`, values of it need not come, and none is kept: the next one could be long after it.
     """
 
-    def __init__(self, port: Port, arrivals: Arrivals) -> None:
-        """`arrivals`: those of all states of the gateway."""
+    def __init__(self, port: Port, arrivals: Arrivals | None = None) -> None:
+        """`arrivals`: those of all states of the gateway; None: of this one alone."""
         self.port = port
         self._codec = VectorCodec(port)
-        self._arrivals = arrivals
+        self._arrivals = arrivals or Arrivals()
         self._newest: tuple[Vector, int] | None = None
         self.used = True
         self.writes = 0

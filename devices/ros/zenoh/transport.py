@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from time import time_ns
-from typing import Any
 
 import zenoh
 from zenoh import ext
@@ -71,7 +70,7 @@ class ZenohTransport(Transport):
             | zenoh.Subscriber[None]
             | zenoh.Queryable[None]
             | zenoh.LivelinessToken
-            | zenoh.MatchingListener[None]
+            | zenoh.MatchingListener
         ] = []
         self._number = 0
         self._closed = False
@@ -112,14 +111,13 @@ class ZenohTransport(Transport):
         """Keep up to date whether `advertised` is wanted."""
 
         def match(status: zenoh.MatchingStatus) -> None:
-            advertised.wanted = bool(status.matching)
+            advertised.wanted = status.matching
             self.changed()
 
         advertised.wanted = False
         listener = publisher.declare_matching_listener(Callback(match, indirect=False))
         self._entities.insert(0, listener)  # it ends before its publisher
-        now: Any = publisher.matching_status  # an object, whatever the stubs say
-        if now.matching:
+        if publisher.matching_status.matching:
             advertised.wanted = True
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
