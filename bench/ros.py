@@ -2,7 +2,7 @@
 
 Also moves and homing in long repetition.
 
-python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face live servo moves cycles] [--output FILE]
+python -m bench.ros ros2-zenoh|ros2-dds|ros1 [bare session face live servo moves cycles] [--output FILE]
 
 `bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x
 288 at 60 Hz; `session`: the same in a session of motion controller and MuJoCo, H = 2 ms, in real time. The
@@ -30,10 +30,8 @@ from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from ros_client import percentiles
-from ros_figures import cpu_s, host_process
-from ros_places import PLACES, Place
-
+from bench.ros_figures import cpu_s, host_process, percentiles
+from bench.ros_places import PLACES, Place
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.session.session import Session
@@ -243,7 +241,7 @@ def session(kind: str, place: Place, seconds: float, *, everything: bool = False
 
     `everything`: publish all states of the arms, not only their joints.
     """
-    parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
+    parts = {"camera": {"kind": "bench.ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
     connections = [
         *states,
@@ -268,7 +266,7 @@ def servo(kind: str, place: Place, count: int) -> dict[str, Any]:
     """Measure the way of `servo_jp` to the joint."""
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory, "times.json")
-        parts = {"watch": {"kind": "ros_parts:Stopwatch", "output": str(output)}}
+        parts = {"watch": {"kind": "bench.ros_parts:Stopwatch", "output": str(output)}}
         watched = [
             "ros.PSM1/servo_jp -> watch.servo_jp",
             "motion.drive/PSM1/servo_jp -> watch.setpoint",
@@ -314,7 +312,9 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=200)
     parser.add_argument("--output", type=Path, help="also write the JSON to this file")
     arguments = parser.parse_args()
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+    os.environ["PYTHONPATH"] = os.pathsep.join(
+        [str(HERE.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    )
     with PLACES[arguments.kind]() as place:
         figures = {
             name: measures[name](arguments.kind, place, arguments) for name in arguments.what or measures
