@@ -25,7 +25,7 @@ from devices.ros.topics.publications import (
     PeriodicTopic,
     Publications,
     State,
-    StateTopic,
+    WantedTopic,
 )
 from devices.ros.topics.refusal_reports import RefusalReports
 from devices.ros.topics.refused_moves import RefusedMoves
@@ -38,7 +38,7 @@ from devices.ros.topics.whole_robot import (
     robot_description,
     whole_robot_sources,
 )
-from devices.ros.transport import ServiceHandler, Transport
+from devices.ros.transport import Publisher, ServiceHandler, Transport
 from devices.samples import stamp_of
 from hub.participant import Device, Sample, Value
 from robots.dvrk.setup_joints import CartArm
@@ -91,8 +91,8 @@ class Gateway(Device):
         """Start from nothing: no client, no message."""
         self._counters = StatusCounters(self.kind, self.rows)
         self._states: dict[str, State] = {}
-        self._optional: list[StateTopic] = []
-        """Topics whose states are used while a program subscribes, and only then."""
+        self._optional: list[tuple[State, Publisher]] = []
+        """States that are used while a program subscribes, and only then, with what publishes them."""
         self._unused: frozenset[str] = frozenset()
         self._has_changed = True
         """Whether programs have subscribed, or have ceased to."""
@@ -144,7 +144,7 @@ class Gateway(Device):
             elif row.way == "serve":
                 transport.serve(row, self._service_handler(row))
 
-    def _advertise_all(self, transport: Transport) -> list[PeriodicTopic | StateTopic]:
+    def _advertise_all(self, transport: Transport) -> list[PeriodicTopic]:
         """Advertise all published rows; return those that are published at the gateway's period."""
         rows = [
             (row, transport.advertise(row), self._counters[row]) for row in self.rows if row.way == "publish"
@@ -160,13 +160,13 @@ class Gateway(Device):
         )
         whole_robot = whole_robot_sources(self.params, self._states)
         always = inputs_of_all(self.params) if self.params.profile == "dvrk" else self._states.keys()
-        periodic: list[PeriodicTopic | StateTopic] = []
+        periodic: list[PeriodicTopic] = []
         for row, publish, count in rows:
             if row.port is not None and row.periodic:
-                topic = StateTopic(self._states[row.port.name], publish, count)
-                periodic.append(topic)
+                state = self._states[row.port.name]
+                periodic.append(WantedTopic(state, publish, count))
                 if row.port.name not in always:
-                    self._optional.append(topic)
+                    self._optional.append((state, publish))
             elif row.port is not None:
                 self._events[row.port.name] = EventTopic(publish, count)
             elif row == DIAGNOSTICS_ROW:
@@ -174,7 +174,7 @@ class Gateway(Device):
                 periodic.append(PeriodicTopic(self._diagnostics, publish, count, every))
             elif row.name in whole_robot:
                 every = periods_between(row.name, self.params.publish_period)
-                periodic.append(PeriodicTopic(whole_robot[row.name], publish, count, every))
+                periodic.append(WantedTopic(whole_robot[row.name], publish, count, every))
             elif self.params.robot_description is not None:
                 urdf = robot_description(self.params.robot_description)
                 EventTopic(publish, count).write(StringMessage(data=urdf))
@@ -228,10 +228,10 @@ class Gateway(Device):
         self._is_new.set()
 
     def _update_used(self) -> None:
-        for topic in self._optional:
+        for state, publish in self._optional:
             # the first value is awaited: by it the topic counts as published
-            topic.state.use(used=topic.wanted or not topic.state.writes)
-        unused = frozenset(topic.state.port.name for topic in self._optional if not topic.state.used)
+            state.use(used=publish.wanted or not state.writes)
+        unused = frozenset(state.port.name for state, _ in self._optional if not state.used)
         if unused != self._unused:
             self._unused = unused
 

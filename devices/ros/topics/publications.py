@@ -18,7 +18,16 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["Arrivals", "EventTopic", "MessageSource", "PeriodicTopic", "Publications", "State", "StateTopic"]
+__all__ = [
+    "Arrivals",
+    "EventTopic",
+    "MessageSource",
+    "PeriodicTopic",
+    "Publications",
+    "State",
+    "WantedSource",
+    "WantedTopic",
+]
 
 _MAX_AGE_NS = 1_000_000_000
 """An older state is not published any more: a program must see that nothing arrives, as a CRTK client does
@@ -31,6 +40,15 @@ class MessageSource(Protocol):
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the present message with this stamp; None if there is nothing to publish."""
+        ...
+
+
+class WantedSource(MessageSource, Protocol):
+    """What is published while a program subscribes."""
+
+    @property
+    def present(self) -> bool:
+        """Whether there is something to publish."""
         ...
 
 
@@ -114,29 +132,22 @@ class PeriodicTopic:
             self._count.messages += 1
 
 
-class StateTopic:
-    """The topic of one state, published at the gateway's period while a program subscribes.
+class WantedTopic(PeriodicTopic):
+    """A periodic topic whose messages are made while a program subscribes.
 
-    Every message is counted, those without a subscriber too: what is reported is what a program would get.
+    Those without a subscriber are counted, too: what is reported is what a program would get.
     """
 
-    def __init__(self, state: State, publish: Publisher, count: Count) -> None:
-        self.state = state
-        self._publish, self._count = publish, count
-        self._stamps = Stamps()
+    def __init__(self, source: WantedSource, publish: Publisher, count: Count, every: int = 1) -> None:
+        super().__init__(source, publish, count, every)
+        self._wanted_source = source
 
-    @property
-    def wanted(self) -> bool:
-        """Whether a program subscribes, or may."""
-        return self._publish.wanted
-
-    def publish(self, period: int) -> None:  # noqa: ARG002
-        """Publish the newest value, if there is one and it is for anybody."""
-        if not self._publish.wanted:
-            self._count.messages += self.state.present
-        elif (payload := self.state.cdr(self._stamps.next_ns())) is not None:
-            self._publish(payload)
-            self._count.messages += 1
+    def publish(self, period: int) -> None:
+        """Publish the present message, if it is due, there is one, and it is for anybody."""
+        if self._publish.wanted:
+            super().publish(period)
+        elif period % self._every == 0:
+            self._count.messages += self._wanted_source.present
 
 
 class EventTopic:
@@ -159,7 +170,7 @@ class EventTopic:
 class Publications:
     """The thread that publishes all states at the gateway's period, whatever the simulation's is."""
 
-    def __init__(self, name: str, topics: Sequence[PeriodicTopic | StateTopic], period_ns: int) -> None:
+    def __init__(self, name: str, topics: Sequence[PeriodicTopic], period_ns: int) -> None:
         """Start to publish; `name`: the gateway's."""
         self._topics, self._period_ns = topics, period_ns
         self._ending = threading.Event()

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from devices.ros.params import GatewayParams
-from devices.ros.topics.publications import MessageSource, State
+from devices.ros.topics.publications import State, WantedSource
 from devices.ros.topics.tf import TF_PERIOD_NS, TransformTree
 from schemas.errors import DeviceError
 from schemas.ports import Port
@@ -21,7 +21,7 @@ __all__ = ["inputs_of_all", "periods_between", "robot_description", "whole_robot
 _PARTS = ("", "jaw/", "hand/")
 
 
-def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, MessageSource]:
+def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, WantedSource]:
     """Return what is published of all arms together, by row name; `states`: by the names of their ports.
 
     The authors' simulator (profile `vrep`) has no such topics.
@@ -73,17 +73,23 @@ class _JointStates:
             (arm, states.get(f"{arm}/{part}measured_js")) for arm in params.arms.shown for part in _PARTS
         )
         self._parts = [(arm, state) for arm, state in found if state is not None]
-        self._known: tuple[str, ...] = ()
+        self._known: list[State] = []
         self._codec: VectorCodec | None = None
+
+    @property
+    def present(self) -> bool:
+        """Whether any joint is known now."""
+        return any(state.present for _, state in self._parts)
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the joints that are known now, as a JointState; None if there are none."""
         known = [(arm, state, value) for arm, state in self._parts if (value := state.value) is not None]
         if not known:
             return None
-        names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
-        if self._codec is None or names != self._known:
-            self._known = names
+        states = [state for _, state, _ in known]
+        if self._codec is None or states != self._known:
+            self._known = states
+            names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
             self._codec = VectorCodec(
                 Port(
                     name="joint_states",

@@ -21,6 +21,7 @@ from devices.ros.zenoh.layout import (
     GraphToken,
     graph_key,
     key,
+    packed_attachment,
     type_hash,
 )
 from schemas.errors import MessageError
@@ -40,13 +41,12 @@ class _Publisher:
     """Numbers the messages of one topic."""
 
     def __init__(self, publisher: zenoh.Publisher | ext.AdvancedPublisher, gid: bytes) -> None:
-        self._publisher, self._gid, self._sequence = publisher, gid, 0
+        self._put, self._gid, self._sequence = publisher.put, gid, 0
         self.wanted = True
 
     def __call__(self, message: bytes) -> None:
         self._sequence += 1
-        attached = Attachment(self._sequence, time_ns(), self._gid).pack()
-        self._publisher.put(message, attachment=attached)
+        self._put(message, attachment=packed_attachment(self._sequence, time_ns(), self._gid))
 
 
 class ZenohTransport(Transport):

@@ -20,7 +20,7 @@ def joint_fields(values, stamp_ns=None):
 
 def wanted(gateway, topic):
     """Return whether the gateway takes a state for wanted by a program."""
-    return next(one.wanted for one in gateway._optional if one.state.port.name == topic[1:])
+    return next(publish.wanted for state, publish in gateway._optional if state.port.name == topic[1:])
 
 
 def received(gateway, topic):

@@ -130,8 +130,9 @@ def device_bundle(use_ns=0, count=3):
             run=7,
             refusals=refusals,
         )
-        subscribed(session, bundle)
+        device = subscribed(session, bundle)
         yield bundle, session, refusals, changes
+        device.undeclare()
         bundle.close()
 
 
