@@ -19,7 +19,7 @@ from hub.devices.run_info import RunInfo
 from hub.observation.latency import Latencies
 from hub.participant import Value
 from hub.planning.plan import ConnectionToDevice
-from hub.transport.bundle import bundled, unpacked, wants
+from hub.transport.bundle import bundled, unpacked, use_mask
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
@@ -54,10 +54,10 @@ class DeviceReceiver:
         self._refusals, self._offset = refusals, offset
         self._inputs: list[_Input] = []
         self._unused: Collection[str] = ()
-        self._has_told = False
-        """Whether the sources have been told of `_unused`: of most devices everything is used."""
-        self._wants: list[tuple[list[str], zenoh.Publisher]] = []
-        """Inputs of each bundle, and where the source hears which of them are used."""
+        self._has_reported = False
+        """Whether the sources know `_unused`: of most devices everything is used."""
+        self._uses: list[tuple[list[str], zenoh.Publisher]] = []
+        """Inputs of each bundle, and where it is published which of them are used."""
         self._arrived: SimpleQueue[_Subscription | None] = SimpleQueue()
         self._thread = Thread(target=self._receive, name=f"receiver {name}", daemon=True)
         self._thread.start()
@@ -74,8 +74,8 @@ class DeviceReceiver:
             signals = bundled(plan, source, name)
             if signals:
                 inputs = [self._input(outlet) for outlet in signals]
-                told = session.declare_publisher(keys.wants(name, source), express=True)
-                self._wants.append(([outlet.target_port for outlet in signals], told))
+                uses = session.declare_publisher(keys.uses(name, source), express=True)
+                self._uses.append(([outlet.target_port for outlet in signals], uses))
                 yield _Subscription(keys.signals(source, name), inputs, whole=False)
             for outlet in outlets:
                 if outlet.source == source and outlet not in signals:
@@ -104,11 +104,11 @@ class DeviceReceiver:
 
     def want_all_but(self, unused: Collection[str], *, again: bool = False) -> None:
         """Tell the sources which signals they need not send, if that has changed; or `again`."""
-        if unused is self._unused and not (again and self._has_told):
+        if unused is self._unused and not (again and self._has_reported):
             return
-        self._unused, self._has_told = unused, True
-        for ports, told in self._wants:
-            told.put(wants(ports, unused), attachment=Tag.pack(self._run.number, 0, INITIAL, 0))
+        self._unused, self._has_reported = unused, True
+        for ports, publisher in self._uses:
+            publisher.put(use_mask(ports, unused), attachment=Tag.pack(self._run.number, 0, INITIAL, 0))
 
     def write_arrived(self, t: int) -> None:
         """Write to the device what has passed the link by `t` (ns since the start of the device's thread)."""
@@ -119,8 +119,8 @@ class DeviceReceiver:
         """Receive no more."""
         for subscriber in self._subscribers:
             subscriber.undeclare()
-        for _, told in self._wants:
-            told.undeclare()
+        for _, publisher in self._uses:
+            publisher.undeclare()
         self._arrived.put(None)
         self._thread.join(timeout=2.0)
 

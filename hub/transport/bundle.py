@@ -18,7 +18,7 @@ from hub.transport.publisher import Publisher
 from hub.transport.refusals import Refusals
 from schemas.errors import MessageError
 
-__all__ = ["Bundle", "DeviceBundle", "ObserverBundle", "bundled", "unpacked", "wants"]
+__all__ = ["Bundle", "DeviceBundle", "ObserverBundle", "bundled", "unpacked", "use_mask"]
 
 _HEAD = struct.Struct("<II")
 """Index of the connection, and the number of bytes of the value that follow."""
@@ -35,8 +35,8 @@ def bundled(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
     ]
 
 
-def wants(ports: Sequence[str], unused: Collection[str]) -> bytes:
-    """Return what a device tells the source of a bundle: a byte for each of the inputs `ports`."""
+def use_mask(ports: Sequence[str], unused: Collection[str]) -> bytes:
+    """Return what a device publishes for the source of a bundle: a byte for each of the inputs `ports`."""
     return b"".join(_UNUSED if port in unused else _WANTED for port in ports)
 
 
@@ -44,7 +44,7 @@ class Bundle:
     """Collects the values of a step and publishes them under `key`.
 
     A reader whose connection is congested misses some, and delays no one. `changed` is called whenever
-    `wants` may have changed.
+    `needs` may have changed.
     """
 
     def __init__(self, session: zenoh.Session, key: str, changed: Callable[[], None]) -> None:
@@ -52,7 +52,7 @@ class Bundle:
         self._changed = changed
         self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, self._matched, always=False)
 
-    def wants(self, index: int) -> bool:  # noqa: ARG002
+    def needs(self, index: int) -> bool:  # noqa: ARG002
         """Return whether the reader subscribes, and needs the connection with this index."""
         return self._publisher.needed
 
@@ -88,9 +88,9 @@ class DeviceBundle(Bundle):
     Args:
         session: The Zenoh session.
         key: Under which the values are published.
-        changed: Is called whenever `wants` may have changed.
+        changed: Is called whenever `needs` may have changed.
         use_ns: The time between two uses of the values; 0: each value is used.
-        wants_key: Under which the device publishes what it needs; until it does, that is everything.
+        uses_key: Under which the device publishes what it needs; until it does, that is everything.
         count: The number of connections.
         run: The number of the run.
         refusals: Counts the messages that are refused.
@@ -103,7 +103,7 @@ class DeviceBundle(Bundle):
         changed: Callable[[], None],
         *,
         use_ns: int,
-        wants_key: str,
+        uses_key: str,
         count: int,
         run: int,
         refusals: Refusals,
@@ -111,7 +111,7 @@ class DeviceBundle(Bundle):
         self._use_ns, self._run, self._refusals = use_ns, run, refusals
         self._wanted = _WANTED * count
         super().__init__(session, key, changed)
-        self._subscriber = session.declare_subscriber(wants_key, Callback(self._set_wanted, indirect=False))
+        self._subscriber = session.declare_subscriber(uses_key, Callback(self._set_wanted, indirect=False))
 
     def _set_wanted(self, sample: zenoh.Sample) -> None:
         try:
@@ -119,7 +119,7 @@ class DeviceBundle(Bundle):
             if tag.run != self._run:
                 raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
             if len(wanted) != len(self._wanted):
-                raise MessageError(f"wants of {len(wanted)} connections, there are {len(self._wanted)}")
+                raise MessageError(f"uses of {len(wanted)} connections, there are {len(self._wanted)}")
         except MessageError as error:
             self._refusals.refuse_sample(sample, error)
             return
@@ -127,7 +127,7 @@ class DeviceBundle(Bundle):
             self._wanted = wanted
             self._changed()
 
-    def wants(self, index: int) -> bool:
+    def needs(self, index: int) -> bool:
         """Return whether the device subscribes, and needs the connection with this index."""
         return self._wanted[index] != 0 and self._publisher.needed
 

@@ -79,7 +79,7 @@ class PortPublisher:
     @property
     def needed(self) -> bool:
         """Whether anybody receives the values."""
-        bundled = any(bundle.wants(index) for bundle, index in self._bundles)
+        bundled = any(bundle.needs(index) for bundle, index in self._bundles)
         return bool(self._lanes or self._needed or bundled)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
@@ -102,7 +102,7 @@ class PortPublisher:
         takers = [
             (bundle, index)
             for bundle, index in self._bundles
-            if bundle.wants(index) and bundle.takes(time_ns, self._stride_ns)
+            if bundle.needs(index) and bundle.takes(time_ns, self._stride_ns)
         ]
         if takers:
             packed = self.codec.pack(value)

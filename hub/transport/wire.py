@@ -72,7 +72,7 @@ class Wire:
                 key,
                 changed,
                 use_ns=target.use_ns,
-                wants_key=self.keys.wants(target.name, source),
+                uses_key=self.keys.uses(target.name, source),
                 count=count,
                 run=self.run,
                 refusals=self.refusals,

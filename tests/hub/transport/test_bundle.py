@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from zenoh.handlers import FifoChannel
 
-from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle, bundled, unpacked, wants
+from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle, bundled, unpacked, use_mask
 from hub.transport.envelope import Tag
 from hub.transport.refusals import Refusals
 from hub.transport.zenoh_session import open_session
@@ -112,7 +112,7 @@ def test_an_observer_gets_the_values_that_hold_at_its_period_and_the_first_again
         bundle.close()
 
 
-WANTS = "trocar/test/device/camera/wants/arm"
+USES = "trocar/test/device/camera/uses/arm"
 
 
 @contextmanager
@@ -125,7 +125,7 @@ def device_bundle(use_ns=0, count=3):
             KEY,
             lambda: changes.append(1),
             use_ns=use_ns,
-            wants_key=WANTS,
+            uses_key=USES,
             count=count,
             run=7,
             refusals=refusals,
@@ -153,12 +153,12 @@ def test_a_device_gets_a_new_value_for_each_use_and_no_more_than_it_needs_for_th
 
 def test_a_device_says_what_it_needs():
     with device_bundle() as (bundle, session, refusals, changes):
-        assert [bundle.wants(index) for index in range(3)] == [True] * 3
+        assert [bundle.needs(index) for index in range(3)] == [True] * 3
         before = len(changes)
-        for run, told in ((7, wants(["a", "b", "c"], {"b"})), (7, b"\1"), (8, b"\0\0\0")):
-            session.put(WANTS, told, attachment=Tag.pack(run, 0, -1, 0))
+        for run, told in ((7, use_mask(["a", "b", "c"], {"b"})), (7, b"\1"), (8, b"\0\0\0")):
+            session.put(USES, told, attachment=Tag.pack(run, 0, -1, 0))
         until = time.monotonic() + 5.0
         while (refusals.total < 2 or len(changes) == before) and time.monotonic() < until:
             time.sleep(0.005)
-        assert [bundle.wants(index) for index in range(3)] == [True, False, True]
+        assert [bundle.needs(index) for index in range(3)] == [True, False, True]
         assert (refusals.total, len(changes)) == (2, before + 1)
