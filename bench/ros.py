@@ -2,12 +2,14 @@
 
 Also moves and homing in long repetition.
 
-python bench/ros.py ros2-zenoh|ros2-dds|ros1 [bare session face servo moves cycles] [--output figures.json]
+python -m bench.ros ros2-zenoh|ros2-dds|ros1 [bare session face live servo moves cycles] [--output FILE]
 
 `bare`: a gateway alone in a process, told joint states of two PSMs and the ECM and stereo pictures of 320 x
 288 at 60 Hz; `session`: the same in a session of motion controller and MuJoCo, H = 2 ms, in real time. The
-pictures are noise that nobody draws: what is measured is the gateway. `servo`: from a `servo_jp` to the
-joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable, enable, home. The console is always a
+pictures are noise that nobody draws: what is measured is the gateway. `live`: the scenario `ros` as it is
+shipped, with its endoscope; the console listens to the joint states of all arms and to both pictures.
+`servo`: from a `servo_jp` to the joint; `moves`, `cycles`: `move_jp(...).wait()`, and unhome, disable,
+enable, home. The console is always a
 process of its own, and its ages are from stamp to receipt (one machine, one clock). Times depend on the
 machine and on who else uses it: its load stands beside.
 """
@@ -21,21 +23,22 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
-from ros_client import percentiles
-from ros_figures import cpu_s, host_process
-from ros_places import PLACES, Place
-
+from bench.ros_figures import cpu_s, host_process, percentiles
+from bench.ros_places import PLACES, Place
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.session.session import Session
 from hub.transport.loopback_port import LoopbackPort
 
 HERE = Path(__file__).parent
+ENDPOINT = "tcp/127.0.0.1:0"
 ARMS = {
     "PSM1": {"instrument": "400006"},
     "PSM2": {"instrument": "400006"},
@@ -55,6 +58,12 @@ LISTENED = [[f"/{name}", "sensor_msgs/msg/JointState"] for name in STATES] + [
 GATEWAY = {"arms": ARMS, "mounting": "cart"}
 FAST = {"publish_period": "4545 us"}
 """220 Hz, of states that the motion controller tells at 250 Hz."""
+
+LIVE = [
+    [f"/{name}", "sensor_msgs/msg/JointState"]
+    for name in (*STATES, "PSM3/measured_js", "PSM3/jaw/measured_js")
+] + LISTENED[len(STATES) :]
+"""What the console of `live` listens to."""
 
 SCENARIO: dict[str, Any] = {
     "name": "ros_figures",
@@ -168,19 +177,26 @@ def in_session(
     with tempfile.TemporaryDirectory() as directory:
         file = Path(directory, "ros.yaml")
         file.write_text(json.dumps(scenario))
-        session = launch(load(str(file)), endpoint="tcp/127.0.0.1:0")
-        result: dict[str, Any] = {}
-        thread = Thread(
-            target=_beside,
-            args=(session, result, lambda: Console(kind, place, session.programs_endpoint, task, arguments)),
-        )
-        thread.start()
-        summary = session.run()
-        thread.join()
+        return _with_console(launch(load(str(file)), endpoint=ENDPOINT), kind, place, task, arguments)
+
+
+def _with_console(
+    session: Session, kind: str, place: Place, task: str, arguments: dict[str, Any]
+) -> dict[str, Any]:
+    """Run a session with a console and its task."""
+    result: dict[str, Any] = {}
+    thread = Thread(
+        target=_beside,
+        args=(session, result, lambda: Console(kind, place, session.programs_endpoint, task, arguments)),
+    )
+    thread.start()
+    summary = session.run()
+    thread.join()
     result |= {
         "real_time_factor": round(summary.real_time_factor, 4),
         "steps": summary.steps,
         "late_steps": summary.late_steps,
+        "observers": {name: asdict(one) for name, one in summary.observers.items()},
     }
     way = summary.latency["state to force"]
     result["hub_to_gateway_ms"] = {
@@ -199,15 +215,21 @@ def _beside(session: Session, result: dict[str, Any], console: Callable[[], Cons
         gateway = host_process("ros")
         program.go()
         program.go()  # ends what it listens to as soon as its time is over
-        before, begun = (cpu_s(), cpu_s(gateway)), monotonic()
+        places = {"hub": "self", "gateway": gateway} | _cameras()
+        before, begun = {name: cpu_s(process) for name, process in places.items()}, monotonic()
         result |= program.result()
         seconds = monotonic() - begun
-        result["hub_cpu_percent"], result["gateway_cpu_percent"] = (
-            round(100 * (after - one) / seconds, 1)
-            for one, after in zip(before, (cpu_s(), cpu_s(gateway)), strict=True)
-        )
+        for name, process in places.items():
+            result[f"{name}_cpu_percent"] = round(100 * (cpu_s(process) - before[name]) / seconds, 1)
     finally:
         session.state.shutdown()
+
+
+def _cameras() -> dict[str, int]:
+    """Return the process of the cameras, if there is one."""
+    with suppress(LookupError):
+        return {"cameras": host_process("cameras")}
+    return {}
 
 
 def _machine() -> dict[str, Any]:
@@ -219,7 +241,7 @@ def session(kind: str, place: Place, seconds: float, *, everything: bool = False
 
     `everything`: publish all states of the arms, not only their joints.
     """
-    parts = {"camera": {"kind": "ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
+    parts = {"camera": {"kind": "bench.ros_parts:Pictures", "host": "cameras", "period": "16 ms"}}
     states = ["motion.* -> ros.*"] if everything else [f"motion.{name} -> ros.{name}" for name in STATES]
     connections = [
         *states,
@@ -232,11 +254,19 @@ def session(kind: str, place: Place, seconds: float, *, everything: bool = False
     return result
 
 
+def live(kind: str, place: Place, seconds: float) -> dict[str, Any]:
+    """Measure the scenario `ros` as it is shipped, with its cameras."""
+    changes = {"kind": kind, **place.params}
+    overrides = [f"participants.ros.{name}={value}" for name, value in changes.items()]
+    task = {"topics": LIVE, "seconds": seconds}
+    return _with_console(launch(load("ros", overrides), endpoint=ENDPOINT), kind, place, "listen", task)
+
+
 def servo(kind: str, place: Place, count: int) -> dict[str, Any]:
     """Measure the way of `servo_jp` to the joint."""
     with tempfile.TemporaryDirectory() as directory:
         output = Path(directory, "times.json")
-        parts = {"watch": {"kind": "ros_parts:Stopwatch", "output": str(output)}}
+        parts = {"watch": {"kind": "bench.ros_parts:Stopwatch", "output": str(output)}}
         watched = [
             "ros.PSM1/servo_jp -> watch.servo_jp",
             "motion.drive/PSM1/servo_jp -> watch.setpoint",
@@ -264,6 +294,7 @@ def main() -> None:
         "bare": lambda kind, place, a: bare(kind, place, a.seconds),
         "session": lambda kind, place, a: session(kind, place, a.seconds),
         "face": lambda kind, place, a: session(kind, place, a.seconds, everything=True),
+        "live": lambda kind, place, a: live(kind, place, a.seconds),
         "servo": lambda kind, place, a: servo(kind, place, a.pulses),
         "moves": lambda kind, place, a: endless(kind, place, "moves", a.moves),
         "cycles": lambda kind, place, a: endless(kind, place, "cycles", a.cycles),
@@ -281,7 +312,9 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=200)
     parser.add_argument("--output", type=Path, help="also write the JSON to this file")
     arguments = parser.parse_args()
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+    os.environ["PYTHONPATH"] = os.pathsep.join(
+        [str(HERE.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    )
     with PLACES[arguments.kind]() as place:
         figures = {
             name: measures[name](arguments.kind, place, arguments) for name in arguments.what or measures

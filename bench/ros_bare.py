@@ -19,9 +19,9 @@ from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
-from ros_figures import cpu_s
-from ros_parts import EYES, picture
 
+from bench.ros_figures import cpu_s
+from bench.ros_parts import EYES, picture
 from devices.ros.gateway import Gateway
 from hub.planning.registry import make
 from hub.transport.zenoh_session import open_session

@@ -18,27 +18,11 @@ from itertools import pairwise
 from time import monotonic, sleep, time_ns
 from typing import Any
 
+from ros_figures import MOVED_RAD, percentiles
 from ros_middleware import JOINT_STATE, MIDDLEWARE, OPERATING_STATE, STRING_STAMPED
 
-MOVED_RAD = 1e-7
-"""An arm that holds still does not move by 1e-13 rad; the drives move the yaw by some 1e-7 rad in the first
-step of 2 ms.
-"""
 PATIENCE_S = 10.0
 """How long the busy edge of a move or of homing may take, and the end of it; more is a miss, and a hang."""
-
-
-def percentiles(times_ns: list[int]) -> dict[str, float]:
-    """Return p50, p99 and the largest, in ms."""
-    ordered = sorted(times_ns)
-    if not ordered:
-        return {"count": 0}
-    picked = {
-        "p50_ms": ordered[len(ordered) // 2],
-        "p99_ms": ordered[min(len(ordered) - 1, len(ordered) * 99 // 100)],
-        "max_ms": ordered[-1],
-    }
-    return {"count": len(ordered)} | {name: round(value / 1e6, 3) for name, value in picked.items()}
 
 
 def begin(client: Any) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 from time import time_ns
 
 import numpy as np
-from ros_client import MOVED_RAD
 
+from bench.ros_figures import MOVED_RAD
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from schemas.ports import Port
 from schemas.ros import Header, Image, JointState

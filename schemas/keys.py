@@ -56,6 +56,10 @@ class Keys:
         """
         return f"{self.prefix}/engine/{participant}/signals/{reader}"
 
+    def uses(self, device: str, participant: str) -> str:
+        """Key on which a wall-clock device publishes which signals of a participant it uses."""
+        return f"{self.prefix}/device/{device}/uses/{participant}"
+
     def host_profile(self, host: str) -> str:
         """Key on which a host of the hub's machine answers with its part of the profile; `*` for all."""
         return f"{self.prefix}/host/{host}/profile"

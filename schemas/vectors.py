@@ -175,6 +175,14 @@ class VectorCodec:
         numbers = bytearray().join([payload[start:stop] for start, stop, _ in self.spans])
         return self.checked(np.frombuffer(numbers))
 
+    def unpack(self, numbers: bytes) -> Vector:
+        """Return the vector, shape (size,), of these bytes; raises MessageError if it is invalid."""
+        if len(numbers) != self.neutral.nbytes:
+            raise MessageError(
+                f"port '{self.port.name}': {len(numbers)} bytes of numbers, expected {self.neutral.nbytes}"
+            )
+        return self.checked(np.frombuffer(numbers))
+
     def decode_all(self, payloads: Sequence[bytes]) -> NDArray[np.float64]:
         """Return the vectors, shape (n, size), in the CDR bytes of many messages.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from abc import abstractmethod
 from collections import defaultdict, deque
+from collections.abc import Collection
 from pathlib import Path
 from typing import ClassVar, cast
 
@@ -18,14 +19,26 @@ from devices.ros.topics.arbitration import CommandArbiter
 from devices.ros.topics.diagnostics import DIAGNOSTICS_PERIOD_NS, DIAGNOSTICS_ROW, Diagnostics
 from devices.ros.topics.dvrk_table import dvrk_table
 from devices.ros.topics.kinematics import kinematics_handler
-from devices.ros.topics.publications import EventTopic, PeriodicTopic, Publications, State
+from devices.ros.topics.publications import (
+    Arrivals,
+    EventTopic,
+    PeriodicTopic,
+    Publications,
+    State,
+    WantedTopic,
+)
 from devices.ros.topics.refusal_reports import RefusalReports
 from devices.ros.topics.refused_moves import RefusedMoves
 from devices.ros.topics.row import Row
 from devices.ros.topics.subscriptions import SubscribedTopic
 from devices.ros.topics.vrep_table import vrep_table
-from devices.ros.topics.whole_robot import periods_between, robot_description, whole_robot_sources
-from devices.ros.transport import ServiceHandler, Transport
+from devices.ros.topics.whole_robot import (
+    inputs_of_all,
+    periods_between,
+    robot_description,
+    whole_robot_sources,
+)
+from devices.ros.transport import Publisher, ServiceHandler, Transport
 from devices.samples import stamp_of
 from hub.participant import Device, Sample, Value
 from robots.dvrk.setup_joints import CartArm
@@ -54,6 +67,7 @@ class Gateway(Device):
 
     def __init__(self, name: str, params: GatewayParams) -> None:
         super().__init__(name, params)
+        self.use_period_ns = params.publish_period
         self.rows = self.table()
         """All topics and services."""
         self._status = Port(
@@ -77,12 +91,18 @@ class Gateway(Device):
         """Start from nothing: no client, no message."""
         self._counters = StatusCounters(self.kind, self.rows)
         self._states: dict[str, State] = {}
+        self._optional: list[tuple[State, Publisher]] = []
+        """States that are used while a program subscribes, and only then, with what publishes them."""
+        self._unused: frozenset[str] = frozenset()
+        self._has_changed = True
+        """Whether programs have subscribed, or have ceased to."""
         self._events: dict[str, EventTopic] = {}
         self._arbiters: defaultdict[str, CommandArbiter] = defaultdict(CommandArbiter)
         self._refusals = RefusalReports(self.name, self._publish_text)
         self._refused_moves = RefusedMoves(self._publish)
         self._received: deque[Sample] = deque()
-        self._has_received = threading.Event()
+        self._is_new = threading.Event()
+        """A message of a program, or its subscription."""
         self._status_due_ns = 0
         self._publications: Publications | None = None
         self._diagnostics: Diagnostics | None = None
@@ -108,6 +128,7 @@ class Gateway(Device):
         self.close()
         self._reset()
         self._transport = transport = self.connect(directory)
+        transport.changed = self._note_programs
         self._publications = Publications(
             self.name, self._advertise_all(transport), self.params.publish_period
         )
@@ -128,17 +149,24 @@ class Gateway(Device):
         rows = [
             (row, transport.advertise(row), self._counters[row]) for row in self.rows if row.way == "publish"
         ]
+        arrivals = Arrivals()
         self._states = {
-            row.port.name: State(row.port) for row, _, _ in rows if row.port is not None and row.periodic
+            row.port.name: State(row.port, arrivals)
+            for row, _, _ in rows
+            if row.port is not None and row.periodic
         }
         self._diagnostics = Diagnostics(
             self.name, self._states, ((row, count) for row, _, count in rows if row.port is not None)
         )
         whole_robot = whole_robot_sources(self.params, self._states)
+        always = inputs_of_all(self.params) if self.params.profile == "dvrk" else self._states.keys()
         periodic: list[PeriodicTopic] = []
         for row, publish, count in rows:
             if row.port is not None and row.periodic:
-                periodic.append(PeriodicTopic(self._states[row.port.name], publish, count))
+                state = self._states[row.port.name]
+                periodic.append(WantedTopic(state, publish, count))
+                if row.port.name not in always:
+                    self._optional.append((state, publish))
             elif row.port is not None:
                 self._events[row.port.name] = EventTopic(publish, count)
             elif row == DIAGNOSTICS_ROW:
@@ -146,7 +174,7 @@ class Gateway(Device):
                 periodic.append(PeriodicTopic(self._diagnostics, publish, count, every))
             elif row.name in whole_robot:
                 every = periods_between(row.name, self.params.publish_period)
-                periodic.append(PeriodicTopic(whole_robot[row.name], publish, count, every))
+                periodic.append(WantedTopic(whole_robot[row.name], publish, count, every))
             elif self.params.robot_description is not None:
                 urdf = robot_description(self.params.robot_description)
                 EventTopic(publish, count).write(StringMessage(data=urdf))
@@ -156,7 +184,7 @@ class Gateway(Device):
         if row.port is not None:
             self._refused_moves.accepted(row)
             self._received.append(Sample(row.port.name, message))
-            self._has_received.set()
+            self._is_new.set()
 
     def _refuse(self, row: Row, level: str, reason: str) -> None:
         self._refusals.report(row, level, reason)
@@ -177,7 +205,10 @@ class Gateway(Device):
         """Return what ROS programs have published since the last call, and the status once a second."""
         if self._publications is not None:
             self._publications.check()
-        self._has_received.clear()
+        self._is_new.clear()
+        if self._has_changed or t >= self._status_due_ns:
+            self._has_changed = False
+            self._update_used()
         samples = [self._received.popleft() for _ in range(len(self._received))]
         if self._transport is not None and t >= self._status_due_ns:
             self._status_due_ns = t + _STATUS_NS
@@ -185,20 +216,37 @@ class Gateway(Device):
         return samples
 
     def wait(self, seconds: float) -> bool:
-        """Wait at most so long for a message of a ROS program; return whether one has arrived."""
-        return self._has_received.wait(seconds)
+        """Wait at most so long for a message or a subscription of a ROS program; return whether one came."""
+        return self._is_new.wait(seconds)
+
+    def unused(self) -> Collection[str]:
+        """Return the states to which no program subscribes, and which the gateway does not read itself."""
+        return self._unused
+
+    def _note_programs(self) -> None:
+        self._has_changed = True
+        self._is_new.set()
+
+    def _update_used(self) -> None:
+        for state, publish in self._optional:
+            # the first value is awaited: by it the topic counts as published
+            state.use(used=publish.wanted or not state.writes)
+        unused = frozenset(state.port.name for state, _ in self._optional if not state.used)
+        if unused != self._unused:
+            self._unused = unused
 
     def write(self, port: str, value: Value) -> None:
         """Set the newest value of a state, or publish a message. Never blocks."""
+        if (state := self._states.get(port)) is not None:
+            state.write(cast("Vector", value))
+            return
         row = self._inputs.get(port)
         if row is None:
             raise MessageError(
                 f"device '{self.name}' has no input '{port}'.{did_you_mean(port, self._inputs)}"
             )
         self._note(row, value)
-        if port in self._states:
-            self._states[port].write(cast("Vector", value))
-        elif port in self._events:
+        if port in self._events:
             self._events[port].write(value)
         elif row.latched:
             self._early[port] = value
@@ -230,3 +278,4 @@ class Gateway(Device):
             self._transport.close()
         self._publications = self._transport = None
         self._states, self._events = {}, {}
+        self._optional, self._unused = [], frozenset()

@@ -19,11 +19,21 @@ NODE = "/dvrk"
 jhu-dvrk/sawIntuitiveResearchKit, ros/dvrk_robot/src/dvrk_system.cpp (commit 47bb09f7).
 """
 
-Publisher = Callable[[bytes], None]
-"""Publishes one message (CDR). Never blocks: where a reader is too slow, older messages are dropped for it.
 
-For one thread at a time.
-"""
+class Publisher(Protocol):
+    """Publishes the messages of one topic. For one thread at a time."""
+
+    @property
+    def wanted(self) -> bool:
+        """Whether a program subscribes, or may; `Transport.changed` is called when this has changed.
+
+        True for latched topics, whose last message is for those who come later.
+        """
+        ...
+
+    def __call__(self, message: bytes, /) -> None:
+        """Publish a message (CDR). Never blocks: for a reader that is too slow older ones are dropped."""
+        ...
 
 
 class MessageHandler(Protocol):
@@ -63,6 +73,9 @@ class Client:
 
 class Transport(ABC):
     """Publishers, subscribers and services of one ROS graph."""
+
+    changed: Callable[[], None] = staticmethod(lambda: None)
+    """Is called, in any thread, when a publisher has become `wanted` or is so no longer."""
 
     @abstractmethod
     def advertise(self, row: Row) -> Publisher:

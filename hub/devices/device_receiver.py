@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from queue import SimpleQueue
 from threading import Thread
@@ -19,7 +19,7 @@ from hub.devices.run_info import RunInfo
 from hub.observation.latency import Latencies
 from hub.participant import Value
 from hub.planning.plan import ConnectionToDevice
-from hub.transport.bundle import bundled, unpacked
+from hub.transport.bundle import bundled, unpacked, use_mask
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.port_codec import PortCodec
@@ -53,15 +53,20 @@ class DeviceReceiver:
         self._name, self._run, self._link, self._device = name, run, link, thread
         self._refusals, self._offset = refusals, offset
         self._inputs: list[_Input] = []
+        self._unused: Collection[str] = ()
+        self._has_reported = False
+        """Whether the sources know `_unused`: of most devices everything is used."""
+        self._uses: list[tuple[list[str], zenoh.Publisher]] = []
+        """Inputs of each bundle, and where it is published which of them are used."""
         self._arrived: SimpleQueue[_Subscription | None] = SimpleQueue()
         self._thread = Thread(target=self._receive, name=f"receiver {name}", daemon=True)
         self._thread.start()
         self._subscribers = [
             session.declare_subscriber(one.key, Callback(partial(self._put, one), indirect=False))
-            for one in self._subscriptions()
+            for one in self._subscriptions(session)
         ]
 
-    def _subscriptions(self) -> Iterator[_Subscription]:
+    def _subscriptions(self, session: zenoh.Session) -> Iterator[_Subscription]:
         """Yield the keys to receive: the bundle of each participant's signals, and each event port."""
         plan, keys, name = self._run.plan, self._run.keys, self._name
         outlets = [outlet for outlet in plan.to_devices if outlet.target == name]
@@ -69,6 +74,8 @@ class DeviceReceiver:
             signals = bundled(plan, source, name)
             if signals:
                 inputs = [self._input(outlet) for outlet in signals]
+                uses = session.declare_publisher(keys.uses(name, source), express=True)
+                self._uses.append(([outlet.target_port for outlet in signals], uses))
                 yield _Subscription(keys.signals(source, name), inputs, whole=False)
             for outlet in outlets:
                 if outlet.source == source and outlet not in signals:
@@ -95,6 +102,14 @@ class DeviceReceiver:
                 except MessageError as error:
                     self._refusals.refuse_sample(sample, error)
 
+    def want_all_but(self, unused: Collection[str], *, again: bool = False) -> None:
+        """Tell the sources which signals they need not send, if that has changed; or `again`."""
+        if unused is self._unused and not (again and self._has_reported):
+            return
+        self._unused, self._has_reported = unused, True
+        for ports, publisher in self._uses:
+            publisher.put(use_mask(ports, unused), attachment=Tag.pack(self._run.number, 0, INITIAL, 0))
+
     def write_arrived(self, t: int) -> None:
         """Write to the device what has passed the link by `t` (ns since the start of the device's thread)."""
         for one in self._inputs:
@@ -104,6 +119,8 @@ class DeviceReceiver:
         """Receive no more."""
         for subscriber in self._subscribers:
             subscriber.undeclare()
+        for _, publisher in self._uses:
+            publisher.undeclare()
         self._arrived.put(None)
         self._thread.join(timeout=2.0)
 
@@ -127,10 +144,13 @@ class _Subscription:
         if not tag.count:  # no events in this step
             return
         payload = sample.payload.to_bytes()
-        for index, value in [(0, payload)] if self._whole else unpacked(payload):
+        if self._whole:
+            self._inputs[0].receive(tag, payload)
+            return
+        for index, value in unpacked(payload):
             if index >= len(self._inputs):
                 raise MessageError(f"a bundle has value {index} of {len(self._inputs)}")
-            self._inputs[index].receive(tag, value)
+            self._inputs[index].receive_packed(tag, value)
 
 
 class _Input:
@@ -149,7 +169,8 @@ class _Input:
         source = run.plan.participants[outlet.source]
         target = run.plan.participants[outlet.target].port(outlet.target_port)
         sent = source.port(outlet.source_port)
-        self._codec = PortCodec(sent.model_copy(update={"variability": target.variability}))
+        self._codec = PortCodec(sent)
+        self._as_messages = target.variability == "event"
         self._port = target.name
         self._stream = f"{outlet.source}.{outlet.source_port} -> {outlet.target}.{target.name}"
         self._link, self._line = link, link.line(target)
@@ -158,8 +179,17 @@ class _Input:
         self._newest = (INITIAL - 1, 0)
 
     def receive(self, tag: Tag, payload: bytes) -> None:
-        """Write a value, or send it over the link; raises MessageError if it is invalid."""
-        value = self._codec.decode(payload)
+        """Write a value (CDR), or send it over the link; raises MessageError if it is invalid."""
+        self._take(tag, self._codec.decode(payload))
+
+    def receive_packed(self, tag: Tag, packed: bytes) -> None:
+        """Write a value of a bundle, or send it over the link; raises MessageError if it is invalid."""
+        value = self._codec.unpack(packed)
+        if self._as_messages and self._codec.vector is not None:
+            value = self._codec.vector.to_message(value, tag.time_ns)
+        self._take(tag, value)
+
+    def _take(self, tag: Tag, value: Value) -> None:
         if self._link.idle:
             self._write(tag, value)
         else:

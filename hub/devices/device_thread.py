@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from time import monotonic_ns
 from typing import Protocol
@@ -72,6 +72,10 @@ class DeviceThread:
             self._uplink = uplink
             if uplink is not None and self._current:
                 uplink.exchange(self.now_ns, list(self._current.values()))
+
+    def unused(self) -> Collection[str]:
+        """Return the signals that the device does not use now."""
+        return self._device.unused()
 
     def write(self, port: str, value: Value) -> None:
         """Write to the device; may be called from any thread.

@@ -90,6 +90,9 @@ class DeviceUplink:
         if now_ns - self._reported_ns >= _STATUS_NS:
             self._reported_ns = now_ns
             self._report_status()
+            self._receiver.want_all_but(self._thread.unused(), again=True)  # a source may have come later
+        else:
+            self._receiver.want_all_but(self._thread.unused())
         return not idle
 
     def _publish(self, port: str, payload: bytes, stamp: bytes) -> None:

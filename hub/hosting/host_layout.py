@@ -152,10 +152,9 @@ class HostLayout:
         indices: dict[str, list[tuple[Bundle, int]]] = {}
         outlets = [outlet for outlet in self._plan.to_devices if outlet.source == one.name]
         for name in dict.fromkeys(outlet.target for outlet in outlets):
-            target = self._plan.participants[name]
-            period_ns = target.period * self._plan.step_ns if target.observer else 0
-            bundle = one.bundles[name] = wire.bundle(one.name, name, period_ns)
-            for index, outlet in enumerate(bundled(self._plan, one.name, name)):
+            signals, target = bundled(self._plan, one.name, name), self._plan.participants[name]
+            bundle = one.bundles[name] = wire.bundle(one.name, target, self._plan.step_ns, len(signals))
+            for index, outlet in enumerate(signals):
                 indices.setdefault(outlet.source_port, []).append((bundle, index))
         return indices
 

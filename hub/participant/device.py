@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -87,6 +87,12 @@ class Device(Participant):
     read_period_ns: ClassVar[int] = 1_000_000
     """Default time between two reads in wall time: a haptic stylus is read and driven at 1 kHz."""
 
+    use_period_ns: int = 0
+    """How often it uses the newest values of its signals, in wall time; 0: it uses each.
+
+    Of more values than one for each use not all are sent to it.
+    """
+
     @abstractmethod
     def open(self, directory: Path) -> None:
         """Start the device; relative paths of the scenario start at `directory`."""
@@ -102,6 +108,13 @@ class Device(Participant):
         """
         sleep(seconds)
         return False
+
+    def unused(self) -> Collection[str]:
+        """Return the signals whose values it does not need until further notice: they are not sent.
+
+        Asked after each `read`; the same collection as long as nothing has changed.
+        """
+        return ()
 
     def write(self, port: str, value: Value) -> None:
         """Accept the newest value of a signal, or the next message of an event port.

@@ -56,6 +56,7 @@ def plan_participant(
         host=f"remote/{name}" if spec.host == "remote" else spec.host,
         period=period_ns // scenario.step,
         read_ns=read_ns,
+        use_ns=participant.use_period_ns if isinstance(participant, Device) else 0,
         network_link=spec.network_link,
         rate_limit=spec.rate_limit,
         ports=ports,

@@ -41,6 +41,8 @@ class PlannedParticipant(_Part):
     """In communication steps; 1 for a device in wall time."""
     read_ns: int = 0
     """For a device in wall time: the time between two reads."""
+    use_ns: int = 0
+    """For a device in wall time: the time between two uses of its signals; 0: it uses every value."""
     network_link: NetworkLinkSpec | None = None
     """For a device: the emulated network between it and the hub."""
     rate_limit: float = 2000.0

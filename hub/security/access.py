@@ -103,6 +103,7 @@ def _part(plan: Plan, keys: Keys, planned: PlannedParticipant) -> list[Rule]:
         if connection.target == name
     ] + [_to_device(plan, keys, connection) for connection in plan.to_devices if connection.target == name]
     orders = [keys.link(name)] if role == "device" else [] if planned.observer else [keys.grant]
+    orders += [keys.uses(one.target, name) for one in plan.to_devices if one.source == name]
     # the hub subscribes to these of all participants at once
     of_all = [keys.device_status("*"), keys.observer_status("*"), keys.refused("*", "*"), keys.ack("*")]
     return [

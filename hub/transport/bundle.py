@@ -1,24 +1,28 @@
 """Bundles: the signals of one participant for a wall-time device or an observer, all of a step in a message.
 
 A gateway to ROS receives a hundred of them at a time. As a message each they took the hub 1.9 ms of a step
-(docs/decisions/0034).
+(docs/decisions/0034). Vectors are in it as their numbers alone: both ends know the ports.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import zenoh
+from zenoh.handlers import Callback
 
 from hub.planning.plan import ConnectionToDevice, Plan
+from hub.transport.envelope import Tag
 from hub.transport.publisher import Publisher
+from hub.transport.refusals import Refusals
 from schemas.errors import MessageError
 
-__all__ = ["Bundle", "ObserverBundle", "bundled", "unpacked"]
+__all__ = ["Bundle", "DeviceBundle", "ObserverBundle", "bundled", "unpacked", "use_mask"]
 
 _HEAD = struct.Struct("<II")
-"""Index of the connection, and the number of bytes of CDR that follow."""
+"""Index of the connection, and the number of bytes of the value that follow."""
+_WANTED, _UNUSED = b"\1", b"\0"
 
 
 def bundled(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
@@ -31,11 +35,16 @@ def bundled(plan: Plan, source: str, target: str) -> list[ConnectionToDevice]:
     ]
 
 
+def use_mask(ports: Sequence[str], unused: Collection[str]) -> bytes:
+    """Return what a device publishes for the source of a bundle: a byte for each of the inputs `ports`."""
+    return b"".join(_UNUSED if port in unused else _WANTED for port in ports)
+
+
 class Bundle:
-    """Collects the values of a step for a device and publishes them under `key`.
+    """Collects the values of a step and publishes them under `key`.
 
     A reader whose connection is congested misses some, and delays no one. `changed` is called whenever
-    `needed` may have changed.
+    `needs` may have changed.
     """
 
     def __init__(self, session: zenoh.Session, key: str, changed: Callable[[], None]) -> None:
@@ -43,14 +52,13 @@ class Bundle:
         self._changed = changed
         self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, self._matched, always=False)
 
-    @property
-    def needed(self) -> bool:
-        """Whether the reader subscribes."""
+    def needs(self, index: int) -> bool:  # noqa: ARG002
+        """Return whether the reader subscribes, and needs the connection with this index."""
         return self._publisher.needed
 
     def takes(self, time_ns: int, stride_ns: int) -> bool:  # noqa: ARG002
         """Return whether to add the value of `time_ns`, which holds for `stride_ns`."""
-        return self.needed
+        return self._publisher.needed
 
     def _matched(self) -> None:
         self._changed()
@@ -61,7 +69,7 @@ class Bundle:
         return bool(self._parts)
 
     def add(self, index: int, payload: bytes) -> None:
-        """Add the value of the connection with this index."""
+        """Add the value of the connection with this index, as `PortCodec.pack` returns it."""
         self._parts += _HEAD.pack(index, len(payload)), payload
 
     def send(self, tag: bytes, *, first: bool = False) -> None:  # noqa: ARG002
@@ -72,6 +80,70 @@ class Bundle:
     def close(self) -> None:
         """Publish no more."""
         self._publisher.close()
+
+
+class DeviceBundle(Bundle):
+    """A bundle of the values that a wall-time device needs: as often as it uses them, and only those it uses.
+
+    Args:
+        session: The Zenoh session.
+        key: Under which the values are published.
+        changed: Is called whenever `needs` may have changed.
+        use_ns: The time between two uses of the values; 0: each value is used.
+        uses_key: Under which the device publishes what it needs; until it does, that is everything.
+        count: The number of connections.
+        run: The number of the run.
+        refusals: Counts the messages that are refused.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        key: str,
+        changed: Callable[[], None],
+        *,
+        use_ns: int,
+        uses_key: str,
+        count: int,
+        run: int,
+        refusals: Refusals,
+    ) -> None:
+        self._use_ns, self._run, self._refusals = use_ns, run, refusals
+        self._wanted = _WANTED * count
+        super().__init__(session, key, changed)
+        self._subscriber = session.declare_subscriber(uses_key, Callback(self._set_wanted, indirect=False))
+
+    def _set_wanted(self, sample: zenoh.Sample) -> None:
+        try:
+            tag, wanted = Tag.of(sample), sample.payload.to_bytes()
+            if tag.run != self._run:
+                raise MessageError(f"belongs to run {tag.run:x}, this is run {self._run:x}")
+            if len(wanted) != len(self._wanted):
+                raise MessageError(f"uses of {len(wanted)} connections, there are {len(self._wanted)}")
+        except MessageError as error:
+            self._refusals.refuse_sample(sample, error)
+            return
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self._changed()
+
+    def needs(self, index: int) -> bool:
+        """Return whether the device subscribes, and needs the connection with this index."""
+        return self._wanted[index] != 0 and self._publisher.needed
+
+    def takes(self, time_ns: int, stride_ns: int) -> bool:
+        """Return whether to add the value of `time_ns`, which holds for `stride_ns`.
+
+        It is every n-th value, with the largest n that brings a new one for each use.
+        """
+        if self._use_ns >= 2 * stride_ns and time_ns % (self._use_ns // stride_ns * stride_ns):
+            return False
+        return self._publisher.needed
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._subscriber.undeclare()
+        super().close()
 
 
 class ObserverBundle(Bundle):
@@ -93,7 +165,7 @@ class ObserverBundle(Bundle):
 
     def takes(self, time_ns: int, stride_ns: int) -> bool:
         """Return whether to add the value of `time_ns`: it holds at a multiple of the period."""
-        return self.needed and -time_ns % self._period_ns < stride_ns
+        return self._publisher.needed and -time_ns % self._period_ns < stride_ns
 
     def send(self, tag: bytes, *, first: bool = False) -> None:
         """Publish what was added since the last time; `first`: the values at time 0."""
@@ -106,7 +178,7 @@ class ObserverBundle(Bundle):
 
 
 def unpacked(payload: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield index and CDR of each value in a bundle; raises MessageError if the bytes are invalid."""
+    """Yield index and bytes of each value in a bundle; raises MessageError if it is invalid."""
     at = 0
     while at < len(payload):
         if len(payload) - at < _HEAD.size:

@@ -115,7 +115,7 @@ class ObserverInputs:
             self._seen_ns = time_ns
         try:
             values = {
-                one.port: one.codec.decode(value.payload)
+                one.port: one.codec.unpack(value.payload)
                 for one, value in zip(self._inputs, chosen, strict=True)
             }
         except MessageError as error:

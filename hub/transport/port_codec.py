@@ -33,6 +33,14 @@ class PortCodec:
         """
         return self.vector.decode(payload) if self.vector is not None else decode(self._model, payload)
 
+    def pack(self, value: Any) -> bytes:
+        """Return a signal's value for a bundle: a vector as its numbers alone, a message as CDR."""
+        return value.tobytes() if self.vector is not None else encode(value)
+
+    def unpack(self, payload: bytes) -> Any:
+        """Return the value that a `PortCodec` of the same port has packed; raises MessageError if invalid."""
+        return self.vector.unpack(payload) if self.vector is not None else decode(self._model, payload)
+
     def accept(self, payload: bytes) -> Any:
         """Return the vector or message in `payload`, from any sender: joints in any order, frame left out.
 

@@ -79,29 +79,35 @@ class PortPublisher:
     @property
     def needed(self) -> bool:
         """Whether anybody receives the values."""
-        bundled = any(bundle.needed for bundle, _ in self._bundles)
+        bundled = any(bundle.needs(index) for bundle, index in self._bundles)
         return bool(self._lanes or self._needed or bundled)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
         for lane in self._lanes:
             lane.send(step, value)
-        bundles: Sequence[tuple[Bundle, int]] = ()
         if self._bundles:
-            bundles = [bundle for bundle in self._bundles if bundle[0].takes(time_ns, self._stride_ns)]
-        if not self._needed and not bundles:
+            self._bundle(time_ns, value)
+        if not self._needed:
             return
         if not self.codec.is_event:
-            payload = self.codec.encode(value, time_ns)
-            for bundle, index in bundles:
-                bundle.add(index, payload)
-            if self._needed:
-                self._send(payload, Tag.pack(self._run, 0, step, time_ns))
+            self._send(self.codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns))
             return
         if not value and self.always:
             self._publishers[0].put(b"", Tag.pack(self._run, 0, step, time_ns, 0, 0))
         for index, message in enumerate(value):
             self._send(encode(message), Tag.pack(self._run, 0, step, time_ns, index, len(value)))
+
+    def _bundle(self, time_ns: int, value: Any) -> None:
+        takers = [
+            (bundle, index)
+            for bundle, index in self._bundles
+            if bundle.needs(index) and bundle.takes(time_ns, self._stride_ns)
+        ]
+        if takers:
+            packed = self.codec.pack(value)
+            for bundle, index in takers:
+                bundle.add(index, packed)
 
     def _send(self, payload: bytes, tag: bytes) -> None:
         for publisher in self._needed:

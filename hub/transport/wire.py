@@ -8,7 +8,7 @@ from typing import Any
 import zenoh
 
 from hub.planning.plan import PlannedParticipant
-from hub.transport.bundle import Bundle, ObserverBundle
+from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle
 from hub.transport.cells import RemoteCell
 from hub.transport.lane import LaneReceiver, LaneSender, has_lane, lane_address
 from hub.transport.port_publisher import PortPublisher
@@ -61,16 +61,22 @@ class Wire:
     def _count_change(self) -> None:
         self.changes += 1
 
-    def bundle(self, source: str, target: str, period_ns: int) -> Bundle:
-        """Return the bundle of a participant's signals for a wall-time device or an observer.
-
-        `period_ns` is the observer's period, and 0 for a device, which receives every value.
-        """
-        key, changed = self.keys.signals(source, target), self._count_change
+    def bundle(self, source: str, target: PlannedParticipant, step_ns: int, count: int) -> Bundle:
+        """Return the bundle of `count` signals of a participant for a wall-time device or an observer."""
+        key, changed = self.keys.signals(source, target.name), self._count_change
         bundle = (
-            ObserverBundle(self.session, key, changed, period_ns)
-            if period_ns
-            else Bundle(self.session, key, changed)
+            ObserverBundle(self.session, key, changed, target.period * step_ns)
+            if target.observer
+            else DeviceBundle(
+                self.session,
+                key,
+                changed,
+                use_ns=target.use_ns,
+                uses_key=self.keys.uses(target.name, source),
+                count=count,
+                run=self.run,
+                refusals=self.refusals,
+            )
         )
         self._bundles.append(bundle)
         return bundle

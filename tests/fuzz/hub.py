@@ -59,6 +59,7 @@ MESSAGES = {
     KEYS.output("device", "keys", "PSM1/servo_jp"): "sensor_msgs/msg/JointState",
     KEYS.output("device", "keys", "PSM1/hold"): "std_msgs/msg/Empty",
     KEYS.signals("teleop", "keys"): "std_msgs/msg/Float64",
+    KEYS.uses("keys", "teleop"): "std_msgs/msg/String",
     KEYS.device_status("keys"): "trocar_msgs/msg/DeviceStatus",
     KEYS.refused("engine", "teleop"): "std_msgs/msg/String",
     KEYS.link("keys"): "std_msgs/msg/String",

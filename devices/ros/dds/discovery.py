@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -38,22 +38,36 @@ _LAST_OF_EACH = Qos(
 class Discovery:
     """Keeps the graph of one participant's domain up to date."""
 
-    def __init__(self, participant: DomainParticipant, waitset: ReaderWaitSet) -> None:
-        """Start, with readers of `participant` in `waitset`."""
-        self._graph = Graph(participant.guid.bytes)
-        for topic in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription):
-            waitset.add(BuiltinDataReader(participant, topic), self._on_endpoint)
+    def __init__(
+        self, participant: DomainParticipant, waitset: ReaderWaitSet, changed: Callable[[], None]
+    ) -> None:
+        """Start, with readers of `participant` in `waitset`; `changed`: called when `is_read` may have."""
+        self._graph, self._changed = Graph(participant.guid.bytes), changed
+        for topic, take in (
+            (BuiltinTopicDcpsPublication, self._on_endpoint),
+            (BuiltinTopicDcpsSubscription, self._on_reader),
+        ):
+            waitset.add(BuiltinDataReader(participant, topic), take)
         info = payload_type(INFO_TYPE)
         waitset.add(
             DataReader(participant, Topic(participant, INFO_TOPIC, info), _LAST_OF_EACH), self._on_info
         )
 
-    def _on_endpoint(self, endpoint: DcpsEndpoint) -> None:
+    def _on_endpoint(self, endpoint: DcpsEndpoint, *, is_reader: bool = False) -> None:
         guid = endpoint.key.bytes
         if endpoint.sample_info.instance_state == InstanceState.Alive:
-            self._graph.add_endpoint(guid, endpoint.participant_key.bytes, endpoint.topic_name)
+            participant, topic = endpoint.participant_key.bytes, endpoint.topic_name
+            self._graph.add_endpoint(guid, participant, topic, is_reader=is_reader)
         else:
             self._graph.remove_endpoint(guid)
+
+    def _on_reader(self, endpoint: DcpsEndpoint) -> None:
+        self._on_endpoint(endpoint, is_reader=True)
+        self._changed()
+
+    def is_read(self, topic: str) -> bool:
+        """Return whether a program reads a DDS topic."""
+        return topic in self._graph.read_topics
 
     def _on_info(self, sample: Payload | InvalidSample) -> None:
         if isinstance(sample, Payload):

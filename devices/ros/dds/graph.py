@@ -59,16 +59,25 @@ class Graph:
         self._changing = threading.Lock()
         self._endpoints: dict[bytes, tuple[bytes, str]] = {}
         """Participant and DDS topic by endpoint."""
+        self._reads: dict[bytes, str] = {}
+        """DDS topic by endpoint, of readers."""
+        self.read_topics: frozenset[str] = frozenset()
+        """The DDS topics that programs read."""
         self._nodes: dict[bytes, str] = {}
         """First node by participant."""
         self._names: dict[bytes, str] = {}
         """Name of a participant, fixed from its first message on."""
 
-    def add_endpoint(self, endpoint: bytes, participant: bytes, topic: str) -> None:
+    def add_endpoint(
+        self, endpoint: bytes, participant: bytes, topic: str, *, is_reader: bool = False
+    ) -> None:
         """Add a reader or a writer."""
         if participant != self._own:
             with self._changing:
                 self._endpoints[endpoint] = participant, topic
+                if is_reader:
+                    self._reads[endpoint] = topic
+                    self.read_topics |= {topic}
 
     def remove_endpoint(self, endpoint: bytes) -> None:
         """Remove a reader or a writer, and the nodes of its participant with the last one.
@@ -77,6 +86,8 @@ class Graph:
         """
         with self._changing:
             participant, _ = self._endpoints.pop(endpoint, (b"", ""))
+            if self._reads.pop(endpoint, None) is not None:
+                self.read_topics = frozenset(self._reads.values())
             if participant not in self._present():
                 self._nodes.pop(participant, None)
 

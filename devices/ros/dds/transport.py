@@ -7,6 +7,9 @@ rmw_cyclonedds_cpp/src/rmw_node.cpp (enclave of a participant).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -39,6 +42,22 @@ _LAST = Policy.DurabilityService(0, Policy.History.KeepLast(1), -1, -1, -1)
 LATCHED = Qos(*_ALWAYS, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), _LAST)
 
 
+class _Publisher:
+    """The writer of one topic; `is_read` returns whether a program reads it, None: it may later."""
+
+    def __init__(
+        self, writer: DataWriter[Payload], type_: type[Payload], is_read: Callable[[], bool] | None
+    ) -> None:
+        self._writer, self._type, self._is_read = writer, type_, is_read
+
+    @property
+    def wanted(self) -> bool:
+        return self._is_read is None or self._is_read()
+
+    def __call__(self, message: bytes) -> None:
+        self._writer.write(self._type(message))
+
+
 class DdsTransport(Transport):
     """Publishes, subscribes and serves as one node on one participant.
 
@@ -53,7 +72,7 @@ class DdsTransport(Transport):
         self._guid = self._participant.guid.bytes
         services.ignore(self._guid)
         self._waitset = ReaderWaitSet(self._participant, "DDS discovery")
-        self._discovery = Discovery(self._participant, self._waitset)
+        self._discovery = Discovery(self._participant, self._waitset, lambda: self.changed())
         self._topics: set[str] = set()
         self._readers: list[bytes] = []
         """GUIDs of the readers of subscriptions."""
@@ -67,14 +86,11 @@ class DdsTransport(Transport):
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         type_ = payload_type(row.type)
         quality = LATCHED if row.latched else _LARGE if row.is_picture else VOLATILE
-        writer = self._writer(f"rt{row.topic}", type_, quality, row.type)
+        topic = f"rt{row.topic}"
+        writer = self._writer(topic, type_, quality, row.type)
         self._writers.append(writer)
         self._announce()
-
-        def publish(message: bytes) -> None:
-            writer.write(type_(message))
-
-        return publish
+        return _Publisher(writer, type_, None if row.latched else partial(self._discovery.is_read, topic))
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
         def on_message(payload: bytes, participant: bytes) -> None:

@@ -42,9 +42,14 @@ class Publication:
         self._count = 0
         self._publishing = threading.Lock()
 
-    def publish(self, message: bytes) -> None:
+    @property
+    def wanted(self) -> bool:
+        """Whether a program subscribes, or gets the last message later."""
+        return self._latched or bool(self._subscribers)
+
+    def __call__(self, message: bytes, /) -> None:
         """Send a message (CDR); a slow subscriber gets the newest ones."""
-        if not self._subscribers and not self._latched:
+        if not self.wanted:
             return
         with self._publishing:
             self._count += 1

@@ -56,7 +56,7 @@ class Ros1Transport(Transport):
     def advertise(self, row: Row) -> Publisher:  # noqa: D102
         publication = self._publications[row.topic] = Publication(row, self._node)
         self._registration.add(Entry("Publisher", row.topic, (ros1_name(row.type),)))
-        return publication.publish
+        return publication
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
         self._subscriptions.add(Subscription(row, receive, self._node))
@@ -104,12 +104,14 @@ class Ros1Transport(Transport):
             connection.send(header_frame({"error": str(error)}))
             raise
         self._connections[connection] = publication
+        self.changed()
         return on_frame
 
     def _on_closed(self, connection: Connection) -> None:
         publication = self._connections.pop(connection, None)
         if publication is not None:
             publication.remove(connection)
+            self.changed()
 
     def _methods(self) -> dict[str, Callable[..., ApiResult]]:
         """Return the methods of the Slave API; the first argument of each is the caller's id."""

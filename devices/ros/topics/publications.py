@@ -18,7 +18,16 @@ from schemas.message import Message
 from schemas.ports import Port
 from schemas.vectors import Vector, VectorCodec
 
-__all__ = ["EventTopic", "MessageSource", "PeriodicTopic", "Publications", "State"]
+__all__ = [
+    "Arrivals",
+    "EventTopic",
+    "MessageSource",
+    "PeriodicTopic",
+    "Publications",
+    "State",
+    "WantedSource",
+    "WantedTopic",
+]
 
 _MAX_AGE_NS = 1_000_000_000
 """An older state is not published any more: a program must see that nothing arrives, as a CRTK client does
@@ -34,20 +43,60 @@ class MessageSource(Protocol):
         ...
 
 
-class State:
-    """The newest value of a signal from the simulation. Written by one thread, read by another."""
+class WantedSource(MessageSource, Protocol):
+    """What is published while a program subscribes."""
 
-    def __init__(self, port: Port) -> None:
+    @property
+    def present(self) -> bool:
+        """Whether there is something to publish."""
+        ...
+
+
+class Arrivals:
+    """When the last value of any state came, by the monotonic clock (ns); 0 before."""
+
+    def __init__(self) -> None:
+        self.newest_ns = 0
+
+    @property
+    def recent(self) -> bool:
+        """Whether the simulation runs: a value came within a second."""
+        return monotonic_ns() - self.newest_ns < _MAX_AGE_NS
+
+
+class State:
+    """The newest value of a signal from the simulation. Written by one thread, read by another.
+
+    While it is not `used`, values of it need not come, and none is kept: the next one could be long after it.
+    """
+
+    def __init__(self, port: Port, arrivals: Arrivals | None = None) -> None:
+        """`arrivals`: those of all states of the gateway; None: of this one alone."""
         self.port = port
         self._codec = VectorCodec(port)
+        self._arrivals = arrivals or Arrivals()
         self._newest: tuple[Vector, int] | None = None
+        self.used = True
         self.writes = 0
         """Number of values so far."""
 
     def write(self, value: Vector) -> None:
         """Set the newest value."""
-        self._newest = value, monotonic_ns()
+        now_ns = self._arrivals.newest_ns = monotonic_ns()
+        if self.used:
+            self._newest = value, now_ns
         self.writes += 1
+
+    def use(self, *, used: bool) -> None:
+        """Say whether values of it are used from now on."""
+        if used != self.used:
+            self._newest = None
+            self.used = used
+
+    @property
+    def present(self) -> bool:
+        """Whether there is a value not older than a second, or would be, were it used."""
+        return self.value is not None if self.used else bool(self.writes) and self._arrivals.recent
 
     @property
     def written_ns(self) -> int:
@@ -56,9 +105,11 @@ class State:
 
     @property
     def value(self) -> Vector | None:
-        """The newest value; None if none was written within a second."""
+        """The newest value; None if none was written within a second, or it is not used."""
         newest = self._newest
-        return newest[0] if newest is not None and monotonic_ns() - newest[1] < _MAX_AGE_NS else None
+        if newest is None or not self.used:
+            return None
+        return newest[0] if monotonic_ns() - newest[1] < _MAX_AGE_NS else None
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the newest value as a message with this stamp; None if there is none."""
@@ -81,6 +132,24 @@ class PeriodicTopic:
             self._count.messages += 1
 
 
+class WantedTopic(PeriodicTopic):
+    """A periodic topic whose messages are made while a program subscribes.
+
+    Those without a subscriber are counted, too: what is reported is what a program would get.
+    """
+
+    def __init__(self, source: WantedSource, publish: Publisher, count: Count, every: int = 1) -> None:
+        super().__init__(source, publish, count, every)
+        self._wanted_source = source
+
+    def publish(self, period: int) -> None:
+        """Publish the present message, if it is due, there is one, and it is for anybody."""
+        if self._publish.wanted:
+            super().publish(period)
+        elif period % self._every == 0:
+            self._count.messages += self._wanted_source.present
+
+
 class EventTopic:
     """One topic of which every message is published at once, in the thread that writes it."""
 
@@ -93,7 +162,8 @@ class EventTopic:
         for message in value if isinstance(value, tuple) else (value,):
             if isinstance(message, Message):
                 with self._publishing:
-                    self._publish(encode(stamped(message, self._stamps.next_ns())))
+                    if self._publish.wanted:
+                        self._publish(encode(stamped(message, self._stamps.next_ns())))
                     self._count.messages += 1
 
 

@@ -49,6 +49,11 @@ class TransformTree:
 
         self._template = _Template(())
 
+    @property
+    def present(self) -> bool:
+        """Whether any transform is known now."""
+        return any(newest() is not None for _, _, newest in self._edges)
+
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return all transforms that are known now, as a TFMessage; None if there are none."""
         known = [

@@ -9,17 +9,19 @@ from xml.etree import ElementTree
 import numpy as np
 
 from devices.ros.params import GatewayParams
-from devices.ros.topics.publications import MessageSource, State
+from devices.ros.topics.publications import State, WantedSource
 from devices.ros.topics.tf import TF_PERIOD_NS, TransformTree
 from schemas.errors import DeviceError
 from schemas.ports import Port
 from schemas.ros import JointState
 from schemas.vectors import VectorCodec
 
-__all__ = ["periods_between", "robot_description", "whole_robot_sources"]
+__all__ = ["inputs_of_all", "periods_between", "robot_description", "whole_robot_sources"]
+
+_PARTS = ("", "jaw/", "hand/")
 
 
-def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, MessageSource]:
+def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> Mapping[str, WantedSource]:
     """Return what is published of all arms together, by row name; `states`: by the names of their ports.
 
     The authors' simulator (profile `vrep`) has no such topics.
@@ -27,6 +29,17 @@ def whole_robot_sources(params: GatewayParams, states: Mapping[str, State]) -> M
     if params.profile != "dvrk":
         return {}
     return {"tf": TransformTree(params, states), "joint_states": _JointStates(params, states)}
+
+
+def inputs_of_all(params: GatewayParams) -> frozenset[str]:
+    """Return the ports that the gateway itself reads: for `/tf`, `/joint_states` and kinematics.
+
+    By them it knows, too, whether the simulation runs.
+    """
+    poses = ("{}/local/measured_cp", "SUJ/{}/measured_cp", "SUJ/{}/local/measured_cp")
+    joints = (f"{{}}/{part}measured_js" for part in _PARTS)
+    names = (*poses, *joints)
+    return frozenset(name.format(arm) for arm in params.arms.shown for name in names)
 
 
 def periods_between(name: str, period_ns: int) -> int:
@@ -57,22 +70,26 @@ class _JointStates:
 
     def __init__(self, params: GatewayParams, states: Mapping[str, State]) -> None:
         found = (
-            (arm, states.get(f"{arm}/{part}measured_js"))
-            for arm in params.arms.shown
-            for part in ("", "jaw/", "hand/")
+            (arm, states.get(f"{arm}/{part}measured_js")) for arm in params.arms.shown for part in _PARTS
         )
         self._parts = [(arm, state) for arm, state in found if state is not None]
-        self._known: tuple[str, ...] = ()
+        self._known: list[State] = []
         self._codec: VectorCodec | None = None
+
+    @property
+    def present(self) -> bool:
+        """Whether any joint is known now."""
+        return any(state.present for _, state in self._parts)
 
     def cdr(self, stamp_ns: int) -> bytes | None:
         """Return the joints that are known now, as a JointState; None if there are none."""
         known = [(arm, state, value) for arm, state in self._parts if (value := state.value) is not None]
         if not known:
             return None
-        names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
-        if self._codec is None or names != self._known:
-            self._known = names
+        states = [state for _, state, _ in known]
+        if self._codec is None or states != self._known:
+            self._known = states
+            names = tuple(f"{arm}_{joint}" for arm, state, _ in known for joint in state.port.names)
             self._codec = VectorCodec(
                 Port(
                     name="joint_states",

@@ -16,7 +16,17 @@ from schemas.codec import message_type, rihs01
 from schemas.errors import MessageError
 from schemas.message import msg_text
 
-__all__ = ["LATCHED", "VOLATILE", "Attachment", "EntityKind", "GraphToken", "graph_key", "key", "type_hash"]
+__all__ = [
+    "LATCHED",
+    "VOLATILE",
+    "Attachment",
+    "EntityKind",
+    "GraphToken",
+    "graph_key",
+    "key",
+    "packed_attachment",
+    "type_hash",
+]
 
 EntityKind = Literal["NN", "MP", "MS", "SS", "SC"]
 """Node, publisher, subscriber, server and client of a service."""
@@ -120,6 +130,11 @@ class GraphToken:
         )
 
 
+def packed_attachment(sequence: int, stamp_ns: int, gid: bytes) -> bytes:
+    """Return the 33 bytes of an `Attachment`, without making one."""
+    return _ATTACHMENT.pack(sequence, stamp_ns, _GID_BYTES, gid)
+
+
 @dataclass(frozen=True, slots=True)
 class Attachment:
     """Sent with every message and request; a response returns that of its request."""
@@ -132,7 +147,7 @@ class Attachment:
 
     def pack(self) -> bytes:
         """Return the attachment as 33 bytes."""
-        return _ATTACHMENT.pack(self.sequence, self.stamp_ns, _GID_BYTES, self.gid)
+        return packed_attachment(self.sequence, self.stamp_ns, self.gid)
 
     @classmethod
     def unpack(cls, data: bytes) -> Attachment:

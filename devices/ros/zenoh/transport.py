@@ -21,6 +21,7 @@ from devices.ros.zenoh.layout import (
     GraphToken,
     graph_key,
     key,
+    packed_attachment,
     type_hash,
 )
 from schemas.errors import MessageError
@@ -34,6 +35,18 @@ _HEARTBEAT_S = 0.5
 rmw_zenoh's period. rmw_zenoh sends it once per message and blocks until every reader has it; we send it
 periodically, because a program that has stopped reading must not block the others.
 """
+
+
+class _Publisher:
+    """Numbers the messages of one topic."""
+
+    def __init__(self, publisher: zenoh.Publisher | ext.AdvancedPublisher, gid: bytes) -> None:
+        self._put, self._gid, self._sequence = publisher.put, gid, 0
+        self.wanted = True
+
+    def __call__(self, message: bytes) -> None:
+        self._sequence += 1
+        self._put(message, attachment=packed_attachment(self._sequence, time_ns(), self._gid))
 
 
 class ZenohTransport(Transport):
@@ -57,6 +70,7 @@ class ZenohTransport(Transport):
             | zenoh.Subscriber[None]
             | zenoh.Queryable[None]
             | zenoh.LivelinessToken
+            | zenoh.MatchingListener
         ] = []
         self._number = 0
         self._closed = False
@@ -88,14 +102,23 @@ class ZenohTransport(Transport):
             )
         self._entities.append(publisher)
         gid = gid_of(self._announce("MP", row, LATCHED if row.latched else VOLATILE))
-        sequence = 0
+        advertised = _Publisher(publisher, gid)
+        if isinstance(publisher, zenoh.Publisher) and (row.periodic or row.is_picture):
+            self._watch(publisher, advertised)
+        return advertised
 
-        def publish(message: bytes) -> None:
-            nonlocal sequence
-            sequence += 1
-            publisher.put(message, attachment=Attachment(sequence, time_ns(), gid).pack())
+    def _watch(self, publisher: zenoh.Publisher, advertised: _Publisher) -> None:
+        """Keep up to date whether `advertised` is wanted."""
 
-        return publish
+        def match(status: zenoh.MatchingStatus) -> None:
+            advertised.wanted = status.matching
+            self.changed()
+
+        advertised.wanted = False
+        listener = publisher.declare_matching_listener(Callback(match, indirect=False))
+        self._entities.insert(0, listener)  # it ends before its publisher
+        if publisher.matching_status.matching:
+            advertised.wanted = True
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:  # noqa: D102
         topic = row.topic

@@ -18,6 +18,11 @@ def joint_fields(values, stamp_ns=None):
     return {"header": header, "name": [], "position": list(values), "velocity": [], "effort": []}
 
 
+def wanted(gateway, topic):
+    """Return whether the gateway takes a state for wanted by a program."""
+    return next(publish.wanted for state, publish in gateway._optional if state.port.name == topic[1:])
+
+
 def received(gateway, topic):
     """Return the samples of `topic` that the gateway reads now."""
     return [sample for sample in gateway.read(0) if sample.port == topic[1:]]

@@ -15,9 +15,23 @@ from schemas.codec import decode, encode, message_type
 from schemas.message import Message
 
 
+class MemoryPublisher:
+    def __init__(self, transport: MemoryTransport, topic: str) -> None:
+        self._transport, self._topic = transport, topic
+        self._published = transport.published[topic]
+
+    @property
+    def wanted(self) -> bool:
+        return self._topic not in self._transport.unwanted
+
+    def __call__(self, message: bytes) -> None:
+        self._published.append(message)
+
+
 class MemoryTransport(Transport):
     def __init__(self) -> None:
         self.published: defaultdict[str, list[bytes]] = defaultdict(list)
+        self.unwanted: set[str] = set()
         self.rows: dict[str, Row] = {}
         self.receivers: dict[str, MessageHandler] = {}
         self.handlers: dict[str, ServiceHandler] = {}
@@ -26,7 +40,12 @@ class MemoryTransport(Transport):
 
     def advertise(self, row: Row) -> Publisher:
         self._new(row)
-        return self.published[row.topic].append
+        return MemoryPublisher(self, row.topic)
+
+    def let_go(self, *topics: str) -> None:
+        """Unsubscribe all programs from `topics`, and subscribe them to all others."""
+        self.unwanted = set(topics)
+        self.changed()
 
     def subscribe(self, row: Row, receive: MessageHandler) -> None:
         self._new(row)

@@ -121,6 +121,66 @@ def test_states_are_published_at_its_own_rate_whatever_the_simulation_does(tmp_p
     assert gateway.transport.published["/ECM/measured_js"] == []  # it has no value
 
 
+def test_a_state_is_used_while_a_program_subscribes_and_counted_as_before(gateway: MemoryGateway) -> None:
+    topic, port = "/PSM1/setpoint_js", "PSM1/setpoint_js"
+    heard, times_ns = gateway.transport.published[topic], iter(range(0, 10**12, 10**9))
+
+    def count() -> int:
+        samples = gateway.read(next(times_ns))
+        (status,) = [s.message for s in samples if isinstance(s.message, GatewayStatus)]
+        return next((one.messages for one in status.topics if one.topic == topic), 0)
+
+    gateway.transport.let_go(topic)
+    assert count() == 0
+    assert port not in gateway.unused()  # its first value tells that it is there
+    gateway.write(port, np.arange(18.0))
+    assert count() >= 0
+    assert set(gateway.unused()) == {port}
+    assert gateway.unused() is gateway.unused()
+    before = count()
+    gateway.write("PSM1/measured_js", np.arange(18.0))  # the simulation runs
+    sleep(0.1)
+    assert count() > before
+    assert heard == []
+    gateway.transport.let_go()
+    assert gateway.wait(5.0)
+    gateway.read(0)
+    assert set(gateway.unused()) == set()
+    sleep(0.05)
+    assert heard == []  # the value from before is old
+    gateway.write(port, np.ones(18))
+    sleep(0.1)
+    first = gateway.transport.heard(topic)[0]
+    assert isinstance(first, JointState)
+    np.testing.assert_array_equal(first.position, np.ones(6))
+
+
+def test_what_the_gateway_reads_itself_is_always_used(gateway: MemoryGateway) -> None:
+    gateway.transport.let_go(*(row.topic for row in gateway.rows))
+    states = {row.port.name for row in gateway.rows if row.port is not None and row.periodic}
+    for name in states:
+        gateway.write(name, gateway._states[name]._codec.neutral)
+    gateway.read(10**18)
+    assert {"PSM1/measured_js", "PSM1/jaw/measured_js", "ECM/local/measured_cp", "SUJ/PSM1/measured_cp"} <= (
+        states - set(gateway.unused())
+    )
+    assert {"PSM1/measured_cp", "PSM1/body/jacobian", "ECM/setpoint_js"} <= set(gateway.unused())
+    gateway.transport.let_go("/PSM1/measured_js")
+    sleep(0.1)
+    assert gateway.transport.published["/joint_states"]
+    assert gateway.transport.published["/tf"]
+    assert gateway.transport.published["/PSM1/measured_js"] == []
+
+
+def test_a_picture_that_nobody_sees_is_counted_and_not_sent(gateway: MemoryGateway) -> None:
+    topic = "/endoscope/left/image_raw"
+    gateway.transport.let_go(topic)
+    gateway.write(topic[1:], Image())
+    (status,) = [s.message for s in gateway.read(10**18) if isinstance(s.message, GatewayStatus)]
+    assert [one.messages for one in status.topics if one.topic == topic] == [1]
+    assert gateway.transport.published[topic] == []
+
+
 def test_an_old_state_is_not_published_any_more(
     gateway: MemoryGateway, monkeypatch: pytest.MonkeyPatch
 ) -> None:

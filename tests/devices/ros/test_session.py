@@ -28,8 +28,10 @@ HOME = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.0])
 class Console:
     """Waits as crtk_python_client does: for busy told after the order, then for not busy."""
 
-    def __init__(self, transport: MemoryTransport, name: str = "/console") -> None:
-        self.transport, self.name = transport, name
+    def __init__(
+        self, transport: MemoryTransport, name: str = "/console", gateway: MemoryGateway | None = None
+    ) -> None:
+        self.transport, self.name, self.gateway = transport, name, gateway
 
     def order(self, topic: str, message: object) -> None:
         self.transport.send(f"/PSM1/{topic}", message, self.name)  # pyright: ignore[reportArgumentType]
@@ -99,7 +101,7 @@ def session(duration: str) -> Generator[Console]:
         while not hasattr(gateway, "transport"):
             assert not run.done(), run.result()
             sleep(0.01)
-        yield Console(gateway.transport)
+        yield Console(gateway.transport, gateway=gateway)
         run.result()
 
 
@@ -128,3 +130,21 @@ def test_a_console_drives_an_arm_as_on_the_real_system() -> None:
         np.testing.assert_allclose(console.positions, HOME + 0.02, atol=1e-6)
         stamps = [state.header.stamp.ns for state in console.states()]
         assert stamps == sorted(set(stamps))
+
+
+def test_states_are_sent_to_the_gateway_while_a_program_subscribes() -> None:
+    topic = "/PSM1/measured_cp"
+    with session("4 s") as console:
+        gateway = console.gateway
+        assert gateway is not None
+        console.until(lambda: topic[1:] in gateway._states)
+        pose, joints = (gateway._states[name] for name in (topic[1:], "PSM1/measured_js"))
+        console.until(lambda: pose.writes > 0)
+        console.transport.let_go(topic)
+        console.until(lambda: not pose.used)
+        sleep(0.1)
+        before, since = pose.writes, joints.writes
+        console.until(lambda: joints.writes > since + 10)
+        assert pose.writes == before
+        console.transport.let_go()
+        console.until(lambda: pose.writes > before + 10)

@@ -1,13 +1,19 @@
 """Bundles: the signals of a participant for a device, in one message."""
 
 import time
+from contextlib import contextmanager
+from itertools import pairwise
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from zenoh.handlers import FifoChannel
 
-from hub.transport.bundle import Bundle, ObserverBundle, bundled, unpacked
+from hub.transport.bundle import Bundle, DeviceBundle, ObserverBundle, bundled, unpacked, use_mask
+from hub.transport.envelope import Tag
+from hub.transport.refusals import Refusals
 from hub.transport.zenoh_session import open_session
 from schemas.errors import MessageError
 from tests.hub.authorities import free_endpoint
@@ -104,3 +110,55 @@ def test_an_observer_gets_the_values_that_hold_at_its_period_and_the_first_again
         send(b"120")
         assert [camera.recv().attachment.to_bytes() for _ in "123"] == [b"surface", b"80", b"120"]
         bundle.close()
+
+
+USES = "trocar/test/device/camera/uses/arm"
+
+
+@contextmanager
+def device_bundle(use_ns=0, count=3):
+    """Yield a bundle for a device that subscribes, the session, its refusals, and the calls of `changed`."""
+    refusals, changes = Refusals(), []
+    with open_session("router", listen=[free_endpoint()]) as session:
+        bundle = DeviceBundle(
+            session,
+            KEY,
+            lambda: changes.append(1),
+            use_ns=use_ns,
+            uses_key=USES,
+            count=count,
+            run=7,
+            refusals=refusals,
+        )
+        device = subscribed(session, bundle)
+        yield bundle, session, refusals, changes
+        device.undeclare()
+        bundle.close()
+
+
+@given(use=st.integers(0, 50), stride=st.integers(1, 60))
+def test_a_device_gets_a_new_value_for_each_use_and_no_more_than_it_needs_for_that(use, stride):
+    with patch.object(DeviceBundle, "__init__", lambda *_: None):
+        bundle = DeviceBundle()
+    bundle._use_ns, bundle._publisher = use, SimpleNamespace(needed=True)
+    times = range(0, 40 * stride, stride)
+    taken = [time_ns for time_ns in times if bundle.takes(time_ns, stride)]
+    gaps = {after - before for before, after in pairwise(taken)}
+    if use < 2 * stride:
+        assert taken == list(times)
+    else:
+        (gap,) = gaps
+        assert use - stride < gap <= use
+
+
+def test_a_device_says_what_it_needs():
+    with device_bundle() as (bundle, session, refusals, changes):
+        assert [bundle.needs(index) for index in range(3)] == [True] * 3
+        before = len(changes)
+        for run, told in ((7, use_mask(["a", "b", "c"], {"b"})), (7, b"\1"), (8, b"\0\0\0")):
+            session.put(USES, told, attachment=Tag.pack(run, 0, -1, 0))
+        until = time.monotonic() + 5.0
+        while (refusals.total < 2 or len(changes) == before) and time.monotonic() < until:
+            time.sleep(0.005)
+        assert [bundle.needs(index) for index in range(3)] == [True, False, True]
+        assert (refusals.total, len(changes)) == (2, before + 1)

@@ -55,7 +55,7 @@ class Sources:
         step = -1 if ms == 0 else ms // 2 - self.plan.participants[name].period
         before = self.arrived + self.refusals.total
         bundle = self.bundles[name]
-        bundle.add(0, codec.encode(np.array([float(ms if value is None else value)]), ms * MS))
+        bundle.add(0, codec.pack(np.array([float(ms if value is None else value)])))
         bundle.send(Tag.pack(run, 0, step, ms * MS))
         until = time.monotonic() + 5.0
         while self.arrived + self.refusals.total == before and time.monotonic() < until:

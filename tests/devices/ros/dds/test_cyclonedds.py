@@ -135,7 +135,7 @@ def test_a_datagram_that_goes_wrong_ends_no_service(gateway, caplog):
             dds_rtps.encode_message(b"\x01\x0f" + bytes(10), bytes(12), [torn]),
             bytes(range(256)),
         ):
-            other.sendto(payload, ("127.0.0.1", services._socket.getsockname()[1]))
+            other.sendto(payload, ("127.0.0.1", services._socket.port))
     services._receive = lambda *_: 1 / 0
     assert until(lambda: "ZeroDivisionError" in caplog.text), "programs announce themselves every second"
     del services._receive

@@ -13,7 +13,7 @@ from devices.ros.dds.gateway import DdsGateway
 from schemas.codec import message_type, rihs01
 from schemas.ros import Header, JointState, StringMessage, Time
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.helpers import received, until
+from tests.devices.ros.helpers import received, until, wanted
 from tests.devices.ros.rclpy_environment import rclpy_python
 from tests.devices.ros.rclpy_peer import RclpyPeer, environment, free_domain
 
@@ -98,6 +98,17 @@ def test_all_belongs_to_one_node_called_as_on_the_real_system(rclpy_python, psm)
         assert until(lambda: [client.name for client in psm._transport.clients()] == ["/console"]), (
             psm._transport.clients()
         )
+
+
+def test_a_state_is_wanted_while_a_program_subscribes(rclpy_python, psm):
+    topic = "/PSM1/setpoint_js"
+    assert not wanted(psm, topic)
+    psm.read(0)
+    with console(rclpy_python, psm, topic):
+        assert psm.wait(5.0)
+        assert until(lambda: wanted(psm, topic))
+        assert not wanted(psm, "/PSM1/measured_cv")
+    assert until(lambda: not wanted(psm, topic))
 
 
 def test_a_program_with_the_default_range_finds_it(rclpy_python, psm):

@@ -32,7 +32,7 @@ def test_an_address_that_is_none_does_not_end_the_services_of_other_programs(por
         services.subscribe("/PSM1/hold", "std_msgs/msg/Empty", "", lambda _data, _sender: None)
         peer.bind(("127.0.0.1", 0))
         peer.settimeout(PATIENCE_S)
-        ours = services._socket.getsockname()
+        ours = ("127.0.0.1", services._socket.port)
         peer.sendto(announcement(b"\x01\x0fwrong67890", port), ours)
         ended = monotonic() + 1.5  # longer than the period at which heartbeats are sent
         while monotonic() < ended and services._thread.is_alive():
@@ -47,4 +47,4 @@ def test_what_is_remembered_of_a_domain_is_limited() -> None:
             peer = b"\x01\x0f" + number.to_bytes(10, "big")
             with suppress(MessageError):
                 services._receive(parse_message(announcement(peer, 9), services._guid_prefix), "127.0.0.1")
-        assert len(services._proxies) == 512
+        assert len(services._matching.proxies) == 512

@@ -16,7 +16,7 @@ from schemas.codec import message_type
 from schemas.crtk import OperatingState
 from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.helpers import joint_fields, received, until
+from tests.devices.ros.helpers import joint_fields, received, until, wanted
 from tests.devices.ros.rospy_peer import Program, TablePeer, master, needs_rospy
 from tests.hub.authorities import free_port
 
@@ -161,6 +161,19 @@ def test_programs_in_cpp_hear_and_command(ros, psm, console):
         assert until(lambda: console.send("/orders", joints()) or came_in(psm, COMMAND, 0.1), 10.0)
         assert clients(psm) == ["/relay_copied", f"/relay{COMMAND.replace('/', '_')}"]
     assert until(lambda: not clients(psm))
+
+
+def test_a_state_is_wanted_while_a_program_subscribes(ros, psm):
+    topic = "/PSM1/setpoint_js"
+    assert not wanted(psm, topic)
+    psm.read(0)
+    with Program(ros) as program:
+        program.listen(topic, JOINTS)
+        assert psm.wait(5.0)
+        assert until(lambda: wanted(psm, topic))
+        assert until(lambda: psm.write(topic[1:], np.zeros(18)) or program.heard(topic, 0.02))
+        assert not wanted(psm, "/PSM1/measured_cv")
+    assert until(lambda: not wanted(psm, topic))
 
 
 def test_headers_are_numbered_as_publishers_of_ros_1_do_it(psm, console):

@@ -19,11 +19,12 @@ from schemas.crtk import OperatingState
 from schemas.errors import DeviceError
 from schemas.ros import StringMessage
 from tests.devices.ros.crtk_table import WHOLE, check_late_joiner, exercise
-from tests.devices.ros.helpers import joint_fields, received, until
+from tests.devices.ros.helpers import joint_fields, received, until, wanted
 from tests.devices.ros.zenoh.zenoh_peer import TYPES, Peer, built, flat
 from tests.hub.authorities import free_endpoint
 
 ARM = {"arms": {"PSM1": {}}, "cameras": []}
+SETPOINT = "/PSM1/setpoint_js"
 STATE, COMMAND, EVENT = "/PSM1/measured_js", "/PSM1/servo_jp", "/PSM1/operating_state"
 JOINTS, STATE_TYPE = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState"
 
@@ -161,6 +162,20 @@ def test_messages_are_numbered_and_carry_the_id_of_their_publisher(psm, peer):
     assert list(numbers) == list(range(numbers[0], numbers[0] + len(numbers)))
     assert list(stamps) == sorted(stamps)
     assert (set(lengths), len(set(ids))) == ({16}, 1)
+
+
+def test_a_state_is_wanted_while_a_program_subscribes(psm, hub):
+    assert not wanted(psm, SETPOINT)
+    psm.read(0)
+    with Peer(hub) as console:
+        heard = []
+        console.listen(SETPOINT, JOINTS, lambda message, _: heard.append(message))
+        assert psm.wait(5.0)
+        assert until(lambda: wanted(psm, SETPOINT))
+        psm.write(SETPOINT[1:], np.zeros(18))
+        assert until(lambda: heard)
+        assert not wanted(psm, "/PSM1/measured_cv")
+    assert until(lambda: not wanted(psm, SETPOINT))
 
 
 def test_a_program_that_joins_late_gets_the_last_state_and_no_older_one(psm, hub):
