@@ -1,4 +1,4 @@
-"""Peg boards and the triangular rings that are carried between their posts: numbers with their sources. SI units.
+"""Peg boards and the triangular rings that are carried between posts: numbers with their sources. SI units.
 
 The frame of a board is in the middle of its top: x to the surgeon's right, y away from the surgeon, z up. The
 frame of a ring is in its middle, z along its axis, y to one corner of the triangle.

@@ -25,8 +25,6 @@ class Dish:
     """m."""
     height: float
     """Of the rim over the table, m."""
-    floor: float
-    """Thickness of its floor, m."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +39,9 @@ class Piece:
     """Coulomb's coefficient towards all that it touches."""
 
 
-DISH = Dish(outer_radius=29.85e-3, inner_radius=28.8e-3, height=21.9e-3, floor=1.0e-3)
-"""Cylinder, Cylinder0 and Cylinder1: 59.7 mm wide, inner radius 28.8 mm, 21.9 mm high. The thickness of the
-floor is ours. They weigh 1 kg each there; here they stand fast.
+DISH = Dish(outer_radius=29.85e-3, inner_radius=28.8e-3, height=21.9e-3)
+"""Cylinder, Cylinder0 and Cylinder1: 59.7 mm wide, inner radius 28.8 mm, 21.9 mm high. They weigh 1 kg each
+there; here they stand fast and have no floor, so that what is in them lies on the table.
 """
 
 DISHES: Mapping[str, tuple[float, float]] = MappingProxyType(
