@@ -16,8 +16,10 @@ from hub.participant import Params
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
+from robots.training.fixtures import FixtureParams
 from schemas.keys import valid_name
 from schemas.quantity import Duration
+from schemas.scenario import Name
 
 __all__ = [
     "MujocoParams",
@@ -79,8 +81,16 @@ class SceneParams(Params):
         ),
     )
     table: TableParams | None = None
+    fixtures: dict[Name, FixtureParams] = Field(
+        default_factory=dict[str, FixtureParams], description="boards and dishes, which stand fast"
+    )
     objects: Annotated[dict[str, ObjectParams], AfterValidator(_object_names)] = Field(
         default_factory=dict[str, ObjectParams]
+    )
+    seed: int | None = Field(
+        default=None,
+        ge=0,
+        description="varies where objects start, by the `scatter` of each; null: where they are put",
     )
     grasp: Literal["friction", "weld"] = Field(
         default="friction",
