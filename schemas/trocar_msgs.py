@@ -174,7 +174,8 @@ class TaskEvent(Message):
     ros_type: ClassVar[str] = "trocar_msgs/msg/TaskEvent"
     header: Header
     event: String
-    """`grasped`, `lifted`, `handed over`, `placed`, `dropped`, `out of workspace`, `out of view`, `collision`.
+    """`grasped`, `lifted`, `handed over`, `placed`, `dropped`, `out of workspace`, `out of view` or
+    `collision`.
     """
     object: String = ""
     """The object of which it is; empty: none."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,15 +47,10 @@ class LegsState(Record):
 class Legs:
     """Counts the objects that are brought where they belong; once all are, they have to go back."""
 
-    def __init__(
-        self, starts: Sequence[frozenset[int]], targets: Sequence[frozenset[int]], *, hand_over: bool
-    ):
-        """Count the transfers from `starts` to `targets`, places of each object.
-
-        Those without a hand-over count unless `hand_over` asks for one.
-        """
-        self.state = LegsState(objects=len(targets))
-        self._ways = (tuple(targets), tuple(starts))
+    def __init__(self, goals: Goals, *, hand_over: bool) -> None:
+        """Count what reaches its target; with `hand_over` only what was handed over on its way."""
+        self.state = LegsState(objects=len(goals.targets))
+        self._ways = (goals.targets, goals.starts)
         self._hand_over = hand_over
 
     def take(self, event: Event) -> bool:

@@ -91,7 +91,9 @@ class Reader:
     def __init__(self, params: TaskParams, connected: Set[str]) -> None:
         """Read the inputs that `params` ask for, of which those in `connected` have a source."""
         arms, things = params.psms, tuple(params.objects)
-        ecm = next((name for name, arm in params.arms.items() if isinstance(arm, MountedEcm)), None)
+        ecm: CartArm | None = next(
+            (name for name, arm in params.arms.items() if isinstance(arm, MountedEcm)), None
+        )
         self.watched = Watched(
             arms,
             things,
@@ -100,7 +102,7 @@ class Reader:
             tools="tools/impulse" in connected,
             camera=ecm is not None and f"{ecm}/measured_cp" in connected,
         )
-        self._bases = [_base(params, arm) for arm in arms]
+        self._bases = [_base(params, arm) for arm in params.psms]
         self._numbers = {int(arm[-1]): i for i, arm in enumerate(arms)}
         self._ecm = ecm if self.watched.camera else None
         if ecm is not None:

@@ -51,7 +51,6 @@ class Task(Controller):
     """
 
     params_model: ClassVar[type[Params]] = TaskParams
-    params: TaskParams
     name_of_kind: ClassVar[str]
     """On the score card."""
     is_board: ClassVar[bool] = False
@@ -102,7 +101,7 @@ class Task(Controller):
         self._now = Instant(len(watched.arms), len(watched.things), period_s=setup.period_ns / 1e9)
         self._smoothing = Smoothing(len(watched.arms), setup.period_ns / 1e9)
         self._events = Things(len(watched.things), params, box, self.place_of)
-        self._legs = Legs(goals.starts, goals.targets, hand_over=goals.hand_over) if goals.targets else None
+        self._legs = Legs(goals, hand_over=goals.hand_over) if goals.targets else None
         self._time, self._metrics = make_metrics(params, watched)
         setting = Setting(watched.things, goals, self.is_board, watched.camera, params.benchmarks)
         self._rules = [RULES[name](setting) for name in params.rules or RULES]
@@ -180,6 +179,10 @@ class Task(Controller):
             value=event.value,
             unit=event.unit,
         )
+
+    def card(self) -> ScoreCard:
+        """Return the score card as it is now."""
+        return self._card(round(self._now.time_s * 1e9))
 
     def _card(self, time_ns: int) -> ScoreCard:
         metrics: dict[str, ScoreValue] = {

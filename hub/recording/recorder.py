@@ -157,9 +157,7 @@ class Recorder:
             with self._lock:
                 queue, self._queue, self._queued_bytes = self._queue, [], 0
                 channels = list(self._channels)
-            if (
-                self._error is not None
-            ):  # what was queued before the error was known must leave no gap behind it
+            if self._error is not None:  # what was queued before the error was known must leave no gap behind it
                 self._dropped += len(queue)
                 continue
             written = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tasks.instant import Watched
 from tasks.metrics.errors import Clutching, Collisions, Counts, Forces, Time, View
-from tasks.metrics.metric import Metric
+from tasks.metrics.metric import AnyMetric
 from tasks.metrics.motion import Economy, Paths, Turning, WorkingVolume
 from tasks.metrics.smoothness import Smoothness
 from tasks.params import TaskParams
@@ -12,7 +12,7 @@ from tasks.params import TaskParams
 __all__ = ["make_metrics"]
 
 
-def make_metrics(params: TaskParams, watched: Watched) -> tuple[Time, tuple[Metric, ...]]:
+def make_metrics(params: TaskParams, watched: Watched) -> tuple[Time, tuple[AnyMetric, ...]]:
     """Return the clock of the trial, and all metrics with it, in the order of the score card."""
     arms, time = watched.arms, Time()
     return time, (

@@ -21,11 +21,11 @@ class TimeState(Record):
     """s; -1: not done."""
 
 
-class Time(Metric):
+class Time(Metric[TimeState]):
     """Time of the trial so far, and until all goals were reached."""
 
     def __init__(self) -> None:
-        self.state: TimeState = TimeState()
+        self.state = TimeState()
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Take the time."""
@@ -54,12 +54,12 @@ class CountsState(Record):
     lost = integer()
 
 
-class Counts(Metric):
+class Counts(Metric[CountsState]):
     """How often objects were grasped, handed over, dropped and lost from the workspace."""
 
     def __init__(self, things: int) -> None:
         """Count for `things` objects."""
-        self.state: CountsState = CountsState()
+        self.state = CountsState()
         self._things = things
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
@@ -89,11 +89,11 @@ class CollisionsState(Record):
     """N s."""
 
 
-class Collisions(Metric):
+class Collisions(Metric[CollisionsState]):
     """How often instruments of different arms touch one another, and the impulse of it."""
 
     def __init__(self, watched: Watched) -> None:
-        self.state: CollisionsState = CollisionsState()
+        self.state = CollisionsState()
         self._reason = "" if watched.tools else "contact is not known: connect or record tools/impulse"
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:
@@ -120,12 +120,12 @@ class ForcesState(Record):
     """s."""
 
 
-class Forces(Metric):
+class Forces(Metric[ForcesState]):
     """Peak of the force on each instrument, and how long it was over a limit."""
 
     def __init__(self, watched: Watched, limit: float) -> None:
         """Measure with a `limit` in N."""
-        self.state: ForcesState = ForcesState(arms=len(watched.arms))
+        self.state = ForcesState(arms=len(watched.arms))
         self._watched, self._limit = watched, limit
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
@@ -159,11 +159,11 @@ class ViewState(Record):
     """s."""
 
 
-class View(Metric):
+class View(Metric[ViewState]):
     """How long each tip was outside of what the endoscope sees."""
 
     def __init__(self, watched: Watched) -> None:
-        self.state: ViewState = ViewState(arms=len(watched.arms))
+        self.state = ViewState(arms=len(watched.arms))
         self._watched = watched
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
@@ -190,11 +190,11 @@ class ClutchingState(Record):
     """1 while a hand leads it."""
 
 
-class Clutching(Metric):
+class Clutching(Metric[ClutchingState]):
     """How often each hand let go of its arm."""
 
     def __init__(self, watched: Watched) -> None:
-        self.state: ClutchingState = ClutchingState(arms=len(watched.arms))
+        self.state = ClutchingState(arms=len(watched.arms))
         self._watched = watched
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002

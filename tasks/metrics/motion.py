@@ -27,12 +27,12 @@ class PathsState(Record):
     time = number()
 
 
-class Paths(Metric):
+class Paths(Metric[PathsState]):
     """Path length and idle share of each tip."""
 
     def __init__(self, arms: Sequence[str], idle_speed: float) -> None:
         """Measure `arms`; below `idle_speed` (m/s) a tip is idle."""
-        self.state: PathsState = PathsState(arms=len(arms))
+        self.state = PathsState(arms=len(arms))
         self._arms, self._idle_speed = arms, idle_speed
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
@@ -70,11 +70,11 @@ class EconomyState(Record):
     begun = number()
 
 
-class Economy(Metric):
+class Economy(Metric[EconomyState]):
     """Share of the way that a tip would have had to go: straight from each of its events to the next."""
 
     def __init__(self, arms: Sequence[str]) -> None:
-        self.state: EconomyState = EconomyState(arms=len(arms))
+        self.state = EconomyState(arms=len(arms))
         self._arms = arms
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:
@@ -112,11 +112,11 @@ class VolumeState(Record):
     count = number()
 
 
-class WorkingVolume(Metric):
+class WorkingVolume(Metric[VolumeState]):
     """Radius of the space that each tip works in: root mean square of its distance from its mean position."""
 
     def __init__(self, arms: Sequence[str]) -> None:
-        self.state: VolumeState = VolumeState(arms=len(arms))
+        self.state = VolumeState(arms=len(arms))
         self._arms = arms
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
@@ -147,11 +147,11 @@ class TurningState(Record):
     begun = number()
 
 
-class Turning(Metric):
+class Turning(Metric[TurningState]):
     """Angular path: the sum of the angles by which each tip turns."""
 
     def __init__(self, arms: Sequence[str]) -> None:
-        self.state: TurningState = TurningState(arms=len(arms))
+        self.state = TurningState(arms=len(arms))
         self._arms = arms
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002

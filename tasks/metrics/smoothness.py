@@ -57,7 +57,7 @@ class SmoothnessState(Record):
     arcs = array("arms")
 
 
-class Smoothness(Metric):
+class Smoothness(Metric[SmoothnessState]):
     """Mean normalised jerk and spectral arc length over the movements of each tip.
 
     A movement lasts while the tip is not idle.
@@ -65,7 +65,7 @@ class Smoothness(Metric):
 
     def __init__(self, arms: Sequence[str], idle_speed: float) -> None:
         """Measure `arms`; below `idle_speed` (m/s) a tip is idle."""
-        self.state: SmoothnessState = SmoothnessState(arms=len(arms))
+        self.state = SmoothnessState(arms=len(arms))
         self._arms, self._idle_speed = arms, idle_speed
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002

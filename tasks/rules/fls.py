@@ -44,14 +44,14 @@ class FlsState(Record):
     """1 for each object that was dropped and not grasped since."""
 
 
-class Fls(Rules):
+class Fls(Rules[FlsState]):
     """Peg transfer by the rules of FLS."""
 
     name: ClassVar[str] = "fls"
 
     def __init__(self, setting: Setting) -> None:
-        goals, count = setting.goals, len(setting.things)
-        self.state: FlsState = FlsState(objects=count)
+        count = len(setting.things)
+        self.state = FlsState(objects=count)
         self._reason = (
             ""
             if setting.is_board and setting.camera
@@ -59,7 +59,7 @@ class Fls(Rules):
             if not setting.is_board
             else NO_CAMERA
         )
-        self._legs = Legs(goals.starts, goals.targets, hand_over=True)
+        self._legs = Legs(setting.goals, hand_over=True)
         self._transfers = 2 * count
 
     def records(self) -> Iterator[Record]:

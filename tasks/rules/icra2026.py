@@ -36,7 +36,7 @@ class Icra2026State(Record):
     """Paths of all tips until then, m."""
 
 
-class Icra2026(Rules):
+class Icra2026(Rules[Icra2026State]):
     """Rules of the challenge's repository.
 
     A ring that leaves the workspace ends the trial. Of equal points, less motion of the PSMs is better.
@@ -46,10 +46,9 @@ class Icra2026(Rules):
     _goes_on: ClassVar[bool] = False
 
     def __init__(self, setting: Setting) -> None:
-        goals = setting.goals
-        self.state: Icra2026State = Icra2026State()
+        self.state = Icra2026State()
         self._applies = setting.is_board
-        self._legs = Legs(goals.starts, goals.targets, hand_over=True)
+        self._legs = Legs(setting.goals, hand_over=True)
 
     def records(self) -> Iterator[Record]:
         """Yield the state, in all its parts."""

@@ -24,13 +24,13 @@ class MScoreState(Record):
     """Nothing: the metrics have all."""
 
 
-class MScore(Rules):
+class MScore(Rules[MScoreState]):
     """Compares the metrics with the task's `benchmarks`."""
 
     name: ClassVar[str] = "mscore"
 
     def __init__(self, setting: Setting) -> None:
-        self.state: MScoreState = MScoreState()
+        self.state = MScoreState()
         self._benchmarks = setting.benchmarks
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from hub.participant import Record
 from schemas.trocar_msgs import ScoreValue
@@ -13,7 +13,7 @@ from tasks.events import Event
 from tasks.goals import Goals
 from tasks.instant import Instant
 
-__all__ = ["Rules", "Setting", "missing_all"]
+__all__ = ["AnyRules", "Rules", "Setting", "missing_all"]
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,14 @@ class Setting:
     benchmarks: Mapping[str, float]
 
 
-class Rules(ABC):
+S = TypeVar("S", bound=Record)
+
+
+class Rules(ABC, Generic[S]):
     """Scores of one foreign evaluator, computed while the trial goes on; the whole memory is in `records`."""
 
     name: ClassVar[str]
-    state: Record
+    state: S
 
     @abstractmethod
     def __init__(self, setting: Setting) -> None: ...
@@ -49,6 +52,9 @@ class Rules(ABC):
     @abstractmethod
     def values(self, metrics: Mapping[str, ScoreValue]) -> Iterator[ScoreValue]:
         """Yield the scores so far; `metrics` are those of the card."""
+
+
+AnyRules = Rules[Any]
 
 
 def missing_all(rows: Mapping[str, str], reason: str) -> Iterator[ScoreValue]:

@@ -1,8 +1,8 @@
 """The success of SurRoL's environments.
 
 Source: med-air/SurRoL at a903fa6, surrol/tasks: steps of 0.2 s, of which an episode has 50; at the end of a
-step an object is where it belongs within 5 mm of its goal, on a peg within 5 mm across and 4 mm along it. (All
-lengths are 5 times as large there, as the whole world is.)
+step an object is where it belongs within 5 mm of its goal, on a peg within 5 mm across and 4 mm along it.
+(All lengths are 5 times as large there, as the whole world is.)
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ class SurrolState(Record):
     """When all objects first were, s; -1: never."""
 
 
-class Surrol(Rules):
+class Surrol(Rules[SurrolState]):
     """SurRoL's success, of all objects instead of one."""
 
     name: ClassVar[str] = "surrol"
 
     def __init__(self, setting: Setting) -> None:
         goals = setting.goals
-        self.state: SurrolState = SurrolState(objects=len(setting.things))
+        self.state = SurrolState(objects=len(setting.things))
         self._board = setting.is_board
         self._goals: list[Vector] = []
         if goals.positions is not None:
