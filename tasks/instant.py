@@ -64,8 +64,8 @@ class Instant:
     """Whether there are velocities and jerks already."""
     forces: list[float] = field(init=False)
     """On the instruments, N."""
-    hands: list[bool] = field(init=False)
-    """Whether each arm is led by a hand."""
+    hands: list[tuple[bool, ...]] = field(init=False)
+    """What was said since the last instant of whether a hand leads each arm, oldest first."""
     poses: Vector = field(init=False)
     """Of the objects: position, m, and quaternion, shape (n, 7)."""
     holders: list[int] = field(init=False)
@@ -81,7 +81,7 @@ class Instant:
         m, n = self.arms, self.things
         self.tips, self.turns, self.velocities = np.zeros((m, 3)), np.zeros((m, 4)), np.zeros((m, 3))
         self.jerks, self.speeds, self.forces = np.zeros((m, 3)), [0.0] * m, [0.0] * m
-        self.hands, self.poses, self.holders = [False] * m, np.zeros((n, 7)), [-1] * n
+        self.hands, self.poses, self.holders = [()] * m, np.zeros((n, 7)), [-1] * n
         self.tips_seen, self.things_seen = np.ones(m, bool), np.ones(n, bool)
 
 
@@ -120,9 +120,8 @@ class Reader:
             if watched.forces[i]:
                 tip, rigid = _wrenches(arm)
                 now.forces[i] = float(np.linalg.norm(inputs[tip][:3] + inputs[rigid][:3]))
-            if watched.hands[i]:
-                following = cast("BoolMessage | None", inputs.message(f"{arm}/following"))
-                now.hands[i] = following is not None and following.data
+            said = cast("tuple[BoolMessage, ...]", inputs.events(f"{arm}/following"))
+            now.hands[i] = tuple(message.data for message in said)
         for i, thing in enumerate(watched.things):
             now.poses[i] = inputs[f"{thing}/pose"]
             now.holders[i] = self._numbers.get(round(float(inputs[f"{thing}/held_by"][0])), -1)

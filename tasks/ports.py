@@ -47,7 +47,7 @@ def _inputs(params: TaskParams) -> Iterator[Port]:
             name=f"{arm}/following",
             causality="input",
             type=BoolMessage.ros_type,
-            start=(0.0,),
+            variability="event",
             description="whether a hand leads the arm: `following` of its teleoperation",
         )
     for thing in params.objects:

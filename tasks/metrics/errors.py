@@ -199,9 +199,10 @@ class Clutching(Metric[ClutchingState]):
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Count the hands that let go now."""
-        for i, led in enumerate(now.hands):
-            self.state.count[i] += bool(self.state.led[i]) and not led
-            self.state.led[i] = led
+        for i, said in enumerate(now.hands):
+            for led in said:
+                self.state.count[i] += bool(self.state.led[i]) and not led
+                self.state.led[i] = led
 
     def values(self) -> Iterator[ScoreValue]:
         """Yield the counts."""

@@ -22,6 +22,8 @@ _THRESHOLD = 0.05
 """Of the spectrum at 0 Hz: what is smaller beyond its last larger one does not count."""
 _SHORTEST, _LONGEST = 0.2, 10.0
 """s; a longer movement is cut."""
+_EDGE = 0.1
+"""Of the speed at which a tip is idle: where a movement begins and ends. Most of the jerk is there."""
 _NEAREST = 1e-3
 """m; a shorter movement is none."""
 
@@ -48,6 +50,8 @@ class SmoothnessState(Record):
     time = array("arms")
     """s since it began; 0: none goes on."""
     length = array("arms")
+    peak = array("arms")
+    """Of the speed, m/s."""
     jerk = array("arms")
     """Integral of the squared jerk, m^2/s^5."""
     real = array("arms", FREQUENCIES.size)
@@ -60,22 +64,23 @@ class SmoothnessState(Record):
 class Smoothness(Metric[SmoothnessState]):
     """Mean normalised jerk and spectral arc length over the movements of each tip.
 
-    A movement lasts while the tip is not idle.
+    A movement lasts while the tip is faster than a tenth of the speed below which it is idle, and counts if
+    it has not been idle throughout.
     """
 
     def __init__(self, arms: Sequence[str], idle_speed: float) -> None:
         """Measure `arms`; below `idle_speed` (m/s) a tip is idle."""
         self.state = SmoothnessState(arms=len(arms))
-        self._arms, self._idle_speed = arms, idle_speed
+        self._arms, self._least, self._edge = arms, idle_speed, _EDGE * idle_speed
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
         """Add one period to the movements that go on, and end those that are over."""
         if not now.is_smooth:
             return
         for i, speed in enumerate(now.speeds):
-            if speed >= self._idle_speed:
+            if speed >= self._edge:
                 self._go_on(i, speed, now)
-            if self.state.time[i] and (speed < self._idle_speed or self.state.time[i] >= _LONGEST):
+            if self.state.time[i] and (speed < self._edge or self.state.time[i] >= _LONGEST):
                 self._end(i)
 
     def _go_on(self, i: int, speed: float, now: Instant) -> None:
@@ -85,16 +90,17 @@ class Smoothness(Metric[SmoothnessState]):
         state.imaginary[i] -= speed * period * np.sin(phase)
         state.time[i] += period
         state.length[i] += speed * period
+        state.peak[i] = max(float(state.peak[i]), speed)
         state.jerk[i] += period * float(now.jerks[i] @ now.jerks[i])
 
     def _end(self, i: int) -> None:
         state = self.state
         time, length = float(state.time[i]), float(state.length[i])
-        if time >= _SHORTEST and length >= _NEAREST:
+        if time >= _SHORTEST and length >= _NEAREST and state.peak[i] >= self._least:
             state.movements[i] += 1.0
             state.jerks[i] += sqrt(0.5 * float(state.jerk[i]) * time**5) / length
             state.arcs[i] += spectral_arc_length(state.real[i] + 1j * state.imaginary[i])
-        for part in (state.time, state.length, state.jerk, state.real, state.imaginary):
+        for part in (state.time, state.length, state.peak, state.jerk, state.real, state.imaginary):
             part[i] = 0.0
 
     def values(self) -> Iterator[ScoreValue]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hub.participant import Inputs, Setup
+from schemas.message import Message
 from schemas.trocar_msgs import ScoreCard, TaskEvent
 from schemas.vectors import VectorCodec, has_vector
 from tasks.task import Task
@@ -53,16 +54,19 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
     begin_ns = max((int(stream.times_ns[0]) for stream in known.values()), default=0)
     begin_ns = begin_ns // period_ns * period_ns
     end_ns = max((int(stream.times_ns[-1]) for stream in known.values()), default=0)
-    places, inputs, events = dict.fromkeys(known, 0), Inputs(values), list[TaskEvent]()
+    queues = {port.name for port in inputs_of if port.variability == "event"}
+    arrived: dict[str, tuple[Message, ...]] = {}
+    places, inputs, events = dict.fromkeys(known, 0), Inputs(values, events=arrived), list[TaskEvent]()
     task.configure(Setup(period_ns, Path(), connected=frozenset(known)))
     for t in range(begin_ns, end_ns - period_ns + 1, period_ns):
         for name, stream in known.items():
-            until = t + stream.ahead_ns
-            place = places[name]
-            while place + 1 < len(stream.times_ns) and stream.times_ns[place + 1] <= until:
-                place += 1
-            places[name] = place
-            values[name] = stream.values[place]
+            first = places[name]
+            # the values until then, of which the last holds
+            places[name] = int(np.searchsorted(stream.times_ns, t + stream.ahead_ns, side="right"))
+            if name in queues:
+                arrived[name] = tuple(stream.values[first : places[name]])
+            elif places[name]:
+                values[name] = stream.values[places[name] - 1]
         outputs = task.step(t - begin_ns, period_ns, inputs)
         events += cast("tuple[TaskEvent, ...]", outputs["events"])
     return Scored(task.card(), events)
