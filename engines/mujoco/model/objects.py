@@ -146,7 +146,7 @@ def _add_triangle(body: mujoco.MjsBody, ring: Ring, rgba: list[float]) -> None:
     bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
     contact, ball = _rubbing(ring.friction), ring.thickness / 2.0
     for k in range(3):
-        turn = (2.0 * k - 0.5) * pi / 3.0  # of the outward normal; a corner lies on y
+        turn = (2.0 * k + 0.5) * pi / 3.0  # of the outward normal; a corner lies on y
         away, corner = np.array([np.cos(turn), np.sin(turn)]), turn + pi / 3.0
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
