@@ -24,7 +24,7 @@ __all__ = ["Progress", "Role", "Seen", "Transfer"]
 
 _HOVER = 0.020
 """Of a tip over its grasp before it goes down and after it has let go, m."""
-_ACCURATE, _IN_LINE = 0.4e-3, 0.5e-3
+_ACCURATE, _IN_LINE = 0.2e-3, 0.5e-3
 """m: of a tip at its grasp; of a thing over its place."""
 _PATIENCE = 0.6
 """s: for these; then it goes on with what has been reached."""
@@ -107,7 +107,7 @@ class Transfer:
     @property
     def settles(self) -> bool:
         """Whether the tip is to be brought exactly where it was sent."""
-        return self.state.phase in (Phase.ACROSS, Phase.DESCEND, Phase.OFFER)
+        return self.state.phase in (Phase.ACROSS, Phase.DESCEND)
 
     def _enter(self, phase: Phase, goal: Vector | None = None, share: float = 1.0) -> None:
         """Begin `phase`, with a line to `goal` or, without one, where the tip stands."""
@@ -168,8 +168,10 @@ class Transfer:
         self._enter(Phase.DESCEND, self.state.grasp, _GENTLE)
 
     def _descend(self) -> None:
-        if self.hand.error > _ACCURATE and self.state.waited < _PATIENCE:
-            return
+        if self.state.waited < _PATIENCE and self._plan(self.state.thing) is not None:
+            self.state.goal[:] = self.state.grasp  # the other hand may still bring it to rest
+            if self.hand.error > _ACCURATE:
+                return
         self.hand.move_jaw(_SHUT)
         self._progress.attempts += 1
         self._enter(Phase.CLOSE)
