@@ -1,7 +1,8 @@
 """The table and the things that lie on it, as bodies of the MuJoCo model.
 
 A bent wire is a row of capsules. Its mass, centre and inertia are those of the smooth wire, so they do not
-depend on how many capsules there are. A triangular ring is three boxes.
+depend on how many capsules there are. A triangular ring is three boxes with
+round edges.
 """
 
 from __future__ import annotations
@@ -67,6 +68,8 @@ _COLOURS = (
     [0.6, 0.3, 0.75, 1.0],
 )
 """Of pieces and triangular rings, in the order of their names' numbers, so that they can be told apart."""
+_CORE = 0.9
+"""Thickness of a ring's wall between its edges, as a share of theirs."""
 _ROUNDNESS = 0.1
 """Greatest distance of a wire's capsules from its centre line, as a share of its radius."""
 
@@ -137,32 +140,46 @@ def _rubbing(friction: float) -> dict[str, Any]:
 
 
 def _add_triangle(body: mujoco.MjsBody, ring: Ring, rgba: list[float]) -> None:
-    """Add three walls, and balls in the corners with which the ring lies on what is level.
+    """Add three walls with round edges, and balls in the corners with which the ring lies on what is level.
 
-    A wall ends where the inner faces meet, so that walls do not overlap beyond the corners' own material.
+    Jaws that are not parallel touch a wall along its edge. Between a capsule and a box MuJoCo finds the same
+    two contacts step by step; between two boxes their number changes, and each change is a blow.
     """
-    middle, half = ring.inradius + ring.thickness / 2.0, ring.height / 2.0
-    size = [ring.thickness / 2.0, sqrt(3.0) * middle, half]
+    middle, half, edge = ring.inradius + ring.thickness / 2.0, ring.height / 2.0, ring.thickness / 2.0
+    length = sqrt(3.0) * middle
     bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
-    contact, ball = _rubbing(ring.friction), ring.thickness / 2.0
+    contact = _rubbing(ring.friction)
     for k in range(3):
-        turn = (2.0 * k - 0.5) * pi / 3.0  # of the outward normal; a corner lies on y
-        away, corner = np.array([np.cos(turn), np.sin(turn)]), turn + pi / 3.0
+        turn = (2.0 * k + 0.5) * pi / 3.0  # of the outward normal; a corner lies on y
+        normal, along = (
+            np.array([np.cos(turn), np.sin(turn), 0.0]),
+            np.array([-np.sin(turn), np.cos(turn), 0.0]),
+        )
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=size,
-            pos=[*(middle * away), 0.0],
+            size=[_CORE * edge, length, half - edge],
+            pos=middle * normal,
             quat=[np.cos(turn / 2.0), 0.0, 0.0, np.sin(turn / 2.0)],
             mass=ring.mass / 3.0,
             rgba=rgba,
             **bits,
             **contact,
         )
-        for z in (ball - half, half - ball):
+        for z in (edge - half, half - edge):
+            ends = np.array([middle * normal + side * length * along + [0.0, 0.0, z] for side in (-1.0, 1.0)])
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                size=[edge, 0.0, 0.0],
+                fromto=ends.ravel(),
+                mass=0.0,
+                rgba=rgba,
+                **bits,
+                **contact,
+            )
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=[ball, 0.0, 0.0],
-                pos=[2.0 * middle * np.cos(corner), 2.0 * middle * np.sin(corner), z],
+                size=[edge, 0.0, 0.0],
+                pos=ends[1],
                 mass=0.0,
                 rgba=rgba,
                 contype=_TABLE,
