@@ -22,7 +22,7 @@ class Goals:
     positions: Vector | None = None
     """Where an object is once it lies there, m, in the world, shape (places, 3)."""
     starts: tuple[frozenset[int], ...] = ()
-    """Of each object: the places where it may begin."""
+    """Of each object: the places where it may begin, and has to go back to; none: it does not go back."""
     targets: tuple[frozenset[int], ...] = ()
     """Of each object: the places where it belongs."""
     hand_over: bool = False
@@ -50,7 +50,7 @@ class Legs:
     def __init__(self, goals: Goals, *, hand_over: bool) -> None:
         """Count what reaches its target; with `hand_over` only what was handed over on its way."""
         self.state = LegsState(objects=len(goals.targets))
-        self._ways = (goals.targets, goals.starts)
+        self._ways = (goals.targets, goals.starts or (frozenset[int](),) * len(goals.targets))
         self._hand_over = hand_over
 
     def take(self, event: Event) -> bool:

@@ -67,7 +67,7 @@ class PickAndPlaceTask(Task):
             frozenset(i for i, dish in enumerate(dishes) if belongs.get(thing) == dish)
             for thing in self.things
         )
-        return Goals(places=dishes, starts=(frozenset[int](),) * len(targets), targets=targets)
+        return Goals(places=dishes, targets=targets)
 
     @property
     def goal_count(self) -> int:
