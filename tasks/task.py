@@ -109,7 +109,7 @@ class Task(Controller):
         self.keep(*self._records())
         self._outputs: dict[str, Any] = {
             "events": (),
-            "score": self._card(0),
+            "score": self.card(0),
             "progress": self._state.progress,
             "done": self._state.done,
         }
@@ -156,7 +156,7 @@ class Task(Controller):
             rules.take(now, events)
         self._outputs["events"] = tuple(self._message(event, t + h) for event in events)
         if not (t + h) % self.params.card_period:
-            self._outputs["score"] = self._card(t + h)
+            self._outputs["score"] = self.card(t + h)
         return self._outputs
 
     def _reach(self, events: tuple[Event, ...]) -> None:
@@ -180,11 +180,8 @@ class Task(Controller):
             unit=event.unit,
         )
 
-    def card(self) -> ScoreCard:
-        """Return the score card as it is now."""
-        return self._card(round(self._now.time_s * 1e9))
-
-    def _card(self, time_ns: int) -> ScoreCard:
+    def card(self, time_ns: int) -> ScoreCard:
+        """Return the score card as it is now, at simulated time `time_ns`."""
         metrics: dict[str, ScoreValue] = {
             value.name: value for metric in self._metrics for value in metric.values()
         }

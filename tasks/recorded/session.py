@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -74,12 +74,17 @@ def _make(
 def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
     """Return what a task says that was not in the session, from the scene of its robot."""
     robot, scene = _robot(recording)
-    arms = {arm: one for arm, one in scene["arms"].items() if f"{robot}.{arm}/measured_cp" in recording}
-    objects = {thing: {} for thing in scene.get("objects") or {} if f"{robot}.{thing}/pose" in recording}
-    boards = [one for one in (scene.get("fixtures") or {}).values() if one.get("kind") == "board"]
+    arms = {
+        arm: one for arm, one in _table(scene, "arms").items() if f"{robot}.{arm}/measured_cp" in recording
+    }
+    objects = {
+        thing: one for thing, one in _table(scene, "objects").items() if f"{robot}.{thing}/pose" in recording
+    }
+    fixtures = _table(scene, "fixtures")
+    boards = [name for name in fixtures if _table(fixtures, name).get("kind") == "board"]
     kind = "peg-board-task" if boards else "practice-task"
     params = {key: scene[key] for key in ("mounting", "setup_joints") if key in scene}
-    params |= {"arms": arms, "objects": objects} | ({"fixtures": scene["fixtures"]} if boards else {})
+    params |= {"arms": arms, "objects": objects} | ({"fixtures": fixtures} if boards else {})
     task = _make(kind, "practice", params, rules, recording)
     streams = {
         port.name: _stream(recording, f"{robot}.{port.name}", _PERIOD_NS)
@@ -92,13 +97,18 @@ def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
 def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
     """Return the participant that publishes the poses of arms, and its parameters."""
     for name, spec in recording.scenario().participants.items():
-        arms: Any = spec.params.get("arms")
-        if isinstance(arms, dict) and any(f"{name}.{arm}/measured_cp" in recording for arm in arms):
+        if any(f"{name}.{arm}/measured_cp" in recording for arm in _table(spec.params, "arms")):
             return name, spec.params
     raise RecordingError(
         f"'{recording.file}' cannot be scored: it has no `measured_cp` of an arm, such as"
         " robot.PSM1/measured_cp of a MuJoCo robot; record a session that has one"
     )
+
+
+def _table(params: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return a mapping of a recorded scenario, which may be a stranger's; empty if it is none."""
+    value: Any = params.get(name)
+    return cast("dict[str, Any]", value) if isinstance(value, dict) else {}
 
 
 def _hands(recording: Recording, task: Task) -> dict[str, Stream]:

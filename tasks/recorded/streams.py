@@ -57,7 +57,7 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
     queues = {port.name for port in inputs_of if port.variability == "event"}
     arrived: dict[str, tuple[Message, ...]] = {}
     places, inputs, events = dict.fromkeys(known, 0), Inputs(values, events=arrived), list[TaskEvent]()
-    task.configure(Setup(period_ns, Path(), connected=frozenset(known)))
+    outputs = task.configure(Setup(period_ns, Path(), connected=frozenset(known)))
     for t in range(begin_ns, end_ns - period_ns + 1, period_ns):
         for name, stream in known.items():
             first = places[name]
@@ -69,4 +69,4 @@ def score(task: Task, streams: Mapping[str, Stream], period_ns: int) -> Scored:
                 values[name] = stream.values[places[name] - 1]
         outputs = task.step(t - begin_ns, period_ns, inputs)
         events += cast("tuple[TaskEvent, ...]", outputs["events"])
-    return Scored(task.card(), events)
+    return Scored(cast("ScoreCard", outputs["score"]), events)

@@ -102,7 +102,7 @@ class Board:
 
     @property
     def card(self):
-        return self.task.card()
+        return self.task.card(self.t)
 
     def metric(self, name):
         value = {one.name: one for one in self.card.metrics}[name]
