@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from tasks.instant import Watched
-from tasks.metrics.errors import Clutching, Collisions, Counts, Forces, Time, View
+from tasks.metrics.counts import Clutching, Counts, Time
+from tasks.metrics.errors import Collisions, Forces, View
 from tasks.metrics.metric import AnyMetric
 from tasks.metrics.motion import Economy, Paths, Turning, WorkingVolume
 from tasks.metrics.smoothness import Smoothness
