@@ -41,8 +41,12 @@ __all__ = [
     "ParticipantStatus",
     "Profile",
     "ProfileRow",
+    "RuleScore",
+    "ScoreCard",
+    "ScoreValue",
     "SessionStatus",
     "SoftBodyState",
+    "TaskEvent",
     "TissueGrasp",
 ]
 
@@ -162,6 +166,62 @@ class TissueGrasp(Message):
     """The nodes of the body that are, or were, held."""
     force_n: Float64
     """Pull of the instrument on the tissue just before."""
+
+
+class TaskEvent(Message):
+    """Something that happened in a training task."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/TaskEvent"
+    header: Header
+    event: String
+    """`grasped`, `lifted`, `handed over`, `placed`, `dropped`, `out of workspace`, `out of view` or
+    `collision`.
+    """
+    object: String = ""
+    """The object of which it is; empty: none."""
+    arm: String = ""
+    """The arm that did it; of a hand-over the one that has the object now; empty: none."""
+    place: String = ""
+    """Where an object was placed."""
+    value: Float64 = 0.0
+    """How much, in `unit`: the height of a lift or a drop, the impulse of a collision."""
+    unit: String = ""
+
+
+class ScoreValue(Message):
+    """One number of a score card."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ScoreValue"
+    name: String
+    """Such as `drops`; of one arm `PSM1/path_length`."""
+    value: Float64 = 0.0
+    """In `unit`; it says nothing if there is a `reason`."""
+    unit: String = ""
+    reason: String = ""
+    """Why there is no value; empty: there is one."""
+
+
+class RuleScore(Message):
+    """What one set of rules says about a trial."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/RuleScore"
+    rules: String
+    values: list[ScoreValue] = Field(default_factory=list[ScoreValue])
+
+
+class ScoreCard(Message):
+    """How well a training task is done so far: metrics, and the scores by each set of rules."""
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ScoreCard"
+    header: Header
+    task: String
+    """Kind of the task."""
+    goals: UInt32
+    """That the task has."""
+    reached: UInt32
+    """Goals reached so far."""
+    metrics: list[ScoreValue] = Field(default_factory=list[ScoreValue])
+    rules: list[RuleScore] = Field(default_factory=list[RuleScore])
 
 
 class ParticipantStatus(Message):

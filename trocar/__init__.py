@@ -7,9 +7,9 @@
     joints.time, joints["position"]     # (n,) s of simulated time, (n, 6) rad and m
 
 What is in `__all__` here, in `trocar.messages` (ROS 2 messages), in `trocar.quantities` (parameters with
-units) and in `trocar.records` (state with named fields) is public. All other modules of the distribution
-(`schemas`, `robots`, `hub`, `engines`, `controllers`, `devices`, `learning`, `configs`) are private: they may
-change in any release. `python -m trocar` is the command line.
+units), in `trocar.records` (state with named fields) and in `trocar.tasks` (training tasks) is public. All
+other modules of the distribution (`schemas`, `robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`,
+`learning`, `configs`) are private: they may change in any release. `python -m trocar` is the command line.
 
 Sessions          `run`, `verify`, `load_scenario`, `run_in_process`
 Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `write_bag` for samples to play

@@ -34,6 +34,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "keyboard": ("keys", ""),
     "libovr": ("teleop", "participants.head={kind: libovr}"),
     "openxr": ("teleop", "participants.head={kind: openxr}"),
+    "practice-task": ("pick", "participants.task={kind: practice-task}"),
     "ros1": ("ros", "participants.ros.kind=ros1"),
     "ros2-dds": ("ros", "participants.ros.kind=ros2-dds"),
     "touch": ("table", "participants.stylus={kind: touch, styluses: {right: {}}}"),

@@ -10,15 +10,27 @@ from pydantic import Field, model_validator
 from hub.participant import Params
 from robots.dvrk.instruments import STEEL_DENSITY
 from robots.dvrk.parameters import UnitQuaternion
+from robots.training.boards import BOARDS, Ring
+from robots.training.fixtures import BoardName
 from schemas.quantity import Angle, Density, Length
 
-__all__ = ["BlockParams", "NeedleParams", "ObjectParams", "RingParams", "TableParams"]
+__all__ = [
+    "BlockParams",
+    "NeedleParams",
+    "ObjectParams",
+    "PieceParams",
+    "RingParams",
+    "TableParams",
+    "TriangleParams",
+]
 
 POLYAMIDE_DENSITY = 1130.0
 """Polyamide 6, kg/m^3 (1.12 to 1.14 g/cm^3 by the makers' data sheets)."""
 
 
 _Side = Annotated[Length, Field(gt=0.0)]
+_Reach = Annotated[Length, Field(ge=0.0)]
+_Turn = Annotated[Angle, Field(ge=0.0, le=pi)]
 
 
 class _Object(Params):
@@ -28,6 +40,13 @@ class _Object(Params):
     orientation: UnitQuaternion = Field(
         default=(0.0, 0.0, 0.0, 1.0),
         description="of the object's frame in the world at time 0: quaternion x, y, z, w",
+    )
+    scatter: tuple[_Reach, _Reach, _Turn] = Field(
+        default=(0.0, 0.0, 0.0),
+        description=(
+            "how far the scene's `seed` may move the start along x and y of the world, and turn it about z,"
+            " to either side"
+        ),
     )
 
 
@@ -86,7 +105,27 @@ class BlockParams(_Object):
     density: Density = Field(default=POLYAMIDE_DENSITY, gt=0.0)
 
 
-ObjectParams = Annotated[RingParams | NeedleParams | BlockParams, Field(discriminator="kind")]
+class PieceParams(_Object):
+    """A small piece of the authors' pick-and-place scene (`robots.training.dishes`), a light box."""
+
+    kind: Literal["piece"]
+
+
+class TriangleParams(_Object):
+    """A triangular ring of a peg board; its frame is in the middle, z along its axis, y to a corner."""
+
+    kind: Literal["triangle"]
+    ring: BoardName = Field(description="the board that it belongs to, which states its measures")
+
+    @property
+    def measures(self) -> Ring:
+        """Its measures, mass and friction."""
+        return BOARDS[self.ring].ring
+
+
+ObjectParams = Annotated[
+    RingParams | NeedleParams | BlockParams | PieceParams | TriangleParams, Field(discriminator="kind")
+]
 """One thing that can be moved."""
 
 

@@ -16,8 +16,10 @@ from hub.participant import Params
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
+from robots.training.fixtures import FixtureParams
 from schemas.keys import valid_name
 from schemas.quantity import Duration
+from schemas.scenario import Name
 
 __all__ = [
     "MujocoParams",
@@ -79,13 +81,23 @@ class SceneParams(Params):
         ),
     )
     table: TableParams | None = None
+    fixtures: dict[Name, FixtureParams] = Field(
+        default_factory=dict[str, FixtureParams], description="boards and dishes, which stand fast"
+    )
     objects: Annotated[dict[str, ObjectParams], AfterValidator(_object_names)] = Field(
         default_factory=dict[str, ObjectParams]
     )
-    grasp: Literal["friction", "weld"] = Field(
+    seed: int | None = Field(
+        default=None,
+        ge=0,
+        description="varies where objects start, by the `scatter` of each; null: where they are put",
+    )
+    grasp: Literal["friction", "weld", "proximity"] = Field(
         default="friction",
         description=(
-            "what holds an object between two jaws: friction alone, or a weld while both jaws touch it"
+            "what holds an object between two jaws: friction alone; a weld while both jaws touch it; or, as"
+            " in the authors' scene, a weld to what a ray from 5 to 13 mm ahead of the jaw meets first while"
+            " the jaw's command is not above 0"
         ),
     )
     looks: bool = Field(
@@ -113,10 +125,10 @@ class SceneParams(Params):
             for name, arm in self.arms.items()
             if isinstance(arm, MountedPsm) and arm.tool.roller is not None
         ]
-        if rolling and self.objects and self.grasp == "weld":
+        if rolling and self.objects and self.grasp != "friction":
             raise ValueError(
-                f"grasp: weld would lock the object that the instrument of {', '.join(rolling)} rolls; use"
-                " grasp: friction"
+                f"grasp: {self.grasp} would lock the object that the instrument of {', '.join(rolling)}"
+                " rolls; use grasp: friction"
             )
         return self
 

@@ -17,6 +17,7 @@ from rich.text import Text
 from hub.observation.summary import Progress
 from hub.planning.limits import shown
 from hub.recording.profiles import profile_tables
+from hub.recording.scores import score_tables
 from schemas.scenario import Scenario
 
 __all__ = ["LATENCY_COLUMNS", "RunProgress", "console", "latency_rows", "show", "table"]
@@ -58,6 +59,10 @@ def show(result: Mapping[str, Any], *, as_json: bool) -> None:
     if rows := list(latency_rows(result.get("latency", {}))):
         console.print()
         console.print(table(rows, *LATENCY_COLUMNS))
+    for name, scores in result.get("scores", {}).items():
+        for columns, cells in score_tables(name, scores):
+            console.print()
+            console.print(table(cells, *columns))
     profile = result.get("profile")
     for columns, cells in profile_tables(profile) if profile else ():
         console.print()

@@ -97,7 +97,7 @@ class Host:
         """
         bonds: dict[str, tuple[BondSide, ...]] = {}
         for one in self._hosted:
-            setup = Setup(period_ns=one.h_ns, directory=directory, bonds=one.planned.bond_plans)
+            setup = Setup(one.h_ns, directory, one.planned.bond_plans, self.plan.connected(one.name))
             try:
                 self._publish(one, INITIAL, 0, one.participant.configure(setup))
             except ParticipantError:

@@ -1,4 +1,4 @@
-"""Measures: numbers for the summary, computed from the values of output ports during the run."""
+"""Measures and score cards: what the summary says of the values of output ports during the run."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from hub.planning.measured import measured_port
 from hub.planning.plan import Plan
 from schemas.ros import Float64Message
 from schemas.scenario import Measure, Scenario
+from schemas.trocar_msgs import ScoreCard
 from schemas.vectors import Vector
 
 __all__ = ["Measures"]
@@ -82,7 +83,13 @@ class Measures:
 
     def __init__(self, scenario: Scenario, plan: Plan) -> None:
         self._meters: dict[str, _Meter] = {}
-        self.by_port: dict[tuple[str, str], list[_Meter]] = {}
+        self.by_port: dict[tuple[str, str], list[_Meter]] = {
+            (planned.name, port.name): []
+            for planned in plan.participants.values()
+            for port in planned.ports
+            if port.causality == "output" and port.type == ScoreCard.ros_type
+        }
+        self._cards: dict[str, ScoreCard] = {}
         self._lock = threading.Lock()
         for name, measure in scenario.measure.items():
             planned = plan.participants[measure.of.participant]
@@ -93,11 +100,19 @@ class Measures:
 
     @property
     def ports(self) -> list[tuple[str, str]]:
-        """The (participant, port) pairs that are measured."""
+        """The (participant, port) pairs that are measured, those of score cards among them."""
         return list(self.by_port)
+
+    @property
+    def cards(self) -> dict[str, ScoreCard]:
+        """The newest score card of each participant that publishes one."""
+        return dict(self._cards)
 
     def take(self, participant: str, port: str, value: Any, time_ns: int) -> None:
         """Add the value of a signal port, or one message of an event port, at a time."""
+        if isinstance(value, ScoreCard):
+            self._cards[participant] = value
+            return
         if isinstance(value, Float64Message):
             value = np.array([value.data])
         for meter in self.by_port.get((participant, port), ()):

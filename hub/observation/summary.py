@@ -70,6 +70,8 @@ class Summary:
     observers: dict[str, Observed] = field(default_factory=dict[str, Observed])
     """By name, the participants that looked on in their own time."""
     measures: dict[str, float | None] = field(default_factory=dict[str, float | None])
+    scores: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
+    """By participant, the last score card that it published (`hub/recording/scores.py`)."""
     ending: str | None = None
     """Which participant has ended the session, at what simulated time and why; None if none has."""
     profile: dict[str, Any] | None = None

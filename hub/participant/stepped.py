@@ -48,13 +48,15 @@ class BondPlan:
 
 @dataclass(frozen=True)
 class Setup:
-    """What `Stepped.configure` receives: the step, the directory and the bonds of the participant."""
+    """What `Stepped.configure` receives: step, directory, and what of the participant is connected."""
 
     period_ns: int
     """Its step, in nanoseconds."""
     directory: Path
     """Where relative paths of the scenario start."""
     bonds: Mapping[str, BondPlan] = field(default_factory=dict[str, BondPlan])
+    connected: frozenset[str] = frozenset()
+    """The inputs that have a source; any other keeps its start value."""
 
 
 class Stepped(Participant):

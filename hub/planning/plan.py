@@ -157,6 +157,11 @@ class Plan(_Part):
         """Return the participants that only look, in their own time."""
         return tuple(planned for planned in self.participants.values() if planned.observer)
 
+    def connected(self, participant: str) -> frozenset[str]:
+        """Return the inputs of a participant that have a source."""
+        every = (*self.connections, *self.from_devices, *self.to_devices)
+        return frozenset(one.target_port for one in every if one.target == participant)
+
     def stride(self, participant: str, port: str) -> int:
         """Return how many steps lie between two values of an output port."""
         planned = self.participants[participant]

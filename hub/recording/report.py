@@ -12,9 +12,9 @@ import numpy as np
 
 from hub.recording.profiles import profile_numbers, profile_tables
 from hub.recording.recording import Recording
+from hub.recording.report_canvas import Figure
 from hub.recording.report_figures import (
     BondTrace,
-    Figure,
     energy_figures,
     force_figure,
     motion_figure,
@@ -22,6 +22,7 @@ from hub.recording.report_figures import (
     press_figure,
     step_time_figures,
 )
+from hub.recording.report_scores import score_figures, score_table, scored
 from hub.recording.series import Series
 from schemas.errors import RecordingError
 from schemas.scenario import Bond, Scenario
@@ -48,6 +49,7 @@ def report(recording: Recording, output: Path) -> None:
         numbers=_numbers(recording, scenario, statuses[-1][1] if statuses else None, traces, books),
         bonds=_sections(_bond_figures(traces, books)),
         steps=_sections(_step_figures(recording, scenario, statuses)),
+        scores=_scores(recording),
         profile=_profile(recording),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
@@ -159,6 +161,16 @@ def _profile(recording: Recording) -> str:
         return ""
     tables = "\n".join(_table(heads, rows) for heads, rows in profile_tables(profile_numbers(profile)))
     return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
+
+
+def _scores(recording: Recording) -> str:
+    """Return the sections about training tasks; empty if there was none."""
+    return "\n".join(
+        f'<section class="score" aria-labelledby="h-{escape(name)}"><h2 id="h-{escape(name)}">Task'
+        f" {escape(name)}</h2>{score_table(name, card)}"
+        f'<div class="figures">{_sections(score_figures(recording, name))}</div></section>'
+        for name, card in scored(recording).items()
+    )
 
 
 def _ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:

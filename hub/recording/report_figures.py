@@ -1,24 +1,17 @@
-"""The plots of a report, as SVG that takes its colours and its width from the page."""
+"""The plots of a report about bonds and steps."""
 
 from __future__ import annotations
 
-import io
-import re
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
-from html import escape
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.errors import MissingExtraError
+from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend, thin
 from schemas.vectors import Vector
 
 __all__ = [
     "BondTrace",
-    "Figure",
     "energy_figures",
     "force_figure",
     "motion_figure",
@@ -32,25 +25,7 @@ CONTACT_SHARE = 0.05
 shows 2 % in the palpation scenario."""
 
 _POINTS = 1200
-"""Points of a line; at the width of a page more make no difference."""
-
-_INK, _GRID = "#101112", "#d0d1d2"
-_SERIES = ("#c00001", "#c00002", "#c00003", "#c00004")
-_VARIABLES = {
-    _INK: "var(--ink)",
-    _GRID: "var(--grid)",
-    **{colour: f"var(--series-{i})" for i, colour in enumerate(_SERIES)},
-}
-"""Colours that stand for the page's own, which follow the reader's light or dark theme."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One plot of the page."""
-
-    title: str
-    svg: str
-    caption: str
+"""Points of a line of which none is left out for its height."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +78,7 @@ def press_figure(trace: BondTrace) -> Figure:
     """Force against depth, one line per contact."""
     episodes = trace.episodes()
     depth_mm, magnitude = trace.depth * 1e3, trace.magnitude
-    with _axes("depth (mm)", "force (N)") as (axes, result):
+    with axes_of("depth (mm)", "force (N)") as (axes, result):
         for i, part in enumerate(episodes):
             label = f"{trace.times_s[part.start]:.1f}–{trace.times_s[part.stop - 1]:.1f} s"
             every = slice(part.start, part.stop, 1 + (part.stop - part.start) // _POINTS)
@@ -111,11 +86,11 @@ def press_figure(trace: BondTrace) -> Figure:
                 depth_mm[every],
                 magnitude[every],
                 linewidth=1,
-                color=_SERIES[i % len(_SERIES)],
-                label=label if len(episodes) <= len(_SERIES) else None,
+                color=SERIES[i % len(SERIES)],
+                label=label if len(episodes) <= len(SERIES) else None,
             )
-        if 1 <= len(episodes) <= len(_SERIES):
-            _legend(axes)
+        if 1 <= len(episodes) <= len(SERIES):
+            legend(axes)
         axes.set_ylim(bottom=0)
     caption = (
         "Depth is the displacement of the motion side since first contact, against the mean direction of the"
@@ -128,13 +103,13 @@ def press_figure(trace: BondTrace) -> Figure:
 
 def force_figure(trace: BondTrace) -> Figure:
     """Force over time, by component."""
-    with _axes("time (s)", "force (N)") as (axes, result):
+    with axes_of("time (s)", "force (N)") as (axes, result):
         axes.plot(
-            *_thin(trace.times_s, trace.magnitude), color=_INK, alpha=0.3, linewidth=3.5, label="magnitude"
+            *thin(trace.times_s, trace.magnitude), color=INK, alpha=0.3, linewidth=3.5, label="magnitude"
         )
         for i, name in zip(range(trace.force.shape[1]), "xyz", strict=False):
-            axes.plot(*_thin(trace.times_s, trace.force[:, i]), color=_SERIES[i], label=name)
-        _legend(axes)
+            axes.plot(*thin(trace.times_s, trace.force[:, i]), color=SERIES[i], label=name)
+        legend(axes)
     caption = f"Force on the motion side, in the bond's frame. Peak {trace.magnitude.max(initial=0):.3g} N."
     return Figure(f"{trace.name}: force", result.svg(caption), caption)
 
@@ -142,10 +117,10 @@ def force_figure(trace: BondTrace) -> Figure:
 def motion_figure(trace: BondTrace) -> Figure:
     """Position over time, from where it started."""
     moved_mm = (trace.position - trace.position[:1]) * 1e3
-    with _axes("time (s)", "displacement (mm)") as (axes, result):
+    with axes_of("time (s)", "displacement (mm)") as (axes, result):
         for i, name in zip(range(moved_mm.shape[1]), "xyz", strict=False):
-            axes.plot(*_thin(trace.times_s, moved_mm[:, i]), color=_SERIES[i], label=name)
-        _legend(axes)
+            axes.plot(*thin(trace.times_s, moved_mm[:, i]), color=SERIES[i], label=name)
+        legend(axes)
     caption = (
         "Displacement of the motion side from its start, in the bond's frame. Largest"
         f" {np.abs(moved_mm).max(initial=0):.3g} mm."
@@ -156,15 +131,15 @@ def motion_figure(trace: BondTrace) -> Figure:
 def energy_figures(bond: str, times_s: Vector, motion_j: Vector, force_j: Vector) -> list[Figure]:
     """The energy book of a bond: works (J, since the start), and what the coupling created or lost."""
     residual_uj = (force_j - motion_j) * 1e6
-    with _axes("time (s)", "work (mJ)") as (axes, book):
+    with axes_of("time (s)", "work (mJ)") as (axes, book):
         for i, (label, values, style) in enumerate(
             (("motion side", motion_j, "-"), ("force side", force_j, "--"))
         ):
-            axes.plot(*_thin(times_s, values * 1e3), color=_SERIES[i], linestyle=style, label=label)
-        _legend(axes)
-    with _axes("time (s)", "residual (µJ)") as (axes, residual):
-        axes.plot(*_thin(times_s, residual_uj), color=_SERIES[2])
-        axes.axhline(0.0, color=_INK, linestyle=":", linewidth=1)
+            axes.plot(*thin(times_s, values * 1e3), color=SERIES[i], linestyle=style, label=label)
+        legend(axes)
+    with axes_of("time (s)", "residual (µJ)") as (axes, residual):
+        axes.plot(*thin(times_s, residual_uj), color=SERIES[2])
+        axes.axhline(0.0, color=INK, linestyle=":", linewidth=1)
     largest_uj = 1e6 * max(np.abs(motion_j).max(), np.abs(force_j).max())
     book_caption = (
         "Work that the motion side gave and the force side took, since the start. Largest"
@@ -193,15 +168,15 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
     low = max(1e-9, min(float(spent.min()) for _, spent in compute.values())) * 1e6
     high = max(float(spent.max()) for _, spent in compute.values()) * 1e6
     bins = np.geomspace(low, max(high, 1.1 * low) * 1.001, 60)
-    with _axes("compute time per step (µs)", "share of steps (%)") as (axes, spread):
+    with axes_of("compute time per step (µs)", "share of steps (%)") as (axes, spread):
         for i, (name, (_, spent)) in enumerate(compute.items()):
             share = np.histogram(spent * 1e6, bins)[0] * (100.0 / len(spent))
-            axes.stairs(share, bins, color=_SERIES[i % len(_SERIES)], label=name, linewidth=1.4)
+            axes.stairs(share, bins, color=SERIES[i % len(SERIES)], label=name, linewidth=1.4)
         axes.set_xscale("log")
-        axes.axvline(step_s * 1e6, color=_INK, linestyle=":", linewidth=1, label="communication step")
-        _legend(axes)
+        axes.axvline(step_s * 1e6, color=INK, linestyle=":", linewidth=1, label="communication step")
+        legend(axes)
     over = "Median (line) and 99th percentile (thin line) of the compute time, in intervals of the session."
-    with _axes("time (s)", "compute time per step (µs)") as (axes, over_time):
+    with axes_of("time (s)", "compute time per step (µs)") as (axes, over_time):
         for i, (name, (times, spent)) in enumerate(compute.items()):
             parts = np.array_split(np.arange(len(times)), min(len(times), 120))
             middle = [float(times[part].mean()) for part in parts]
@@ -210,12 +185,12 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
                 axes.plot(
                     middle,
                     line,
-                    color=_SERIES[i % len(_SERIES)],
+                    color=SERIES[i % len(SERIES)],
                     linewidth=width,
                     label=name if percentile == 50 else None,
                 )
         axes.set_yscale("log")
-        _legend(axes)
+        legend(axes)
     return [
         Figure("Compute time per step", spread.svg(caption), caption + "."),
         Figure("Compute time over the session", over_time.svg(over), over),
@@ -224,92 +199,12 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
 
 def pace_figure(times_s: Vector, factor: Vector) -> Figure:
     """Real-time factor over simulated time."""
-    with _axes("time (s)", "real-time factor") as (axes, result):
-        axes.plot(*_thin(times_s, factor), color=_SERIES[0])
-        axes.axhline(1.0, color=_INK, linestyle=":", linewidth=1)
+    with axes_of("time (s)", "real-time factor") as (axes, result):
+        axes.plot(*thin(times_s, factor), color=SERIES[0])
+        axes.axhline(1.0, color=INK, linestyle=":", linewidth=1)
         axes.set_ylim(bottom=0)
     caption = (
         "Simulated seconds per wall second, as the session stated it; 1 is real time. Median"
         f" {np.median(factor):.2f}."
     )
     return Figure("Pace", result.svg(caption), caption)
-
-
-class _Result:
-    text = ""
-
-    def svg(self, label: str) -> str:
-        """Return the SVG element, with `label` for those who do not see it."""
-        body = self.text[self.text.index("<svg") :]
-        body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
-        for colour, variable in _VARIABLES.items():
-            body = body.replace(colour, variable)
-        return re.sub(
-            r'<svg [^>]*?(viewBox="[^"]*")[^>]*>',
-            rf'<svg \1 xmlns:xlink="http://www.w3.org/1999/xlink" role="img" aria-label="{escape(label)}">',
-            body,
-            count=1,
-        )
-
-
-@contextmanager
-def _axes(x: str, y: str) -> Generator[tuple[Any, _Result]]:
-    """Give axes to draw on; afterwards the result holds the SVG."""
-    try:
-        import matplotlib
-        from matplotlib.figure import Figure as Canvas
-    except ImportError as error:
-        raise MissingExtraError("the report", "report", "matplotlib") from error
-    mpl: Any = matplotlib
-    settings = {
-        "svg.fonttype": "none",
-        "svg.hashsalt": "trocar",
-        "font.family": "sans-serif",
-        "font.size": 10,
-        "text.color": _INK,
-        "axes.labelcolor": _INK,
-        "axes.edgecolor": _INK,
-        "axes.linewidth": 0.6,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "xtick.color": _INK,
-        "ytick.color": _INK,
-        "grid.color": _GRID,
-        "grid.linewidth": 0.6,
-        "lines.linewidth": 1.4,
-        "lines.solid_joinstyle": "round",
-    }
-    result = _Result()
-    with mpl.rc_context(settings):
-        figure: Any = Canvas(figsize=(4.8, 3.1), layout="constrained")
-        axes = figure.add_subplot()
-        axes.grid(visible=True)
-        axes.set_axisbelow(True)
-        axes.set_xlabel(x)
-        axes.set_ylabel(y)
-        yield axes, result
-        stream = io.StringIO()
-        figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
-    result.text = stream.getvalue()
-
-
-def _legend(axes: Any) -> None:
-    axes.legend(
-        frameon=False,
-        fontsize=9,
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        ncols=4,
-        borderaxespad=0,
-        handlelength=1,
-        columnspacing=1,
-    )
-
-
-def _thin(x: Vector, y: Vector) -> Sequence[Vector]:
-    """Leave out points of y over x that a page cannot show, but keep the extremes of y."""
-    if len(x) <= _POINTS:
-        return x, y
-    parts = np.array_split(np.arange(len(x)), _POINTS // 2)
-    keep = np.unique([[part[np.argmin(y[part])], part[np.argmax(y[part])]] for part in parts])
-    return x[keep], y[keep]

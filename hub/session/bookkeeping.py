@@ -14,6 +14,7 @@ from hub.observation.summary import Progress, Summary
 from hub.planning.plan import Plan, PlannedParticipant
 from hub.recording.profiles import profile_numbers
 from hub.recording.recorder import RecorderSummary
+from hub.recording.scores import score_numbers
 from hub.session.clock import Clock
 from hub.session.observer_reports import ObserverReports
 from hub.transport.refusals import Refusals
@@ -145,6 +146,9 @@ class Bookkeeping:
             latency=by_way(self._latencies),
             observers=self._observer_reports.observed(),
             measures=self._monitor.measures.results(),
+            scores={
+                name: score_numbers(card) for name, card in sorted(self._monitor.measures.cards.items())
+            },
             ending=self.detail or None,
             profile=None if profile is None else profile_numbers(profile),
         )

@@ -65,7 +65,7 @@ class Rig:
         self._events = {
             name: cast("tuple[Message, ...]", inputs[name]) for name in inputs if name not in self._values
         }
-        setup = Setup(period_ns, directory, plans)
+        setup = Setup(period_ns, directory, plans, frozenset(inputs))
         self.outputs = self._checked(participant.configure(setup), "configure()")
         require(declared == participant.ports, "configure() does not change the ports")
         require(

@@ -50,7 +50,7 @@ def test_words_are_plain(page):
 
 
 @pytest.mark.parametrize(
-    "folder", ["hub", "schemas", "robots", "engines", "controllers", "devices", "learning", "trocar"]
+    "folder", ["hub", "schemas", "robots", "engines", "controllers", "devices", "tasks", "learning", "trocar"]
 )
 def test_words_of_what_ships_are_plain(folder):
     for file in sorted((ROOT / folder).rglob("*.py")):
@@ -61,7 +61,7 @@ def test_words_of_what_ships_are_plain(folder):
 @cache
 def source():
     """All code as one text, without the seams between the parts of a string."""
-    folders = ("hub", "schemas", "robots", "engines", "controllers", "devices", "learning", "trocar")
+    folders = ("hub", "schemas", "robots", "engines", "controllers", "devices", "tasks", "learning", "trocar")
     files = [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
     text = "\n".join(file.read_text("utf-8") for file in files)
     return re.sub(r'"\s*\n\s*f?"', "", text)
@@ -90,7 +90,7 @@ def test_files_and_modules_that_a_page_names_exist(page):
     for name in re.findall(r"`((?:[a-z_0-9]+/)+[a-z_0-9]+\.(?:py|c|json|yaml))`", text):
         roots = (ROOT, *(ROOT / folder for folder in ("engines/bullet", "engines/mujoco", "robots/dvrk")))
         assert any((root / name).is_file() for root in roots), f"{page}: {name}"
-    for name in re.findall(r"`((?:hub|schemas|robots|engines|controllers|devices)(?:\.\w+)+)`", text):
+    for name in re.findall(r"`((?:hub|schemas|robots|engines|controllers|devices|tasks)(?:\.\w+)+)`", text):
         assert exists(name) or name == "hub.lab", f"{page}: {name}"
 
 

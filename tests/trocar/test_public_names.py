@@ -15,6 +15,7 @@ import trocar.messages
 import trocar.quantities
 import trocar.records
 import trocar.sessions
+import trocar.tasks
 from schemas.message import Message
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,6 +76,7 @@ def test_the_public_names_are_these() -> None:
         "quantities",
         "records",
         "sessions",
+        "tasks",
     }
 
 

@@ -239,6 +239,8 @@ class MjModel:
     body_dofadr: NDArray[np.int32]
     body_parentid: NDArray[np.int32]
     geom_bodyid: NDArray[np.int32]
+    geom_size: _Array
+    geom_type: NDArray[np.int32]
     eq_active0: NDArray[np.uint8]
     eq_data: _Array
     eq_obj1id: NDArray[np.int32]
@@ -282,6 +284,9 @@ class MjData:
     qpos: _Array
     sensordata: _Array
     site_xmat: _Array
+    site_xpos: _Array
+    geom_xmat: _Array
+    geom_xpos: _Array
     xipos: _Array
     warning: _Warnings
     xfrc_applied: _Array
@@ -304,6 +309,9 @@ def mj_step1(m: MjModel, d: MjData) -> None: ...
 def mj_step2(m: MjModel, d: MjData) -> None: ...
 def mju_mulQuat(res: _Array, qa: _Array, qb: _Array) -> None: ...
 def mju_negQuat(res: _Array, quat: _Array) -> None: ...
+def mju_rayGeom(
+    pos: _Array, mat: _Array, size: _Array, pnt: _Array, vec: _Array, geomtype: int
+) -> float: ...
 def mju_rotVecQuat(res: _Array, vec: _Array, quat: _Array) -> None: ...
 def mju_quatZ2Vec(quat: _Array, vec: _Array) -> None: ...
 def mju_subQuat(res: _Array, qa: _Array, qb: _Array) -> None: ...

@@ -2,7 +2,7 @@
 
 An object is held by an arm once both fingers have touched it for `_SETTLED`. With `grasp: weld` a weld
 between wrist and object is active for as long; with `grasp: friction` only contact acts, and this module only
-observes.
+observes. With `grasp: proximity` a ray takes the place of the contacts, and what it meets is welded at once.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.interaction.proximity import Rays
 from engines.mujoco.model import FINGERS
 from engines.mujoco.model.poses import ROS_ORDER
-from engines.mujoco.params import SceneParams, has_jaw
+from engines.mujoco.params import SceneParams
+from robots.dvrk.mounted import MountedPsm
 from schemas.vectors import Vector
 
 __all__ = ["Holding", "prepare"]
@@ -41,7 +43,7 @@ def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
             data=[0.0, 1.0, *[0.0] * 10],
             **_RIGID,
         )
-    if scene.grasp == "weld":
+    if scene.grasp != "friction":
         for thing in scene.objects:
             for arm in _jawed(scene):
                 ends = {"objtype": mujoco.mjtObj.mjOBJ_BODY, "name1": f"{arm}/wrist_yaw", "name2": thing}
@@ -51,7 +53,16 @@ def prepare(spec: mujoco.MjSpec, scene: SceneParams) -> None:
 
 
 def _jawed(scene: SceneParams) -> list[str]:
-    return [name for name, arm in scene.arms.items() if has_jaw(arm)]
+    return list(_jaws(scene))
+
+
+def _jaws(scene: SceneParams) -> dict[str, float]:
+    """Return the length of the fingers of every arm that has a jaw, m."""
+    return {
+        name: arm.tool.jaw.length
+        for name, arm in scene.arms.items()
+        if isinstance(arm, MountedPsm) and arm.tool.jaw is not None
+    }
 
 
 class Holding:
@@ -61,7 +72,8 @@ class Holding:
         """Watch the objects of `scene`; `update` is called every `period` seconds."""
         things, arms = list(scene.objects), _jawed(scene)
         self._model, self._data = model, data
-        self._settled = max(1, round(_SETTLED / period))
+        self._rays = Rays(model, data, things, _jaws(scene)) if scene.grasp == "proximity" else None
+        self._settled = 1 if self._rays is not None else max(1, round(_SETTLED / period))
         self._numbers = [int(arm[-1]) for arm in arms]
         self._bodies = [model.body(thing).id for thing in things]
         self._fingers = [model.body(f"{arm}/{FINGERS[0]}").id for arm in arms]
@@ -71,7 +83,7 @@ class Holding:
         self._contacts = np.zeros((*shape, 2, 4))  # per finger: how many, sum of their positions
         welds = (
             [model.equality(f"{thing}/{arm}/weld").id for thing in things for arm in arms]
-            if scene.grasp == "weld"
+            if scene.grasp != "friction"
             else []
         )
         self._welds = np.array(welds, int).reshape(shape) if welds else None
@@ -118,6 +130,8 @@ class Holding:
         Returns whether there are any. In Python and once per update: 36 contact sensors of a full cart with
         six objects cost MuJoCo a twentieth of every sub-step.
         """
+        if self._rays is not None:
+            return self._rays.look(self._contacts, self._touched)
         self._contacts[:] = 0.0
         contact = self._data.contact
         ends = self._ends[contact.geom]

@@ -1,22 +1,35 @@
 """The table and the things that lie on it, as bodies of the MuJoCo model.
 
 A bent wire is a row of capsules. Its mass, centre and inertia are those of the smooth wire, so they do not
-depend on how many capsules there are.
+depend on how many capsules there are. A triangular ring is three boxes with
+round edges.
 """
 
 from __future__ import annotations
 
+from hashlib import blake2b
 from itertools import pairwise
-from math import acos, ceil, pi, sin
+from math import acos, ceil, pi, sin, sqrt
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from engines.mujoco.object_params import BlockParams, NeedleParams, ObjectParams, RingParams, TableParams
+from engines.mujoco.object_params import (
+    BlockParams,
+    NeedleParams,
+    ObjectParams,
+    PieceParams,
+    RingParams,
+    TableParams,
+    TriangleParams,
+)
+from robots import rotation
+from robots.training.boards import Ring
+from robots.training.dishes import PIECE
 from schemas.vectors import Vector
 
-__all__ = ["CONTACT", "add", "add_table", "wire_inertia"]
+__all__ = ["CONTACT", "LEVEL", "add", "add_table", "start_pose", "wire_inertia"]
 
 CONTACT: dict[str, Any] = {
     "condim": 4,
@@ -36,6 +49,8 @@ _THINGS, _TABLE, _WIRES = 1, 32, 64
 MuJoCo's default; of tables; of wires among each other. A wire lies on a table with a few balls, so that one
 at rest costs a few contacts and not two for each of its capsules.
 """
+LEVEL = {"contype": _THINGS, "conaffinity": _TABLE}
+"""Collision bits of what things lie on."""
 _BALLS_APART = pi / 4.0
 """Greatest angle between two of those balls, rad."""
 _RGBA = {
@@ -44,6 +59,17 @@ _RGBA = {
     "block": [0.9, 0.75, 0.2, 1.0],
     "table": [0.32, 0.45, 0.4, 1.0],
 }
+_COLOURS = (
+    [0.9, 0.2, 0.15, 1.0],
+    [0.95, 0.75, 0.1, 1.0],
+    [0.15, 0.45, 0.85, 1.0],
+    [0.2, 0.7, 0.3, 1.0],
+    [0.95, 0.45, 0.1, 1.0],
+    [0.6, 0.3, 0.75, 1.0],
+)
+"""Of pieces and triangular rings, in the order of their names' numbers, so that they can be told apart."""
+_CORE = 0.9
+"""Thickness of a ring's wall between its edges, as a share of theirs."""
 _ROUNDNESS = 0.1
 """Greatest distance of a wire's capsules from its centre line, as a share of its radius."""
 
@@ -56,15 +82,27 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
     body = spec.worldbody.add_body(name="table", pos=[x, y, z - half[2]])
-    body.add_geom(
-        name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, conaffinity=_TABLE, rgba=_RGBA["table"]
-    )
+    body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=_RGBA["table"], **LEVEL)
 
 
-def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
+def start_pose(name: str, params: ObjectParams, seed: int | None) -> tuple[Vector, Vector]:
+    """Return where the object `name` starts in the world: position (m) and quaternion (x, y, z, w).
+
+    With a `seed` it is moved and turned by shares of its `scatter`, which are the same on every machine.
+    """
+    position, turn = np.array(params.position), np.array(params.orientation)
+    if seed is None or not any(params.scatter):
+        return position, turn
+    drawn = np.frombuffer(blake2b(f"{seed}/{name}".encode(), digest_size=24).digest(), "<u8")
+    x, y, angle = params.scatter * (drawn / 2.0**63 - 1.0)
+    position[:2] += x, y
+    return position, rotation.product(rotation.exp(np.array([0.0, 0.0, angle])), turn)
+
+
+def add(spec: mujoco.MjSpec, name: str, params: ObjectParams, seed: int | None = None) -> None:
     """Add one movable object as the body `name`, in the object's frame, with the free joint `name`."""
-    x, y, z, w = params.orientation
-    body = spec.worldbody.add_body(name=name, pos=params.position, quat=[w, x, y, z])
+    position, (x, y, z, w) = start_pose(name, params, seed)
+    body = spec.worldbody.add_body(name=name, pos=position, quat=[w, x, y, z])
     body.add_freejoint(name=name)
     match params:
         case BlockParams():
@@ -78,6 +116,76 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams) -> None:
             )
         case RingParams() | NeedleParams():
             _add_wire(body, params)
+        case PieceParams():
+            half = [extent / 2.0 for extent in PIECE.size]
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                size=half,
+                mass=PIECE.mass,
+                rgba=_colour(name),
+                **_rubbing(PIECE.friction),
+            )
+        case TriangleParams():
+            _add_triangle(body, params.measures, _colour(name))
+
+
+def _colour(name: str) -> list[float]:
+    number = "".join(filter(str.isdigit, name))
+    return _COLOURS[(int(number or 1) - 1) % len(_COLOURS)]
+
+
+def _rubbing(friction: float) -> dict[str, Any]:
+    """Return how an object with this Coulomb coefficient touches."""
+    return CONTACT | {"friction": [friction, *CONTACT["friction"][1:]]}
+
+
+def _add_triangle(body: mujoco.MjsBody, ring: Ring, rgba: list[float]) -> None:
+    """Add three walls with round edges, and balls in the corners with which the ring lies on what is level.
+
+    Jaws that are not parallel touch a wall along its edge. Between a capsule and a box MuJoCo finds the same
+    two contacts step by step; between two boxes their number changes, and each change is a blow.
+    """
+    middle, half, edge = ring.inradius + ring.thickness / 2.0, ring.height / 2.0, ring.thickness / 2.0
+    length = sqrt(3.0) * middle
+    bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
+    contact = _rubbing(ring.friction)
+    for k in range(3):
+        turn = (2.0 * k + 0.5) * pi / 3.0  # of the outward normal; a corner lies on y
+        normal, along = (
+            np.array([np.cos(turn), np.sin(turn), 0.0]),
+            np.array([-np.sin(turn), np.cos(turn), 0.0]),
+        )
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[_CORE * edge, length, half - edge],
+            pos=middle * normal,
+            quat=[np.cos(turn / 2.0), 0.0, 0.0, np.sin(turn / 2.0)],
+            mass=ring.mass / 3.0,
+            rgba=rgba,
+            **bits,
+            **contact,
+        )
+        for z in (edge - half, half - edge):
+            ends = np.array([middle * normal + side * length * along + [0.0, 0.0, z] for side in (-1.0, 1.0)])
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                size=[edge, 0.0, 0.0],
+                fromto=ends.ravel(),
+                mass=0.0,
+                rgba=rgba,
+                **bits,
+                **contact,
+            )
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                size=[edge, 0.0, 0.0],
+                pos=ends[1],
+                mass=0.0,
+                rgba=rgba,
+                contype=_TABLE,
+                conaffinity=0,
+                **contact,
+            )
 
 
 def _add_wire(body: mujoco.MjsBody, params: RingParams | NeedleParams) -> None:

@@ -1,4 +1,4 @@
-"""A whole scene: arms, free or on the cart's setup joints, a table and objects."""
+"""A whole scene: arms, free or on the cart's setup joints, a table, fixtures and objects."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from engines.mujoco.model import arm, objects, setup_joints, shapes
+from engines.mujoco.model import arm, fixtures, objects, setup_joints, shapes
 from engines.mujoco.model.names import FINGERS
 from engines.mujoco.model.tree import links
 from engines.mujoco.params import SceneParams, has_hand
@@ -46,8 +46,10 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
         shapes.add_arm(result, name, params, arm.add(result, name, params, pose), seen=scene.looks)
     if scene.table is not None:
         objects.add_table(result, scene.table)
+    for name, fixture in scene.fixtures.items():
+        fixtures.add(result, name, fixture)
     for name, thing in scene.objects.items():
-        objects.add(result, name, thing)
+        objects.add(result, name, thing, scene.seed)
     return result
 
 

@@ -1,0 +1,114 @@
+"""How a jaw may take hold of a thing from above.
+
+A grasp is a pose of the tip, shape (4, 4), whose z points along the closed fingers and whose y is the way the
+left finger opens; the tip's origin is in the wrist yaw axis (robots.dvrk.instruments). Metres and radians,
+poses in the world.
+"""
+
+from __future__ import annotations
+
+from math import asin, atan2, cos, pi, sin, sqrt, tan
+from typing import NamedTuple
+
+import numpy as np
+
+from robots.training.boards import Ring
+from robots.training.dishes import PIECE
+from schemas.vectors import Vector
+
+__all__ = ["Grasps", "of_piece", "of_ring"]
+
+_BITE = 1.0e-3
+"""How far from the ends of the fingers the edges of a block touch them, m."""
+_ROOM = 2.0e-3
+"""Between an open finger and the block on either side, m."""
+_WIDEST = 1.39
+"""Largest opening of the jaw, rad (robots.dvrk.instruments)."""
+_DEPTH = 5.0e-3
+"""How deep the fingers reach into a ring, m."""
+_ASIDE = 3.5e-3
+"""How far from the middle of a ring's wall they take it, m: away from the post, clear of the next wall."""
+_AJAR = 0.20
+"""Opening with which a jaw comes down on the wall of a ring, rad."""
+_FINGER = (1.4e-3, 2.1e-3)
+"""Thickness and half the width of a finger of a needle driver near its end, m (engines.mujoco.looks)."""
+_FREE = 0.3e-3
+"""Between the finger in a ring and the post, m."""
+_UPRIGHT = cos(0.35)
+"""Of the axis of a ring that can be taken by a wall."""
+
+
+class Grasps(NamedTuple):
+    """Ways to take hold of one thing."""
+
+    poses: Vector
+    """Of the tip, shape (n, 4, 4); none where the thing cannot be taken from above."""
+    opening: Vector
+    """Of the jaw before it closes, rad, shape (n,)."""
+    outwards: Vector
+    """Horizontal direction from the thing's middle to the grasp, shape (n, 2), of length 1 or, amid it, 0."""
+
+
+def of_piece(pose: Vector, reach: float) -> Grasps:
+    """Return the grasps of a block lying or standing with `pose`, shape (4, 4).
+
+    The block's upper edges come between the fingers, which are a wedge as long as the jaw is open: `reach` is
+    their length. Either side that is narrow enough will do, and either finger on either side.
+    """
+    axes, half = pose[:3, :3], np.array(PIECE.size) / 2.0
+    up = int(np.abs(axes[2]).argmax())
+    top = pose[:3, 3] + [0.0, 0.0, np.abs(axes[2]) @ half]
+    poses, openings = list[Vector](), list[float]()
+    for side in range(3):
+        wedge = asin(min(1.0, half[side] / (reach - _BITE)))
+        over = half[side] / tan(wedge)
+        opening = 2.0 * atan2(half[side] + _ROOM, over)
+        if side == up or opening > _WIDEST:
+            continue
+        turn = atan2(axes[1, side], axes[0, side])
+        for way in (0.0, pi):
+            poses.append(_downwards(top, over, turn + way))
+            openings.append(opening)
+    return _grasps(poses, openings, [(0.0, 0.0)] * len(poses))
+
+
+def of_ring(ring: Ring, pose: Vector, reach: float, post: tuple[Vector, float] | None) -> Grasps:
+    """Return the grasps of an upright ring with `pose`, shape (4, 4): one finger in the hole, one outside.
+
+    `post`: the one it is around, if any: where it stands (x, y), m, and its radius, m.
+    """
+    poses, outwards = list[Vector](), list[tuple[float, float]]()
+    if abs(float(pose[2, 2])) < _UPRIGHT:
+        return _grasps([], [], [])
+    spin = atan2(pose[1, 1], pose[0, 1])  # of the corner on y
+    middle, over = ring.inradius + ring.thickness / 2.0, ring.height / 2.0 + reach - _DEPTH
+    for k in range(3):
+        turn = spin + (2.0 * k + 1.0) * pi / 3.0  # opposite to a corner: the outward normal of a wall
+        axes = np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
+        for aside in (-_ASIDE, _ASIDE):
+            if post is not None:
+                inner = middle - reach * sin(_AJAR / 2.0) - _FINGER[0] / 2.0
+                off = np.abs(axes @ (post[0] - pose[:2, 3]) - [inner, aside]) - [_FINGER[0] / 2.0, _FINGER[1]]
+                if np.linalg.norm(np.maximum(off, 0.0)) < post[1] + _FREE:
+                    continue
+            away = np.array([middle, aside]) @ axes
+            for way in (0.0, pi):
+                poses.append(_downwards(pose[:3, 3] + np.append(away, 0.0), over, turn + way))
+                outwards.append(tuple(away / sqrt(float(away @ away))))
+    return _grasps(poses, [_AJAR] * len(poses), outwards)
+
+
+def _grasps(poses: list[Vector], openings: list[float], outwards: list[tuple[float, float]]) -> Grasps:
+    return Grasps(
+        np.array(poses).reshape(-1, 4, 4), np.array(openings), np.array(outwards, np.float64).reshape(-1, 2)
+    )
+
+
+def _downwards(point: Vector, over: float, turn: float) -> Vector:
+    """Return the tip's pose `over` (m) a point, with the fingers down, opening at `turn` (rad) from x."""
+    pose = np.eye(4)
+    c, s = cos(turn), sin(turn)
+    pose[:3, :3] = [[-s, c, 0.0], [c, s, 0.0], [0.0, 0.0, -1.0]]
+    pose[:3, 3] = point
+    pose[2, 3] += over
+    return pose

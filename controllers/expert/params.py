@@ -1,0 +1,75 @@
+"""Parameters of the expert: the scene it works in, and what belongs where. SI units."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from controllers.motion.params import Arms, SetupJoints
+from hub.participant import Params
+from robots.dvrk.crtk import Mounting
+from robots.dvrk.parameters import ArmName
+from robots.training.fixtures import BoardParams, DishParams, FixtureParams
+from schemas.errors import did_you_mean
+from schemas.scenario import Name
+
+__all__ = ["ExpertParams"]
+
+
+class _Object(Params):
+    """Of an object of the scene: what it is; everything else is the engine's."""
+
+    model_config = Params.model_config | {"extra": "ignore"}
+
+    kind: str
+
+
+class ExpertParams(Params):
+    """The scene, the hands that work in it, and where things belong."""
+
+    arms: Arms
+    mounting: Mounting = "free"
+    setup_joints: SetupJoints = SetupJoints()
+    fixtures: dict[Name, FixtureParams] = Field(description="boards and dishes, as in the scene")
+    objects: dict[Name, _Object] = Field(description="as in the scene; pieces and triangles are carried")
+    hands: tuple[ArmName, ...] = Field(
+        default=("PSM1", "PSM2"),
+        min_length=1,
+        max_length=2,
+        description="which arms work: one alone, or two, the surgeon's right one first",
+    )
+    hand_over: bool = Field(
+        default=False,
+        description="two hands: whether the left one takes each ring up and gives it to the right one",
+    )
+    goals: dict[Name, Name] = Field(
+        default_factory=dict[str, str], description="of each piece: the dish that it is carried to"
+    )
+    end: bool = Field(default=True, description="whether the session ends when the task is done")
+
+    @model_validator(mode="after")
+    def _is_a_task(self) -> Self:
+        if missing := [arm for arm in self.hands if arm not in self.arms.driven]:
+            raise ValueError(f"hands: {', '.join(missing)} is no arm of the scene")
+        if self.hand_over and len(self.hands) < 2:
+            raise ValueError("hand_over needs two hands, such as [PSM1, PSM2]")
+        dishes = [name for name, fixture in self.fixtures.items() if isinstance(fixture, DishParams)]
+        for thing, dish in self.goals.items():
+            if thing not in self.objects:
+                raise ValueError(f"goals: no object '{thing}'.{did_you_mean(thing, self.objects)}")
+            if dish not in dishes:
+                raise ValueError(f"goals: no dish '{dish}'.{did_you_mean(dish, dishes)}")
+        if not self.goals and self.board is None:
+            raise ValueError("nothing to do: give `goals` of pieces, or a fixture of kind board")
+        return self
+
+    @property
+    def board(self) -> BoardParams | None:
+        """The board of the scene, if it has one."""
+        return next((each for each in self.fixtures.values() if isinstance(each, BoardParams)), None)
+
+    @property
+    def rings(self) -> tuple[str, ...]:
+        """Names of the triangular rings of the scene."""
+        return tuple(name for name, thing in self.objects.items() if thing.kind == "triangle")

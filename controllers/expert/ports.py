@@ -1,0 +1,57 @@
+"""The ports of the expert: those of CRTK's clients for each hand, and of the engine for each thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from controllers.expert.hand import Phase
+from robots.dvrk import crtk
+from schemas.ports import Port
+from schemas.ros import Float64Message, JointState, PoseStamped, StringMessage
+
+__all__ = ["EVENTS", "expert_ports"]
+
+EVENTS = ("error", "warning")
+"""Of a motion controller that refuses a command."""
+_PROGRESS = {
+    "done": "1 when everything is where it belongs",
+    "placed": "how many things are where they belong",
+    "attempts": "how often a jaw has closed on a thing",
+    "dropped": "how often a thing was not held any more on its way",
+}
+_PHASES = ", ".join(f"{phase:d} {phase.name.lower()}" for phase in Phase)
+
+
+def expert_ports(arms: Iterable[str], things: Iterable[str]) -> tuple[Port, ...]:
+    """Return the ports for these arms and things."""
+    number = Float64Message.ros_type
+    return (
+        *(port for arm in arms for port in _hand_ports(arm)),
+        *(
+            port
+            for thing in things
+            for port in (
+                Port(
+                    name=f"objects/{thing}/pose", causality="input", type=PoseStamped.ros_type, frame="world"
+                ),
+                Port(name=f"objects/{thing}/held_by", causality="input", type=number),
+            )
+        ),
+        *(
+            Port(name=name, causality="output", type=number, description=meaning)
+            for name, meaning in _PROGRESS.items()
+        ),
+    )
+
+
+def _hand_ports(arm: str) -> Iterator[Port]:
+    pose, joints = PoseStamped.ros_type, JointState.ros_type
+    yield Port(name=f"{arm}/local/measured_cp", causality="input", type=pose, frame=crtk.base_frame(arm))
+    yield Port(
+        name=f"{arm}/jaw/measured_js", causality="input", type=joints, names=("jaw",), fields=crtk.MEASURED
+    )
+    for event in EVENTS:
+        yield Port(name=f"{arm}/{event}", causality="input", type=StringMessage.ros_type, variability="event")
+    yield Port(name=f"{arm}/servo_cp", causality="output", type=pose, variability="event")
+    yield Port(name=f"{arm}/jaw/move_jp", causality="output", type=joints, variability="event")
+    yield Port(name=f"{arm}/phase", causality="output", type=Float64Message.ros_type, description=_PHASES)

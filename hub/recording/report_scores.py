@@ -1,0 +1,113 @@
+"""The part of a report about training tasks: score cards, events on a time line, paths of the tips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+import numpy as np
+
+from hub.recording.recording import Recording
+from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend
+from hub.recording.scores import score_numbers, score_tables
+from schemas.trocar_msgs import ScoreCard, TaskEvent
+
+__all__ = ["score_figures", "score_table", "scored"]
+
+_MM = 1e3
+
+
+def scored(recording: Recording) -> dict[str, ScoreCard]:
+    """Return the last score card of each participant that published one."""
+    found: dict[str, ScoreCard] = {}
+    for port, kind in recording.ports.items():
+        if kind == ScoreCard.ros_type:
+            for _, card in recording[port].messages():
+                if isinstance(card, ScoreCard):
+                    found[port.partition(".")[0]] = card
+    return found
+
+
+def score_table(name: str, card: ScoreCard) -> str:
+    """Return the tables of a card as HTML, with a bar beside each number, by the largest of the same unit."""
+    numbers = score_numbers(card)
+    largest: dict[str, float] = {}
+    for one in numbers["metrics"].values():
+        if one["value"] is not None:
+            largest[one["unit"]] = max(largest.get(one["unit"], 0.0), abs(one["value"]))
+    tables: list[str] = []
+    for heads, rows in score_tables(name, numbers):
+        head = "".join(f'<th scope="col">{escape(text)}</th>' for text in heads)
+        lines: list[str] = []
+        for row in rows:
+            metric = numbers["metrics"].get(row[0].replace(" ", "_"))
+            bar = "" if metric is None else _bar(metric["value"], largest[metric["unit"]])
+            cells = "".join(f"<td>{escape(cell)}</td>" for cell in row)
+            lines.append(f"<tr>{cells}<td>{bar}</td></tr>")
+        body = "\n".join(lines)
+        region = f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(heads[0])}">'
+        tables.append(
+            f"{region}<table><thead><tr>{head}<th></th></tr></thead><tbody>{body}</tbody></table></div>"
+        )
+    return "\n".join(tables)
+
+
+def _bar(value: float, largest: float) -> str:
+    share = 100.0 * abs(value) / largest if largest else 0.0
+    return f'<span class="bar" style="width:{share:.1f}%"></span>'
+
+
+def score_figures(recording: Recording, name: str) -> Iterator[Figure]:
+    """Yield the time line of the events of task `name`, and the path of each tip that it watches."""
+    events = [
+        (time_s, event)
+        for port, kind in recording.ports.items()
+        if kind == TaskEvent.ros_type and port.startswith(f"{name}.")
+        for time_s, event in recording[port].messages()
+        if isinstance(event, TaskEvent)
+    ]
+    if events:
+        yield _time_line(name, events)
+    for connection in recording.plan().connections:
+        source = f"{connection.source}.{connection.source_port}"
+        arm, _, port = connection.target_port.partition("/")
+        if connection.target == name and port == "measured_cp" and arm != "ECM" and source in recording:
+            yield _path(recording, source, arm, [(t, event) for t, event in events if event.arm == arm])
+
+
+def _time_line(name: str, events: list[tuple[float, TaskEvent]]) -> Figure:
+    """All events, a row for each object or arm."""
+    subjects = sorted({_subject(event) for _, event in events})
+    kinds = sorted({event.event for _, event in events})
+    with axes_of("time (s)", "") as (axes, result):
+        for i, kind in enumerate(kinds):
+            points = [(t, subjects.index(_subject(event))) for t, event in events if event.event == kind]
+            x, y = zip(*points, strict=True)
+            marker = "osD^vPX*"[i % 8]
+            axes.plot(x, y, linestyle="", marker=marker, color=SERIES[i % len(SERIES)], label=kind)
+        axes.set_yticks(range(len(subjects)), subjects)
+        axes.margins(y=0.2)
+        legend(axes)
+    caption = "; ".join(f"{sum(e.event == kind for _, e in events)} {kind}" for kind in kinds) + "."
+    return Figure(f"{name}: events", result.svg(caption), caption)
+
+
+def _subject(event: TaskEvent) -> str:
+    return event.object or event.arm or "instruments"
+
+
+def _path(recording: Recording, source: str, arm: str, events: list[tuple[float, TaskEvent]]) -> Figure:
+    """Where a tip went, in its arm's own base, from above and from the front, with the events on it."""
+    series = recording[source]
+    position = (series["position"] - series["position"][:1]) * _MM
+    with axes_of("x (mm)", "y, z (mm)") as (axes, result):
+        for i, label in (1, "y: from above"), (2, "z: from the front"):
+            axes.plot(position[:, 0], position[:, i], color=SERIES[i - 1], linewidth=0.9, label=label)
+        at = np.searchsorted(series.time, [t for t, _ in events]).clip(max=len(position) - 1)
+        for i in (1, 2):
+            axes.plot(position[at, 0], position[at, i], linestyle="", marker=".", color=INK)
+        axes.set_aspect("equal", adjustable="datalim")
+        legend(axes)
+    way = float(np.linalg.norm(np.diff(position, axis=0), axis=1).sum()) / _MM
+    caption = f"Path of the tip from where it started, in {series.frame}: {way:.3f} m. Dots: its events."
+    return Figure(f"{arm}: path of the tip", result.svg(caption), caption)

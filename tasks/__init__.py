@@ -1,0 +1,1 @@
+"""Training tasks: events, goals, metrics, and the scores of foreign rules."""

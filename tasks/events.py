@@ -1,0 +1,25 @@
+"""What happens in a task."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+__all__ = ["Event", "EventKind"]
+
+EventKind = Literal[
+    "grasped", "lifted", "handed over", "placed", "dropped", "out of workspace", "out of view", "collision"
+]
+
+
+class Event(NamedTuple):
+    """One event; `thing`, `arm` and `place` are indices into those of the task, -1: none."""
+
+    kind: EventKind
+    thing: int = -1
+    arm: int = -1
+    """That did it; of a hand-over the one that has the object now."""
+    place: int = -1
+    """Where the object was placed."""
+    value: float = 0.0
+    """How much, in `unit`: the height of a lift or drop, the impulse of a collision."""
+    unit: str = ""

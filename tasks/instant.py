@@ -1,0 +1,152 @@
+"""What a task sees at one instant, read from its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hub.participant import Inputs
+from robots import rotation
+from robots.dvrk import setup_joints
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.setup_joints import CartArm
+from schemas.ros import BoolMessage
+from schemas.vectors import Vector
+from tasks.params import TaskParams
+from tasks.view import Frustum, optical_in_tip
+
+__all__ = ["Instant", "Reader", "Watched"]
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What a task watches, and which of it is connected; arms are those with instruments."""
+
+    arms: tuple[str, ...]
+    things: tuple[str, ...]
+    forces: tuple[bool, ...]
+    """Of each arm, whether the force on its instrument is."""
+    hands: tuple[bool, ...]
+    """Of each arm, whether its teleoperation is."""
+    tools: bool
+    """Whether the impulse between instruments is."""
+    camera: bool
+    """Whether there is an endoscope, and its pose is connected."""
+
+
+@dataclass
+class Instant:
+    """The world at one instant: m arms with instruments, n objects, all in the world's frame.
+
+    The arrays are written anew at each instant.
+    """
+
+    arms: int
+    things: int
+    time_s: float = 0.0
+    period_s: float = 0.0
+    """Since the instant before."""
+    tips: Vector = field(init=False)
+    """Positions, m, shape (m, 3)."""
+    turns: Vector = field(init=False)
+    """Orientations in the arms' own bases: quaternions (x, y, z, w), shape (m, 4)."""
+    velocities: Vector = field(init=False)
+    """Of the tips, m/s, shape (m, 3): see `tasks.metrics.smoothing`."""
+    jerks: Vector = field(init=False)
+    """Of the tips, m/s^3, shape (m, 3)."""
+    speeds: list[float] = field(init=False)
+    """Of the tips, m/s."""
+    is_smooth: bool = False
+    """Whether there are velocities and jerks already."""
+    forces: list[float] = field(init=False)
+    """On the instruments, N."""
+    hands: list[tuple[bool, ...]] = field(init=False)
+    """What was said since the last instant of whether a hand leads each arm, oldest first."""
+    poses: Vector = field(init=False)
+    """Of the objects: position, m, and quaternion, shape (n, 7)."""
+    holders: list[int] = field(init=False)
+    """Index of the arm that holds each object, -1: none."""
+    impulse: float = 0.0
+    """Of all contacts between instruments since the start, N s."""
+    tips_seen: NDArray[np.bool_] = field(init=False)
+    """By the endoscope, shape (m,)."""
+    things_seen: NDArray[np.bool_] = field(init=False)
+    """By the endoscope, shape (n,)."""
+
+    def __post_init__(self) -> None:
+        m, n = self.arms, self.things
+        self.tips, self.turns, self.velocities = np.zeros((m, 3)), np.zeros((m, 4)), np.zeros((m, 3))
+        self.jerks, self.speeds, self.forces = np.zeros((m, 3)), [0.0] * m, [0.0] * m
+        self.hands, self.poses, self.holders = [()] * m, np.zeros((n, 7)), [-1] * n
+        self.tips_seen, self.things_seen = np.ones(m, bool), np.ones(n, bool)
+
+
+class Reader:
+    """Reads the inputs of a task."""
+
+    def __init__(self, params: TaskParams, connected: Set[str]) -> None:
+        """Read the inputs that `params` ask for, of which those in `connected` have a source."""
+        arms, things = params.psms, tuple(params.objects)
+        ecm: CartArm | None = next(
+            (name for name, arm in params.arms.items() if isinstance(arm, MountedEcm)), None
+        )
+        self.watched = Watched(
+            arms,
+            things,
+            forces=tuple(not connected.isdisjoint(_wrenches(arm)) for arm in arms),
+            hands=tuple(f"{arm}/following" in connected for arm in arms),
+            tools="tools/impulse" in connected,
+            camera=ecm is not None and f"{ecm}/measured_cp" in connected,
+        )
+        self._bases = [_base(params, arm) for arm in params.psms]
+        self._numbers = {int(arm[-1]): i for i, arm in enumerate(arms)}
+        self._ecm = ecm if self.watched.camera else None
+        if ecm is not None:
+            self._view_base, mounted = _base(params, ecm), cast("MountedEcm", params.arms[ecm])
+            self._optical_in_tip = optical_in_tip(mounted)
+            self._frustum = Frustum(params.camera, params.near, params.far)
+
+    def read(self, inputs: Inputs, now: Instant) -> None:
+        """Write what the inputs say into `now`."""
+        watched = self.watched
+        for i, arm in enumerate(watched.arms):
+            pose, base = inputs[f"{arm}/measured_cp"], self._bases[i]
+            now.tips[i] = base[:3, :3] @ pose[:3] + base[:3, 3]
+            now.turns[i] = pose[3:]
+            if watched.forces[i]:
+                tip, rigid = _wrenches(arm)
+                now.forces[i] = float(np.linalg.norm(inputs[tip][:3] + inputs[rigid][:3]))
+            said = cast("tuple[BoolMessage, ...]", inputs.events(f"{arm}/following"))
+            now.hands[i] = tuple(message.data for message in said)
+        for i, thing in enumerate(watched.things):
+            now.poses[i] = inputs[f"{thing}/pose"]
+            now.holders[i] = self._numbers.get(round(float(inputs[f"{thing}/held_by"][0])), -1)
+        now.impulse = float(inputs["tools/impulse"][0])
+        if self._ecm is not None:
+            self._look(inputs[f"{self._ecm}/measured_cp"], now)
+
+    def _look(self, pose: Vector, now: Instant) -> None:
+        tip = np.eye(4)
+        tip[:3, :3], tip[:3, 3] = rotation.matrix(pose[3:]), pose[:3]
+        optical = self._view_base @ tip @ self._optical_in_tip
+        now.tips_seen = self._frustum.sees(optical, now.tips)
+        now.things_seen = self._frustum.sees(optical, now.poses[:, :3])
+
+
+def _wrenches(arm: str) -> tuple[str, str]:
+    return f"{arm}/tip_wrench", f"{arm}/rigid_wrench"
+
+
+def _base(params: TaskParams, arm: CartArm) -> Vector:
+    """Return the pose of `<arm>_base` in the world, shape (4, 4)."""
+    if params.mounting == "cart":
+        positions = params.setup_joints.get(arm, setup_joints.SIMULATED[arm])
+        return setup_joints.base_pose(arm, np.array(positions))
+    mounted: MountedPsm | MountedEcm = params.arms[arm]
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation.matrix(np.array(mounted.orientation)), mounted.position
+    return pose

@@ -1,0 +1,114 @@
+"""Metrics of what should not happen: instruments that collide, press too hard or are out of view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from hub.participant import Record, array, integer, number
+from schemas.trocar_msgs import ScoreValue
+from tasks.events import Event
+from tasks.instant import Instant, Watched
+from tasks.metrics.metric import NO_CAMERA, Metric, missing
+
+__all__ = ["Collisions", "Forces", "View"]
+
+
+class CollisionsState(Record):
+    """Between instruments."""
+
+    count = integer()
+    impulse = number()
+    """N s."""
+
+
+class Collisions(Metric[CollisionsState]):
+    """How often instruments of different arms touch one another, and the impulse of it."""
+
+    def __init__(self, watched: Watched) -> None:
+        self.state = CollisionsState()
+        self._reason = "" if watched.tools else "contact is not known: connect or record tools/impulse"
+
+    def take(self, now: Instant, events: Sequence[Event]) -> None:
+        """Count contacts."""
+        self.state.count += sum(event.kind == "collision" for event in events)
+        self.state.impulse = now.impulse
+
+    def values(self) -> Iterator[ScoreValue]:
+        """Yield the count and the impulse, N s."""
+        rows = ("tool_collisions", float(self.state.count), ""), ("tool_impulse", self.state.impulse, "N*s")
+        for name, value, unit in rows:
+            if self._reason:
+                yield missing(name, unit, self._reason)
+            else:
+                yield ScoreValue(name=name, value=value, unit=unit)
+
+
+class ForcesState(Record):
+    """Of each arm."""
+
+    peak = array("arms")
+    """N."""
+    excess = array("arms")
+    """s."""
+
+
+class Forces(Metric[ForcesState]):
+    """Peak of the force on each instrument, and how long it was over a limit."""
+
+    def __init__(self, watched: Watched, limit: float) -> None:
+        """Measure with a `limit` in N."""
+        self.state = ForcesState(arms=len(watched.arms))
+        self._watched, self._limit = watched, limit
+
+    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Take the forces."""
+        for i, force in enumerate(now.forces):
+            if force > self.state.peak[i]:
+                self.state.peak[i] = force
+            if force > self._limit:
+                self.state.excess[i] += now.period_s
+
+    def values(self) -> Iterator[ScoreValue]:
+        """Yield the peaks, N, and the times, s."""
+        for name, values, unit in (
+            ("peak_force", self.state.peak, "N"),
+            ("excessive_force_time", self.state.excess, "s"),
+        ):
+            for arm, value, known in zip(
+                self._watched.arms, values.tolist(), self._watched.forces, strict=True
+            ):
+                if known:
+                    yield ScoreValue(name=f"{arm}/{name}", value=value, unit=unit)
+                else:
+                    reason = f"the force is not known: connect or record {arm}/rigid_wrench or tip_wrench"
+                    yield missing(f"{arm}/{name}", unit, reason)
+
+
+class ViewState(Record):
+    """Of each arm."""
+
+    unseen = array("arms")
+    """s."""
+
+
+class View(Metric[ViewState]):
+    """How long each tip was outside of what the endoscope sees."""
+
+    def __init__(self, watched: Watched) -> None:
+        self.state = ViewState(arms=len(watched.arms))
+        self._watched = watched
+
+    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Add one period for the tips that are not seen."""
+        for i, seen in enumerate(now.tips_seen.tolist()):
+            if not seen:
+                self.state.unseen[i] += now.period_s
+
+    def values(self) -> Iterator[ScoreValue]:
+        """Yield the times, s."""
+        for arm, time in zip(self._watched.arms, self.state.unseen.tolist(), strict=True):
+            name = f"{arm}/out_of_view_time"
+            if self._watched.camera:
+                yield ScoreValue(name=name, value=time, unit="s")
+            else:
+                yield missing(name, "s", NO_CAMERA)

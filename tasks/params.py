@@ -1,0 +1,85 @@
+"""Parameters that all tasks have.
+
+Arms, mounting and objects are those of the scenario's `scene`. Poses are in the world.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, GetPydanticSchema, with_config
+from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
+
+from hub.participant import Params
+from robots.dvrk import endoscope
+from robots.dvrk.endoscope import StereoCamera
+from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.parameters import SetupPositions
+from robots.dvrk.setup_joints import CartArm
+from schemas.quantity import Angle, Duration, Force, Length, Speed
+
+__all__ = ["TaskParams"]
+
+
+@with_config(ConfigDict(extra="forbid"))
+class _Arms(TypedDict, total=False):
+    PSM1: MountedPsm
+    PSM2: MountedPsm
+    PSM3: MountedPsm
+    ECM: MountedEcm
+
+
+_Point = tuple[Length, Length, Length]
+
+
+class TaskParams(Params):
+    """What the task watches, and from which value on something counts."""
+
+    arms: Annotated[
+        dict[CartArm, MountedPsm | MountedEcm], GetPydanticSchema(lambda _, handler: handler(_Arms))
+    ] = Field(min_length=1, description="as in the scene: where each stands, and which endoscope looks on")
+    mounting: Literal["free", "cart"] = Field(default="free", description="as in the scene")
+    setup_joints: dict[CartArm, SetupPositions] = Field(
+        default_factory=dict[CartArm, SetupPositions], description="as in the scene"
+    )
+    objects: dict[str, Any] = Field(
+        default_factory=dict[str, Any], description="as in the scene: the task watches those of its names"
+    )
+    rules: tuple[str, ...] = Field(default=(), description="by which the card scores; default: all there are")
+    benchmarks: dict[str, float] = Field(
+        default_factory=dict[str, float],
+        description=(
+            "for the rules `mscore`: by metric the largest value that passes, in the metric's unit; of a"
+            " share, an economy or a spectral arc length the least"
+        ),
+    )
+    workspace: tuple[_Point, _Point] | None = Field(
+        default=None,
+        description="two opposite corners; objects outside are out of the workspace. Default: the task's own",
+    )
+    lift: Length = Field(default=5e-3, gt=0, description="an object that is held so high has been lifted")
+    drop: Length = Field(default=5e-3, gt=0, description="an object that falls so far has been dropped")
+    idle_speed: Speed = Field(default=1e-3, gt=0, description="a tip that is slower is idle")
+    force_limit: Force = Field(default=5.0, gt=0, description="more on an instrument is excessive")
+    width: int = Field(default=endoscope.WIDTH, ge=1, description="of the endoscope's pictures, in pixels")
+    height: int = Field(default=endoscope.HEIGHT, ge=1, description="of the endoscope's pictures, in pixels")
+    field_of_view: Angle = Field(
+        default=endoscope.FIELD_OF_VIEW, gt=0.0, lt=3.0, description="of the endoscope, horizontal"
+    )
+    baseline: Length = Field(default=endoscope.BASELINE, ge=0.0, description="between its two cameras")
+    near: Length = Field(default=endoscope.NEAR, gt=0.0, description="anything nearer is invisible")
+    far: Length = Field(default=endoscope.FAR, gt=0.0, lt=inf, description="anything farther is invisible")
+    card_period: Duration = Field(
+        default=100_000_000, gt=0, description="how often the card is published; a multiple of the period"
+    )
+
+    @property
+    def psms(self) -> tuple[CartArm, ...]:
+        """The arms with instruments, in the order in which they are stated."""
+        return tuple(name for name, arm in self.arms.items() if isinstance(arm, MountedPsm))
+
+    @property
+    def camera(self) -> StereoCamera:
+        """The two cameras of the endoscope."""
+        return StereoCamera(self.width, self.height, self.field_of_view, self.baseline)

@@ -1,0 +1,1 @@
+"""Scores of recordings: of sessions, and of real arms in ROS bags."""

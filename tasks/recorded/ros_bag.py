@@ -1,0 +1,89 @@
+"""Metrics of real arms, from ROS bags."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hub.recording.ros_bag_reader import RosBag
+from robots import rotation
+from robots.dvrk.mounted import MountedPsm
+from schemas.errors import RecordingError
+from schemas.ros import JointState, PoseStamped
+from schemas.vectors import Vector
+from tasks.params import TaskParams
+from tasks.practice import PracticeTask
+from tasks.recorded.streams import Scored, Stream, score
+
+__all__ = ["score_ros_bag"]
+
+_PERIOD_NS = 10_000_000
+_INSTRUMENT = "LARGE_NEEDLE_DRIVER_400006"
+"""Whose tip is taken for that of an arm of which only joints are recorded."""
+_CHAIN = MountedPsm(instrument=_INSTRUMENT).chain
+_SOURCES = ("local/measured_cp", "measured_cp", "measured_js")
+"""Topics of an arm from which its tip is known, the best first: without what moves the endoscope."""
+_TOPIC = re.compile(r"(?:.*/)?(PSM[123])/(" + "|".join(_SOURCES) + ")")
+
+
+def score_ros_bag(path: Path, rules: Sequence[str]) -> Scored:
+    """Return the metrics of the arms in a ROS bag; those that need objects or a scene have none.
+
+    Raises RecordingError if it cannot be read or has no topic of an arm, ScenarioError for unknown rules.
+    """
+    with RosBag(path) as bag:
+        topics = _arm_topics(bag)
+        if not topics:
+            raise RecordingError(
+                f"'{path}' cannot be scored: it has no topic such as /PSM1/measured_cp or /PSM1/measured_js;"
+                " record one of them: ros2 bag record /PSM1/measured_cp /PSM2/measured_cp"
+            )
+        params = {"arms": {arm: {"instrument": _INSTRUMENT} for arm in sorted(topics)}, "rules": list(rules)}
+        task = PracticeTask("practice", TaskParams.model_validate(params))
+        streams = {f"{arm}/measured_cp": _tips(bag, topic) for arm, topic in topics.items()}
+    return score(task, streams, _PERIOD_NS)
+
+
+def _arm_topics(bag: RosBag) -> dict[str, str]:
+    """Return by arm the best topic about its tip."""
+    found: dict[str, tuple[int, str]] = {}
+    for topic, about in bag.topics.items():
+        match = _TOPIC.fullmatch(topic)
+        types = (PoseStamped.ros_type, JointState.ros_type)
+        if match is None or not about.messages or about.type not in types:
+            continue
+        rank = _SOURCES.index(match[2])
+        if match[1] not in found or rank < found[match[1]][0]:
+            found[match[1]] = rank, topic
+    return {arm: topic for arm, (_, topic) in found.items()}
+
+
+def _tips(bag: RosBag, topic: str) -> Stream:
+    """Return the poses of a tip, by the time of the bag, from its start."""
+    read = _from_joints if topic.endswith("measured_js") else _from_pose
+    times: list[int] = []
+    poses: list[Vector] = []
+    for _, time_ns, message in bag.messages([topic], bag.start_ns):
+        try:
+            pose = read(message)
+        except (AttributeError, TypeError, ValueError) as error:
+            raise RecordingError(f"'{bag.path}': topic '{topic}' at {time_ns} ns: {error}") from error
+        if not np.isfinite(pose).all():
+            raise RecordingError(f"'{bag.path}': topic '{topic}' at {time_ns} ns: not all numbers are finite")
+        times.append(time_ns - bag.start_ns)
+        poses.append(pose)
+    return Stream(np.array(times, np.int64), np.stack(poses), _PERIOD_NS)
+
+
+def _from_pose(message: Any) -> Vector:
+    at, turn = message.pose.position, message.pose.orientation
+    return np.array([at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w])
+
+
+def _from_joints(message: Any) -> Vector:
+    pose = _CHAIN.forward(np.asarray(message.position, np.float64)[:6])
+    return np.concatenate([pose[:3, 3], rotation.from_matrix(pose)])

@@ -1,0 +1,129 @@
+"""The task of a recorded session, and what its inputs received."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from hub.planning import registry
+from hub.planning.plan import Plan
+from hub.recording.recording import Recording
+from schemas.errors import RecordingError
+from schemas.vectors import has_vector
+from tasks.recorded.streams import Scored, Stream, score
+from tasks.task import Task
+
+__all__ = ["score_session"]
+
+_PERIOD_NS = 10_000_000
+"""Of a task that was not in the session."""
+
+
+def score_session(recording: Recording, rules: Sequence[str], *, trust: bool = False) -> dict[str, Scored]:
+    """Return by name what each task of a recorded session says, by `rules` or, without any, by its own.
+
+    A session without a task is measured without goals; if a peg board was in its scene, with those of that.
+    `trust` allows tasks that are classes of the recording's own. Raises RecordingError if the recording is
+    not of a session or has no arm, ScenarioError for unknown rules.
+    """
+    plan, scenario = recording.plan(), recording.scenario()
+    found: dict[str, Scored] = {}
+    for name, spec in scenario.participants.items():
+        if _is_task(spec.kind, trust=trust):
+            task = _make(spec.kind, name, spec.params, rules, recording)
+            found[name] = score(
+                task, _inputs(recording, plan, name), plan.participants[name].period * plan.step_ns
+            )
+    return found or {"practice": _without_task(recording, rules)}
+
+
+def _inputs(recording: Recording, plan: Plan, task: str) -> dict[str, Stream]:
+    """Return by input what a task of the session received, when it did."""
+    found: dict[str, Stream] = {}
+    for one in plan.connections:
+        source = f"{one.source}.{one.source_port}"
+        if one.target == task and source in recording:
+            steps = plan.participants[one.source].period if one.fresh else 0
+            found[one.target_port] = _stream(recording, source, steps * plan.step_ns)
+    for one in plan.from_devices:
+        source = f"{one.source}.{one.source_port}"
+        if one.target == task and source in recording:
+            found[one.target_port] = _stream(recording, source, 0)
+    return found
+
+
+def _is_task(kind: str, *, trust: bool) -> bool:
+    if ":" in kind and not trust:
+        return False
+    loaded = registry.load(kind) if ":" in kind or kind in registry.kinds() else None
+    return loaded is not None and issubclass(loaded, Task)
+
+
+def _make(
+    kind: str, name: str, params: Mapping[str, Any], rules: Sequence[str], recording: Recording
+) -> Task:
+    asked = {"rules": list(rules)} if rules else {}
+    made = registry.make(kind, name, {**params, **asked}, recording.directory())
+    if not isinstance(made, Task):
+        raise RecordingError(f"'{kind}' is no task")
+    return made
+
+
+def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
+    """Return what a task says that was not in the session, from the scene of its robot."""
+    robot, scene = _robot(recording)
+    arms = {
+        arm: one for arm, one in _table(scene, "arms").items() if f"{robot}.{arm}/measured_cp" in recording
+    }
+    objects = {
+        thing: one for thing, one in _table(scene, "objects").items() if f"{robot}.{thing}/pose" in recording
+    }
+    fixtures = _table(scene, "fixtures")
+    boards = [name for name in fixtures if _table(fixtures, name).get("kind") == "board"]
+    kind = "peg-board-task" if boards else "practice-task"
+    params = {key: scene[key] for key in ("mounting", "setup_joints") if key in scene}
+    params |= {"arms": arms, "objects": objects} | ({"fixtures": fixtures} if boards else {})
+    task = _make(kind, "practice", params, rules, recording)
+    streams = {
+        port.name: _stream(recording, f"{robot}.{port.name}", _PERIOD_NS)
+        for port in task.ports
+        if port.causality == "input" and f"{robot}.{port.name}" in recording
+    }
+    return score(task, streams | _hands(recording, task), _PERIOD_NS)
+
+
+def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
+    """Return the participant that publishes the poses of arms, and its parameters."""
+    for name, spec in recording.scenario().participants.items():
+        if any(f"{name}.{arm}/measured_cp" in recording for arm in _table(spec.params, "arms")):
+            return name, spec.params
+    raise RecordingError(
+        f"'{recording.file}' cannot be scored: it has no `measured_cp` of an arm, such as"
+        " robot.PSM1/measured_cp of a MuJoCo robot; record a session that has one"
+    )
+
+
+def _table(params: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return a mapping of a recorded scenario, which may be a stranger's; empty if it is none."""
+    value: Any = params.get(name)
+    return cast("dict[str, Any]", value) if isinstance(value, dict) else {}
+
+
+def _hands(recording: Recording, task: Task) -> dict[str, Stream]:
+    """Return by input whether a teleoperation led the arm."""
+    found: dict[str, Stream] = {}
+    for name, spec in recording.scenario().participants.items():
+        arm = spec.params.get("arm")
+        if arm in task.params.psms and f"{name}.following" in recording:
+            found[f"{arm}/following"] = _stream(recording, f"{name}.following", _PERIOD_NS)
+    return found
+
+
+def _stream(recording: Recording, port: str, ahead_ns: int) -> Stream:
+    series = recording[port]
+    times_ns = np.round(series.time * 1e9).astype(np.int64)
+    if has_vector(series.type):
+        return Stream(times_ns, series.values, ahead_ns)
+    return Stream(times_ns, [message for _, message in series.messages()], ahead_ns)

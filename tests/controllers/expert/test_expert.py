@@ -1,0 +1,169 @@
+"""The expert in a world without physics: tips go where they are sent, and a shut jaw holds what it is at."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from controllers.expert.controller import Expert
+from controllers.expert.hand import Hand, Phase, framed, pose_of
+from controllers.expert.params import ExpertParams
+from hub.participant import Inputs, Setup
+from hub.planning.scenario_file import load
+from robots.dvrk.instruments import instrument
+from robots.dvrk.psm import chain
+from schemas.errors import SessionError
+from schemas.ros import StringMessage
+
+PERIOD = 10_000_000
+
+
+class World:
+    """Two hands and the things of an installed scenario."""
+
+    def __init__(self, name, **params):
+        given = load(name, []).params["lead"]
+        self.expert = Expert("lead", ExpertParams.model_validate(given.model_dump() | params))
+        self.outputs = self.expert.configure(Setup(PERIOD, ".")) or {}
+        self.things = {thing: framed(np.array(pose)) for thing, pose in starts(name).items()}
+        self.held, self.jaws, self.tips, self.grips, self.t = {}, {}, {}, {}, 0
+        for each in self.expert._transfers:
+            hand = each.hand
+            self.tips[hand.arm] = hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
+            self.jaws[hand.arm] = 0.5
+
+    def step(self, **events):
+        values = {}
+        for each in self.expert._transfers:
+            arm = each.hand.arm
+            values[f"{arm}/local/measured_cp"] = pose_of(np.linalg.inv(each.hand.base) @ self.tips[arm])
+            wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
+            values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
+        for thing, pose in self.things.items():
+            holders = [float(arm[-1]) for arm, (name, _) in self.grips.items() if name == thing]
+            values[f"objects/{thing}/pose"] = pose_of(pose)
+            values[f"objects/{thing}/held_by"] = np.array([min(holders, default=0.0)])
+        out = self.expert.step(self.t, PERIOD, Inputs(values, events=events))
+        self.t += PERIOD
+        for each in self.expert._transfers:
+            self._follow(each.hand, out)
+        return out
+
+    def _follow(self, hand, out):
+        arm = hand.arm
+        for message in out[f"{arm}/jaw/move_jp"]:
+            self.jaws[arm] = float(message.position[0])
+            self.grips.pop(arm, None)
+            if self.jaws[arm] < 0:
+                near = [
+                    thing
+                    for thing, pose in self.things.items()
+                    if np.linalg.norm(pose[:3, 3] - self.tips[arm][:3, 3]) < 0.03
+                ]
+                if near:
+                    near.sort(key=lambda thing: np.linalg.norm(self.things[thing][:3, 3] - self.tips[arm][:3, 3]))
+                    self.grips[arm] = near[0], np.linalg.inv(self.tips[arm]) @ self.things[near[0]]
+        for message in out[f"{arm}/servo_cp"]:
+            p, q = message.pose.position, message.pose.orientation
+            self.tips[arm] = hand.base @ framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
+        if arm in self.grips:
+            thing, grip = self.grips[arm]
+            self.things[thing] = self.tips[arm] @ grip
+
+    def run(self, seconds, until=lambda world: world.expert.ended):
+        for _ in range(round(seconds * 1e9 / PERIOD)):
+            self.step()
+            if until(self):
+                return self
+        return self
+
+
+def starts(name):
+    params = load(name, []).params["robot"]
+    return {thing: (*what.position, *what.orientation) for thing, what in params.objects.items()}
+
+
+@pytest.mark.parametrize("name", ["pick-and-place", "peg-board", "peg-board-surrol", "peg-board-fls"])
+def test_everything_is_carried_where_it_belongs_at_the_first_attempt(name):
+    world = World(name).run(120)
+    assert world.expert.ended
+    things = len(world.things)
+    assert world.outputs["placed"][0] == things
+    assert world.outputs["attempts"][0] == things * (2 if world.expert.params.hand_over else 1)
+    assert world.outputs["dropped"][0] == 0
+
+
+def test_what_is_lost_on_its_way_is_taken_up_again():
+    world = World("peg-board-surrol")
+    carrying = world.expert._transfers[0]
+    world.run(20, until=lambda _: carrying.state.phase is Phase.CARRY)
+    thing, _ = world.grips.pop("PSM1")
+    world.things[thing] = framed(np.array(starts("peg-board-surrol")[thing]))
+    world.run(120)
+    assert world.outputs["dropped"][0] == 1
+    assert world.outputs["placed"][0] == len(world.things)
+
+
+def test_one_hand_alone_does_what_two_do():
+    world = World("pick-and-place", hands=("PSM1",)).run(120)
+    assert world.expert.ended
+
+
+def test_a_saved_expert_goes_on_with_the_same_bits():
+    world, other = World("peg-board"), World("peg-board")
+    world.run(9)
+    other.expert.restore(world.expert.save())
+    for each in ("held", "jaws", "tips", "grips", "things"):
+        setattr(other, each, dict(getattr(world, each)))
+    other.t = world.t
+    world.run(3), other.run(3)
+    assert world.expert.state_hash() == other.expert.state_hash()
+    assert world.tips["PSM2"] == pytest.approx(other.tips["PSM2"], abs=0)
+
+
+def test_a_refused_command_ends_the_session_and_says_what_the_hand_did():
+    world = World("peg-board")
+    with pytest.raises(SessionError, match="PSM2 in phase 'rise': too far"):
+        world.run(0.05).step(**{"PSM2/error": (StringMessage(data="too far"),)})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ({"hands": ("PSM3",)}, "PSM3 is no arm of the scene"),
+        ({"hands": ("PSM1",), "hand_over": True}, "hand_over needs two hands"),
+        ({"goals": {"piece9": "left"}}, "no object 'piece9'"),
+        ({"goals": {"piece1": "lift"}}, "no dish 'lift'.*left"),
+        ({"goals": {}}, "nothing to do"),
+    ],
+)
+def test_a_task_that_cannot_be_done_is_refused(wrong, problem):
+    stated = load("pick-and-place", []).params["lead"].model_dump()
+    with pytest.raises(ValidationError, match=problem):
+        ExpertParams.model_validate(stated | wrong)
+
+
+@given(
+    st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
+    st.lists(st.floats(-3, 3), min_size=3, max_size=3),
+    st.floats(0.1, 1.0),
+)
+def test_a_line_starts_and_ends_at_rest_and_keeps_to_its_speed(way, turn, share):
+    from robots import rotation
+
+    tool = instrument("400006")
+    hand = Hand("PSM1", np.eye(4), chain(tool), tool.jaw)
+    hand.period = 0.01
+    start = np.array([0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 1.0])
+    hand.state.goal[:] = hand.state.start[:] = hand.measured[:] = start
+    goal = np.concatenate([start[:3] + way, rotation.exp(np.array(turn))])
+    hand.go(goal, share)
+    line = [hand.line()[:3]]
+    while not hand.has_arrived:
+        hand.advance(settle=False)
+        line.append(hand.line()[:3])
+    assert line[-1] == pytest.approx(goal[:3])
+    speed = np.linalg.norm(np.diff(line, axis=0), axis=1) / hand.period
+    assert speed.max(initial=0.0) <= 0.12 * share * 1.01
+    assert speed[0] < 0.25 * speed.max() + 1e-9

@@ -1,0 +1,69 @@
+"""Ways to take hold: where the fingers come, by plain geometry."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controllers.expert.grasps import of_piece, of_ring
+from robots.training.boards import BOARDS
+from robots.training.dishes import PIECE
+
+DRIVER, CADIERE = 10.2e-3, 15.5e-3
+ANGLES = st.floats(-np.pi, np.pi)
+
+
+def turned(angle, axis=2, position=(0.1, 0.2, 0.3)):
+    pose, (i, j) = np.eye(4), ((1, 2), (2, 0), (0, 1))[axis]
+    pose[[i, i, j, j], [i, j, i, j]] = np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)
+    pose[:3, 3] = position
+    return pose
+
+
+@given(ANGLES)
+def test_a_standing_piece_is_taken_across_either_side_with_room_to_come_down(angle):
+    pose = turned(angle)
+    found = of_piece(pose, CADIERE)
+    assert len(found.poses) == 4
+    for tip, opening in zip(found.poses, found.opening, strict=True):
+        assert tip[:3, 2] == pytest.approx([0, 0, -1])
+        assert tip[:2, 3] == pytest.approx(pose[:2, 3])
+        across = np.abs(pose[:3, :3].T @ tip[:3, 1])
+        half = PIECE.size[int(across.argmax())] / 2
+        assert across.max() == pytest.approx(1.0)
+        over = tip[2, 3] - (pose[2, 3] + PIECE.size[2] / 2)
+        assert over * np.tan(opening / 2) == pytest.approx(half + 2e-3)  # 2 mm to either side
+        assert np.hypot(half, over) == pytest.approx(CADIERE - 1e-3)  # the edges touch 1 mm from the ends
+
+
+def test_a_short_jaw_takes_a_piece_across_its_narrow_side_alone():
+    found = of_piece(turned(0.0), DRIVER)
+    assert np.abs(found.poses[:, 0, 1]) == pytest.approx(1.0)
+
+
+@given(ANGLES, st.sampled_from(sorted(BOARDS)), st.floats(0, 1e-3), ANGLES)
+def test_a_ring_around_its_post_can_be_taken_and_no_finger_comes_down_on_the_post(angle, name, off, where):
+    board = BOARDS[name]
+    pose = turned(angle)
+    post = pose[:2, 3] + off * np.array([np.cos(where), np.sin(where)])
+    found = of_ring(board.ring, pose, DRIVER, (post, board.post_radius))
+    assert len(found.poses)
+    for tip, opening in zip(found.poses, found.opening, strict=True):
+        inwards = pose[:2, 3] - tip[:2, 3]
+        way = tip[:2, 1] * np.sign(tip[:2, 1] @ inwards)
+        # the finger in the hole, at its end: a rectangle of 1.4 mm by 4.2 mm behind the pad
+        middle = tip[:2, 3] + way * (DRIVER * np.sin(opening / 2) + 0.7e-3)
+        off_axes = np.abs([way @ (post - middle), np.array([-way[1], way[0]]) @ (post - middle)])
+        assert np.linalg.norm(np.maximum(off_axes - [0.7e-3, 2.1e-3], 0)) > board.post_radius
+
+
+@given(ANGLES)
+def test_the_wall_of_a_ring_lies_in_the_plane_between_the_fingers(angle):
+    ring, pose = BOARDS["icra2026"].ring, turned(angle)
+    for tip in of_ring(ring, pose, DRIVER, None).poses:
+        across = abs(tip[:2, 1] @ (tip[:2, 3] - pose[:2, 3]))
+        assert across == pytest.approx(ring.inradius + ring.thickness / 2)
+
+
+def test_a_ring_on_its_side_cannot_be_taken_from_above():
+    assert not len(of_ring(BOARDS["icra2026"].ring, turned(np.pi / 2, axis=0), DRIVER, None).poses)
