@@ -36,8 +36,8 @@ class Spheres:
         self._bodies = np.unique(carriers)
         self._share = (carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
         self._applied, self._masses = data.xfrc_applied, data.xipos.reshape(-1)
-        # (2, n, 3): where the axes in the orders of `TURNED` stand, of each sphere in `_position`, of its force,
-        # and of the centre of mass of its link in `_masses`
+        # (2, n, 3): where the axes in the orders of `TURNED` stand, of each sphere in `_position`, of its
+        # force, and of the centre of mass of its link in `_masses`
         self._of_sphere = 3 * np.arange(n)[:, None] + TURNED[:, None]
         self._of_force = self._of_sphere[::-1].copy()
         self._of_mass = 3 * carriers[:, None] + TURNED[:, None]
