@@ -7,7 +7,7 @@ its mesh allows for forces, 1.7 / w (docs/decisions/0015-contact-force.md), of 1
 gravity. `real_time`: simulated time by processor time of the engine alone, idle and pressed; `loops`: the
 same processor time in units of a loop of plain Python, timed before and after, so that machines and loads can
 be compared. `truth_error`: of the force at rest, to finite elements of the same mesh. Results:
-docs/decisions/0046-cost-of-tissue.md and 0050-tissue-in-real-time.md.
+docs/decisions/0046-cost-of-tissue.md and 0050-faster-tissue.md.
 """
 
 from __future__ import annotations
