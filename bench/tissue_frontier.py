@@ -38,6 +38,8 @@ ORGANS: dict[str, dict[str, object]] = {
 RADIUS_M, DEPTH_M = 5e-3, 3e-3
 CLEAR_M = 15e-3
 """Least distance of the point that is pressed from anchored nodes."""
+REST_S = {"block": 0.2, "kidney": 0.2, "colon": 0.2, "liver": 2.0}
+"""After the press, until the force is that at rest: the liver's lobe is held at one side and swings slowly."""
 LARGEST_PHASE = 1.7
 """Sub-step times highest frequency up to which forces keep their figure."""
 SUB_STEPS_S = (1e-3, 0.5e-3, 0.25e-3)
@@ -98,7 +100,7 @@ def run(name: str, nodes: int, seconds: float) -> dict[str, float | str]:
 
         cost("idle")
         rig.move(at + above - [0.0, 0.0, DEPTH_M], 0.1)
-        rig.hold(0.2)
+        rig.hold(REST_S[name])
         cost("pressed")
         row["force_n"] = float(rig.force[2])
     truth = Body(params.organs["organ"], gravity=0.0).press([at + above - [0.0, 0.0, DEPTH_M]], [RADIUS_M])[
