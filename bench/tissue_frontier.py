@@ -39,7 +39,7 @@ RADIUS_M, DEPTH_M = 5e-3, 3e-3
 CLEAR_M = 15e-3
 """Least distance of the point that is pressed from anchored nodes."""
 REST_S = {"block": 0.2, "kidney": 0.2, "colon": 0.2, "liver": 2.0}
-"""After the press, until the force is that at rest: the liver's lobe is held at one side and swings slowly."""
+"""After the press, until the force is that at rest: the liver is tied at one end and swings slowly."""
 LARGEST_PHASE = 1.7
 """Sub-step times highest frequency up to which forces keep their figure."""
 SUB_STEPS_S = (1e-3, 0.5e-3, 0.25e-3)

@@ -9,9 +9,9 @@ from schemas.vectors import Vector
 
 __all__ = ["TURNED", "effective_mass", "moment"]
 
-TURNED = np.array([[1, 2, 0], [2, 0, 1]])
+_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+TURNED = np.array([_YZX, _ZXY])
 """Axes y, z, x and z, x, y: a cross product is a(yzx) b(zxy) - a(zxy) b(yzx)."""
-_YZX, _ZXY = TURNED
 
 
 def moment(arms: Vector, forces: Vector) -> Vector:
