@@ -5,9 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from engines.mujoco.interaction.mechanics import effective_mass, moment
+from engines.mujoco.interaction.mechanics import TURNED, effective_mass
 from engines.mujoco.model import CONTACT
 from hub.participant import Inputs, MotionSide
+from schemas.vectors import Vector
 
 __all__ = ["Spheres"]
 
@@ -26,16 +27,23 @@ class Spheres:
         """Let `motion` act on the spheres of the instrument of `arm`."""
         self.motion, self.bond = motion, f"{arm}/{CONTACT}"
         sites = _sites(arm, model)
-        n, self._carriers = len(sites), model.site_bodyid[sites]
+        n, carriers = len(sites), model.site_bodyid[sites]
         first = int(model.sensor(f"{model.site(sites[0]).name}/position").adr[0])
         self._position, self._velocity = (
             data.sensordata[first : first + 3 * n],
             data.sensordata[first + 3 * n : first + 6 * n],
         )
-        self._centres = self._position.reshape(n, 3)
-        self._bodies = np.unique(self._carriers)
-        self._share = (self._carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
-        self._applied, self._masses = data.xfrc_applied, data.xipos
+        self._bodies = np.unique(carriers)
+        self._share = (carriers == self._bodies[:, None]).astype(np.float64)  # (bodies, n)
+        self._applied, self._masses = data.xfrc_applied, data.xipos.reshape(-1)
+        # (2, n, 3): where the axes in the orders of `TURNED` stand, of each sphere in `_position`, of its
+        # force, and of the centre of mass of its link in `_masses`
+        self._of_sphere = 3 * np.arange(n)[:, None] + TURNED[:, None]
+        self._of_force = self._of_sphere[::-1].copy()
+        self._of_mass = 3 * carriers[:, None] + TURNED[:, None]
+        # arms and forces with their axes in the orders whose products are the two terms of a moment
+        self._arms, self._turned, self._terms = np.zeros((3, 2, n, 3))
+        self._moved = np.zeros(3 * n)
         # force, and its moment about the centre of mass of the link that carries the sphere
         self._loads = np.zeros((n, 6))
         self._forces, self._moments = self._loads[:, :3], self._loads[:, 3:]
@@ -43,7 +51,8 @@ class Spheres:
         self._last = self._position.copy()
         tip, base = int(model.sensor(f"{arm}/tip/position").adr[0]), model.site(f"{arm}/base").id
         self._tip, self._to_base = data.sensordata[tip : tip + 3], data.site_xmat[base].reshape(3, 3).T.copy()
-        self._tip_wrench = np.zeros(6)
+        self._tip_wrench, self._about_tip = np.zeros(6), np.zeros((n, 3))
+        self._tip_force, self._tip_torque = self._tip_wrench[:3], self._tip_wrench[3:]
         self.outputs = {
             **motion.result(self._position, self._velocity),
             f"{arm}/tip_wrench": self._tip_wrench,
@@ -80,16 +89,29 @@ class Spheres:
     def _push(self, tau: float) -> None:
         self._force = self.motion.force(tau, self._position, self._velocity)
         self._forces[:] = self._force.reshape(-1, 3)
-        self._moments[:] = moment(self._centres - self._masses.take(self._carriers, 0), self._forces)
+        # three times as fast as the default mode
+        self._force.take(self._of_force, None, self._turned, "clip")
+        self._position.take(self._of_sphere, None, self._arms, "clip")
+        self._masses.take(self._of_mass, None, self._terms, "clip")
+        np.subtract(self._arms, self._terms, out=self._arms)
+        self._set_moments(self._moments)
         self._applied[self._bodies] = self._share @ self._loads
 
+    def _set_moments(self, moments: Vector) -> None:
+        """Set `moments` (N m), shape (n, 3), to those of the forces at `_arms`."""
+        first, second = np.multiply(self._arms, self._turned, out=self._terms)
+        np.subtract(first, second, out=moments)
+
     def _record_work(self) -> None:
-        self.motion.add(self._force, self._position - self._last)
+        self.motion.add(self._force, np.subtract(self._position, self._last, out=self._moved))
         self._last[:] = self._position
 
     def _update_tip_wrench(self) -> None:
-        self._to_base.dot(self._forces.sum(axis=0), self._tip_wrench[:3])
-        self._to_base.dot(moment(self._centres - self._tip, self._forces).sum(axis=0), self._tip_wrench[3:])
+        self._position.take(self._of_sphere, None, self._arms, "clip")
+        self._arms -= self._tip.take(TURNED)[:, None]
+        self._set_moments(self._about_tip)
+        self._to_base.dot(np.add.reduce(self._forces, 0), self._tip_force)
+        self._to_base.dot(np.add.reduce(self._about_tip, 0), self._tip_torque)
 
 
 def _sites(arm: str, model: mujoco.MjModel) -> list[int]:

@@ -7,9 +7,11 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["effective_mass", "moment"]
+__all__ = ["TURNED", "effective_mass", "moment"]
 
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+TURNED = np.array([_YZX, _ZXY])
+"""Axes y, z, x and z, x, y: a cross product is a(yzx) b(zxy) - a(zxy) b(yzx)."""
 
 
 def moment(arms: Vector, forces: Vector) -> Vector:

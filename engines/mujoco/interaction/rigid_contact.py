@@ -36,7 +36,9 @@ class RigidContact:
         ]
         self._arms = np.arange(len(arms))
         self._sums, self._means = np.zeros((len(arms), 6)), np.zeros((len(arms), 6))
-        self._substeps, self._is_touched = 0, False
+        self._substeps, self._is_touched, self._was_touched = 0, False, False
+        self._geoms, self._found = b"", np.zeros(0, np.intp)
+        """Pairs of geoms in contact as they were last seen, and which of the contacts count."""
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
 
     def add(self) -> None:
@@ -54,29 +56,34 @@ class RigidContact:
     def end(self) -> None:
         """Set the outputs to the mean over the sub-steps since the last call."""
         if not self._is_touched:
-            if self._means.any():
+            if self._was_touched:
                 self._means[:] = 0.0
-            self._substeps = 0
+            self._substeps, self._was_touched = 0, False
             return
         for to_base, total, mean in zip(self._to_base, self._sums, self._means, strict=True):
             to_base.dot(total, mean)
         self._means /= self._substeps
         self._sums[:] = 0.0
-        self._substeps, self._is_touched = 0, False
+        self._substeps, self._is_touched, self._was_touched = 0, False, True
 
     def _add_contacts(self) -> None:
+        geoms = self._data.contact.geom  # (contacts, 2)
+        pairs = geoms.tobytes()
+        if pairs != self._geoms:  # most contacts last: objects lie on the table for many sub-steps
+            owners = self._owner[geoms]
+            self._geoms, self._found = pairs, (owners[:, 0] != owners[:, 1]).nonzero()[0]
+        if self._found.size:
+            self._add_forces(self._found)
+
+    def _add_forces(self, found: NDArray[np.intp]) -> None:
         model, data, contact = self._model, self._data, self._data.contact
-        owners = self._owner[contact.geom]  # (contacts, 2)
-        found = (owners[:, 0] != owners[:, 1]).nonzero()[0]
-        if not len(found):
-            return
         self._is_touched = True
         loads = np.empty((len(found), 6))  # on the second geom: force and torque
         for load, i in zip(loads, found.tolist(), strict=True):
             mujoco.mj_contactForce(model, data, i, load)
         loads.reshape(-1, 2, 3)[:] = loads.reshape(-1, 2, 3) @ contact.frame[found].reshape(-1, 3, 3)
         owners, at, tips = (
-            owners[found, :, None] == self._arms,
+            self._owner[contact.geom[found]][:, :, None] == self._arms,
             contact.pos[found],
             data.sensordata[self._tips],
         )
