@@ -158,8 +158,8 @@ def scenario() -> str:
             " parameters of every kind installed on your machine.",
             "",
             "YAML merge keys (`<<: *scene`) are allowed. Every value can be overridden on the command line:"
-            ' `--set participants.tissue.organs.block.young_modulus="25 kPa"`. The `participants.` may be left'
-            " out.",
+            ' `--set participants.tissue.organs.block.young_modulus="25 kPa"`. The part'
+            " `participants.` may be left out.",
             "",
             *_scenario_limits(),
             *_model("Top level", schema),

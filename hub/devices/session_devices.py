@@ -130,7 +130,7 @@ class SessionDevices:
 
     def _take(self, device: str, sample: Sample, arrival_ns: int, stamp: Stamp) -> None:
         source = device, sample.port
-        if source not in self._connected and not self._observers.watches(*source):
+        if source not in self._connected and not self._monitor.watches(*source):
             return
         try:
             self._offer(*source, sample.encode(), arrival_ns, stamp)
