@@ -260,11 +260,15 @@ class VectorCodec:
 
         Commands go as such to an arm's controller in every step; the vector was checked where it is from.
         """
-        numbers: dict[str, Vector] = dict.fromkeys(("position", "velocity", "effort"), _NONE)
-        for path, _, block in self._blocks:
-            numbers[path] = value[block].copy()
+        numbers = {path: value[block].copy() for path, _, block in self._blocks}
         header = Header(stamp=Time.from_ns(time_ns), frame_id=self.port.frame)
-        return JointState.model_construct(header=header, name=list(self.port.names), **numbers)
+        return JointState.model_construct(
+            header=header,
+            name=list(self.port.names),
+            position=numbers.get("position", _NONE),
+            velocity=numbers.get("velocity", _NONE),
+            effort=numbers.get("effort", _NONE),
+        )
 
     def from_message(self, message: Message) -> Vector:
         """Return the vector, shape (size,), of a validated message from outside.
