@@ -7,6 +7,7 @@ from math import cos, pi, sin
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controllers.expert.grasps import Grasps, of_piece, of_ring
 from robots.training.dishes import DISH, PIECE
@@ -130,7 +131,7 @@ class PegBoard:
         """Say whether it is around any of the target posts and down."""
         return bool(self._on_target(poses[thing, :3, 3]).any())
 
-    def _on_target(self, middle: Vector) -> Vector:
+    def _on_target(self, middle: Vector) -> NDArray[np.bool_]:
         off = np.abs(middle - self._targets)
         return (np.hypot(off[:, 0], off[:, 1]) < self._board.ring.inradius) & (
             off[:, 2] < self._board.ring.height / 2.0

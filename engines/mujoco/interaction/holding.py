@@ -76,7 +76,9 @@ class Holding:
         self._settled = 1 if self._rays is not None else max(1, round(_SETTLED / period))
         self._numbers = [int(arm[-1]) for arm in arms]
         self._bodies = [model.body(thing).id for thing in things]
-        self._fingers = [model.body(f"{arm}/{FINGERS[0]}").id for arm in arms]
+        # in what slip is measured: what a ray holds does not move with a finger
+        part = FINGERS[0] if self._rays is None else "wrist_yaw"
+        self._fingers = [model.body(f"{arm}/{part}").id for arm in arms]
         self._wrists = [model.body(f"{arm}/wrist_yaw").id for arm in arms]
         shape = (len(things), len(arms))
         self._ends = _ends(model, things, [f"{arm}/{finger}" for arm in arms for finger in FINGERS])

@@ -62,7 +62,9 @@ class World:
                     if np.linalg.norm(pose[:3, 3] - self.tips[arm][:3, 3]) < 0.03
                 ]
                 if near:
-                    near.sort(key=lambda thing: np.linalg.norm(self.things[thing][:3, 3] - self.tips[arm][:3, 3]))
+                    near.sort(
+                        key=lambda thing: np.linalg.norm(self.things[thing][:3, 3] - self.tips[arm][:3, 3])
+                    )
                     self.grips[arm] = near[0], np.linalg.inv(self.tips[arm]) @ self.things[near[0]]
         for message in out[f"{arm}/servo_cp"]:
             p, q = message.pose.position, message.pose.orientation
