@@ -95,7 +95,7 @@ class Hand:
         """Pose of the tip in the world."""
         self.angle = 0.0
         """Of the jaw, rad."""
-        self._told: list[float] = []
+        self._angles: list[float] = []
 
     @property
     def has_arrived(self) -> bool:
@@ -136,7 +136,7 @@ class Hand:
 
     def move_jaw(self, angle: float) -> None:
         """Tell the jaw to go to an angle, rad."""
-        self._told.append(angle)
+        self._angles.append(angle)
 
     def line(self) -> Vector:
         """Return the pose on the line, shape (7,)."""
@@ -171,10 +171,10 @@ class Hand:
         return PoseStamped(header=Header(frame_id=base_frame(self.arm)), pose=pose)
 
     def jaw_commands(self) -> tuple[JointState, ...]:
-        """Return what the jaw is told in this step, and forget it."""
-        told = tuple(JointState(position=np.array([angle])) for angle in self._told)
-        self._told.clear()
-        return told
+        """Return the commands to the jaw in this step, and forget them."""
+        commands = tuple(JointState(position=np.array([angle])) for angle in self._angles)
+        self._angles.clear()
+        return commands
 
 
 def framed(pose: Vector) -> Vector:

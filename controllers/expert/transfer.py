@@ -31,11 +31,11 @@ _PATIENCE = 0.6
 _ALIGNING = 0.08
 """Time constant with which a thing is brought in line, s."""
 _SHUT = -0.3
-"""rad: what a jaw is told that grasps."""
+"""rad: the command to a jaw that grasps."""
 _PRESSED, _GIVEN_UP = 0.3, 0.9
 """s: until a jaw holds at the earliest; until it does not."""
 _HELD_OPEN = 0.03
-"""rad: a jaw told to shut that stays this far open has something between its fingers."""
+"""rad: a jaw commanded to shut that stays this far open has something between its fingers."""
 _UNHELD = 0.25
 """s without a holder after which a thing is lost."""
 _OPENED = 0.25

@@ -119,6 +119,14 @@ class SceneParams(Params):
         return self
 
     @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        if twice := self.objects.keys() & self.fixtures.keys():
+            raise ValueError(
+                f"{', '.join(sorted(twice))}: the name of an object and of a fixture; give each its own"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _rolls_by_friction(self) -> Self:
         rolling = [
             name

@@ -17,6 +17,7 @@ from tasks.metrics.metric import Metric, missing
 __all__ = ["Economy", "Paths", "Turning", "WorkingVolume"]
 
 _STILL = "the tip has not moved"
+_SHORT = "the trial is too short"
 
 
 class PathsState(Record):
@@ -49,13 +50,11 @@ class Paths(Metric[PathsState]):
         """Yield the lengths (m) and the shares."""
         state = self.state
         for arm, length in zip(self._arms, state.length.tolist(), strict=True):
-            yield ScoreValue(name=f"{arm}/path_length", value=length, unit="m")
+            name = f"{arm}/path_length"
+            yield ScoreValue(name=name, value=length, unit="m") if state.time else missing(name, "m", _SHORT)
         for arm, idle in zip(self._arms, state.idle.tolist(), strict=True):
             name = f"{arm}/idle_share"
-            if state.time:
-                yield ScoreValue(name=name, value=idle / state.time)
-            else:
-                yield missing(name, "", "the trial is too short")
+            yield ScoreValue(name=name, value=idle / state.time) if state.time else missing(name, "", _SHORT)
 
 
 class EconomyState(Record):
@@ -134,7 +133,7 @@ class WorkingVolume(Metric[VolumeState]):
             if self.state.count:
                 yield ScoreValue(name=name, value=sqrt(squares / self.state.count), unit="m")
             else:
-                yield missing(name, "m", "the trial is too short")
+                yield missing(name, "m", _SHORT)
 
 
 class TurningState(Record):
@@ -166,4 +165,6 @@ class Turning(Metric[TurningState]):
     def values(self) -> Iterator[ScoreValue]:
         """Yield the angles, rad."""
         for arm, angle in zip(self._arms, self.state.angle.tolist(), strict=True):
-            yield ScoreValue(name=f"{arm}/angular_path", value=angle, unit="rad")
+            name = f"{arm}/angular_path"
+            begun = self.state.begun
+            yield ScoreValue(name=name, value=angle, unit="rad") if begun else missing(name, "rad", _SHORT)

@@ -95,8 +95,9 @@ def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
 
 
 def _robot(recording: Recording) -> tuple[str, dict[str, Any]]:
-    """Return the participant that publishes the poses of arms, and its parameters."""
-    for name, spec in recording.scenario().participants.items():
+    """Return the participant that publishes the poses of arms, best an engine, and its parameters."""
+    plan, specs = recording.plan(), recording.scenario().participants
+    for name, spec in sorted(specs.items(), key=lambda item: plan.participants[item[0]].role != "engine"):
         if any(f"{name}.{arm}/measured_cp" in recording for arm in _table(spec.params, "arms")):
             return name, spec.params
     raise RecordingError(

@@ -39,8 +39,10 @@ def test_a_tip_at_rest_is_idle():
     assert measured(Paths(["PSM1"], IDLE), resting)["PSM1/path_length"] == 0.0
 
 
-def test_a_trial_that_is_too_short_has_no_idle_share():
-    assert measured(Paths(["PSM1"], IDLE), np.zeros((3, 3)))["PSM1/idle_share"] is None
+def test_a_trial_that_is_too_short_has_no_path_and_no_idle_share():
+    found = measured(Paths(["PSM1"], IDLE), np.zeros((3, 3)))
+    assert found == {"PSM1/path_length": None, "PSM1/idle_share": None}
+    assert measured(Turning(["PSM1"]), np.zeros((0, 3)))["PSM1/angular_path"] is None
 
 
 def metrics():

@@ -1,8 +1,10 @@
 """Scores of a session, of its re-simulation, of its recording, and of real arms in ROS bags."""
 
 import json
+import lzma
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,3 +118,13 @@ def test_a_bag_without_an_arm_says_what_to_record(tmp_path):
     bag = write(tmp_path / "bag", [(0.0, "/needle/pose", pose((0.0, 0.0, 0.0)))])
     with pytest.raises(RecordingError, match="ros2 bag record /PSM1/measured_cp"):
         score_ros_bag(bag, [])
+
+
+def test_a_session_of_an_earlier_version_without_a_task_is_measured(tmp_path):
+    packed = Path(__file__).parents[1] / "hub" / "recording" / "recordings_0_1_0" / "pick.mcap.xz"
+    (tmp_path / "pick.mcap").write_bytes(lzma.decompress(packed.read_bytes()))
+    (scored,) = score_session(Recording(tmp_path / "pick.mcap"), []).values()
+    found = {one.name: one for one in scored.card.metrics}
+    assert scored.card.task == "practice-task"
+    assert (found["grasps"].value, found["grasps"].reason) == (0, "")
+    assert found["PSM1/path_length"].reason == "the trial is too short"  # 50 ms

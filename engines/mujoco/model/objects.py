@@ -67,7 +67,7 @@ _COLOURS = (
     [0.95, 0.45, 0.1, 1.0],
     [0.6, 0.3, 0.75, 1.0],
 )
-"""Of pieces and triangular rings, in the order of their names' numbers, so that they can be told apart."""
+"""Of pieces and triangular rings, in the order of their names' numbers, so that they differ."""
 _CORE = 0.9
 """Thickness of a ring's wall between its edges, as a share of theirs."""
 _ROUNDNESS = 0.1

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from engines.mujoco.model import build
 from engines.mujoco.model.objects import start_pose
@@ -71,6 +72,17 @@ def test_a_piece_lies_in_a_dish_and_cannot_leave_it_sideways():
         mujoco.mj_step(model, data)
     assert np.linalg.norm(data.body("piece1").xpos[:2]) < DISH.inner_radius
     assert model.body("piece1").mass == pytest.approx(PIECE.mass)
+
+
+def test_a_fixture_and_an_object_have_different_names():
+    with pytest.raises(ValidationError, match="middle: the name of an object and of a fixture"):
+        SceneParams.model_validate(
+            {
+                "arms": ARM,
+                "fixtures": {"middle": {"kind": "dish", "position": [0, 0, 0]}},
+                "objects": {"middle": {"kind": "piece", "position": [0, 0, 0]}},
+            }
+        )
 
 
 @given(st.integers(0, 10**6), st.floats(0, 5e-3), st.floats(0, 1.0))
