@@ -11,7 +11,18 @@ from pathlib import Path
 
 __all__ = ["NAMES", "Collision", "collisions"]
 
-NAMES = ("trocar", "schemas", "robots", "hub", "engines", "controllers", "devices", "configs")
+NAMES = (
+    "trocar",
+    "schemas",
+    "robots",
+    "hub",
+    "engines",
+    "controllers",
+    "devices",
+    "tasks",
+    "learning",
+    "configs",
+)
 """The top-level packages of the distribution `trocar`."""
 
 _ROOT = Path(__file__).resolve().parents[1]

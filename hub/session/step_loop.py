@@ -144,13 +144,15 @@ class StepLoop:
         due, steps = self._schedule(grant)
         run.watchdog.wait_for(due)
         payload = pack_grant(grant) if self._away or run.recorded else b""
-        for link in self._links:
-            link.send_grant(payload)
-        if self._grants.needed:
-            self._grants.put(payload)
-        self.book_acks()
-        if run.recorded:
-            run.monitor.grant(grant, payload)
+        try:
+            for link in self._links:
+                link.send_grant(payload)
+            if self._grants.needed:
+                self._grants.put(payload)
+            self.book_acks()
+        finally:  # a failure may be raised at any moment: what was granted is in the recording
+            if run.recorded:
+                run.monitor.grant(grant, payload)
         run.host.run(grant, self._done_here)
         self._receive_acks([name for name in due if name in self._away], grant, steps)
         run.bookkeeping.acknowledged(granted_ns)
