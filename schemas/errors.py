@@ -109,9 +109,15 @@ class ConnectError(TrocarError):
     """No hub, or not the hub that was asked for."""
 
 
+_MOST_NAMES = 30
+"""Known names that are listed although one of them is probably meant."""
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return `" Did you mean 'x'?"` for a near miss, then the list of what is known."""
+    """Return `" Did you mean 'x'?"` for a near miss, then what is known; a long list if nothing is near."""
     names = sorted(known)
     close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
     hint = f" Did you mean '{close[0]}'?" if close else ""
+    if close and len(names) > _MOST_NAMES:
+        return hint
     return f"{hint} Known: {', '.join(names) or 'none'}."

@@ -140,8 +140,9 @@ def _all_params(source: Source, found: list[str]) -> dict[str, Params]:
         try:
             params[name] = _params(("participants", name), spec, source, present)
         except ScenarioError as error:
-            found.append(str(located(error, source)))
+            found += str(located(error, source)).splitlines()
             if len(found) >= MAX_PROBLEMS:
+                del found[MAX_PROBLEMS:]
                 break
     return params
 
