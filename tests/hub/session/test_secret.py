@@ -122,7 +122,8 @@ def test_the_secret_lies_in_a_file_of_this_user_as_long_as_the_hub_runs():
         assert file.read_text() != first
 
 
-def test_a_hub_that_finds_its_port_taken_leaves_the_secret_of_the_other_one():
+def test_a_hub_that_finds_its_port_taken_leaves_the_secret_of_the_other_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))  # other sessions write beside the user's secrets
     port = LoopbackPort("tcp/127.0.0.1:0")
     with listen_with_secret(port):
         before, files = secret_of(port.endpoint), set(private_directory().iterdir())
