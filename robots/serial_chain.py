@@ -166,7 +166,7 @@ class SerialChain:
         if q.shape[-1:] != (n,):
             self.check_form(q)
         if q.ndim > 1:
-            return self._frames_of_many(q)
+            return _frames(q, self.basis, self.tip, self.prismatic)
         factors = self._factors
         np.cos(q, out=factors[:, 0, 1])
         np.sin(q, out=factors[:, 0, 2])
@@ -178,21 +178,6 @@ class SerialChain:
         for i in range(1, n):
             pose = np.matmul(pose, links[i], out=poses[i])
         np.matmul(pose, self.tip, out=poses[n])
-        return poses
-
-    def _frames_of_many(self, q: Vector) -> Vector:
-        n = len(self.joints)
-        factors = np.ones((*q.shape, 1, 3))
-        np.cos(q, out=factors[..., 0, 1])
-        np.sin(q, out=factors[..., 0, 2])
-        for joint in self.prismatic:
-            factors[..., joint, 0, 2] = q[..., joint]
-        links = (factors @ self.basis).reshape(*q.shape, 4, 4)
-        poses = np.empty((*q.shape[:-1], n + 1, 4, 4))
-        poses[..., 0, :, :] = links[..., 0, :, :]
-        for i in range(1, n):
-            np.matmul(poses[..., i - 1, :, :], links[..., i, :, :], out=poses[..., i, :, :])
-        np.matmul(poses[..., n - 1, :, :], self.tip, out=poses[..., n, :, :])
         return poses
 
     def out_of_range(self, q: Vector) -> list[str]:
@@ -299,7 +284,7 @@ class SerialChains:
 
     def __init__(self, chains: Sequence[SerialChain]) -> None:
         """Take k chains."""
-        self._n, self.prismatic = len(chains[0].joints), chains[0].prismatic
+        self.prismatic = chains[0].prismatic
         self.basis = np.stack([chain.basis for chain in chains])[:, None]  # (k, 1, n, 3, 16)
         self._tips = np.stack([chain.tip for chain in chains])[:, None]  # (k, 1, 4, 4)
 
@@ -308,16 +293,24 @@ class SerialChains:
 
         Positions `q` have shape (k, m, n): m configurations of each chain.
         """
-        n = self._n
-        factors = np.ones((*q.shape, 1, 3))
-        np.cos(q, out=factors[..., 0, 1])
-        np.sin(q, out=factors[..., 0, 2])
-        for joint in self.prismatic:
-            factors[..., joint, 0, 2] = q[..., joint]
-        links = (factors @ self.basis).reshape(*q.shape, 4, 4)
-        poses = np.empty((*q.shape[:-1], n + 1, 4, 4))
-        poses[..., 0, :, :] = links[..., 0, :, :]
-        for i in range(1, n):
-            np.matmul(poses[..., i - 1, :, :], links[..., i, :, :], out=poses[..., i, :, :])
-        np.matmul(poses[..., n - 1, :, :], self._tips, out=poses[..., n, :, :])
-        return poses
+        return _frames(q, self.basis, self._tips, self.prismatic)
+
+
+def _frames(q: Vector, basis: Vector, tip: Vector, prismatic: Sequence[int]) -> Vector:
+    """Return the poses of links and tips, shape (..., n + 1, 4, 4), at positions `q`, shape (..., n).
+
+    `basis` is that of one chain or of several, shape (..., n, 3, 16), and `tip` has shape (..., 4, 4).
+    """
+    n = q.shape[-1]
+    factors = np.ones((*q.shape, 1, 3))
+    np.cos(q, out=factors[..., 0, 1])
+    np.sin(q, out=factors[..., 0, 2])
+    for joint in prismatic:
+        factors[..., joint, 0, 2] = q[..., joint]
+    links = (factors @ basis).reshape(*q.shape, 4, 4)
+    poses = np.empty((*q.shape[:-1], n + 1, 4, 4))
+    poses[..., 0, :, :] = links[..., 0, :, :]
+    for i in range(1, n):
+        np.matmul(poses[..., i - 1, :, :], links[..., i, :, :], out=poses[..., i, :, :])
+    np.matmul(poses[..., n - 1, :, :], tip, out=poses[..., n, :, :])
+    return poses

@@ -8,26 +8,17 @@ from __future__ import annotations
 from math import inf
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, GetPydanticSchema, with_config
-from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
+from pydantic import Field, GetPydanticSchema
 
 from hub.participant import Params
 from robots.dvrk import endoscope
 from robots.dvrk.endoscope import StereoCamera
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions
 from robots.dvrk.setup_joints import CartArm
 from schemas.quantity import Angle, Duration, Force, Length, Speed
 
 __all__ = ["TaskParams"]
-
-
-@with_config(ConfigDict(extra="forbid"))
-class _Arms(TypedDict, total=False):
-    PSM1: MountedPsm
-    PSM2: MountedPsm
-    PSM3: MountedPsm
-    ECM: MountedEcm
 
 
 _Point = tuple[Length, Length, Length]
@@ -37,7 +28,7 @@ class TaskParams(Params):
     """What the task watches, and from which value on something counts."""
 
     arms: Annotated[
-        dict[CartArm, MountedPsm | MountedEcm], GetPydanticSchema(lambda _, handler: handler(_Arms))
+        dict[CartArm, MountedPsm | MountedEcm], GetPydanticSchema(lambda _, handler: handler(MountedArms))
     ] = Field(min_length=1, description="as in the scene: where each stands, and which endoscope looks on")
     mounting: Literal["free", "cart"] = Field(default="free", description="as in the scene")
     setup_joints: dict[CartArm, SetupPositions] = Field(

@@ -13,7 +13,7 @@ from typing_extensions import TypedDict  # pydantic needs this one before Python
 
 from engines.mujoco.object_params import ObjectParams, TableParams
 from hub.participant import Params
-from robots.dvrk.mounted import MountedEcm, MountedPsm
+from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions, settable
 from robots.dvrk.setup_joints import CartArm
 from robots.training.fixtures import FixtureParams
@@ -32,14 +32,6 @@ __all__ = [
 
 
 @with_config(ConfigDict(extra="forbid"))
-class _Arms(TypedDict, total=False):
-    PSM1: MountedPsm
-    PSM2: MountedPsm
-    PSM3: MountedPsm
-    ECM: MountedEcm
-
-
-@with_config(ConfigDict(extra="forbid"))
 class _SetupJoints(TypedDict, total=False):
     PSM1: Annotated[SetupPositions, settable("PSM1")]
     PSM2: Annotated[SetupPositions, settable("PSM2")]
@@ -54,7 +46,7 @@ def _validated_as(form: Any) -> GetPydanticSchema:
 
 def _object_names(objects: Mapping[str, ObjectParams]) -> Mapping[str, ObjectParams]:
     for name in objects:
-        if not valid_name(name) or name in _Arms.__annotations__:
+        if not valid_name(name) or name in MountedArms.__annotations__:
             raise ValueError(
                 f"'{name}' is not a valid name of an object: a letter, then letters, digits and underscores,"
                 " and not the name of an arm"
@@ -66,7 +58,7 @@ class SceneParams(Params):
     """What stands where: arms of a da Vinci Research Kit, a table and things to hold."""
 
     model: Literal["dvrk"] = "dvrk"
-    arms: Annotated[dict[CartArm, MountedPsm | MountedEcm], _validated_as(_Arms), Field(min_length=1)]
+    arms: Annotated[dict[CartArm, MountedPsm | MountedEcm], _validated_as(MountedArms), Field(min_length=1)]
     mounting: Literal["free", "cart"] = Field(
         default="free",
         description=(

@@ -24,7 +24,7 @@ _LEFT_OUT = {"latency", "observers", "profile", "session", "recording"}
 
 @dataclass(frozen=True)
 class Trial:
-    """Which values a trial has, and the how manieth repetition it is."""
+    """Which values a trial has, and which repetition of them it is, from 0."""
 
     number: int
     repetition: int

@@ -8,7 +8,8 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator, with_config
+from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
 from robots.dvrk import ecm, psm
 from robots.dvrk.inertia import PROBE_RADIUS
@@ -26,7 +27,7 @@ from robots.dvrk.parameters import (
 from robots.serial_chain import SerialChain
 from schemas.quantity import Angle, Length
 
-__all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedEcm", "MountedPsm", "PsmTool"]
+__all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "MountedPsm", "PsmTool"]
 
 DEFAULT_INSTRUMENT = "palpation-probe"
 
@@ -123,3 +124,13 @@ class MountedEcm(MountedArm):
     def _starts_in_range(self) -> Self:
         check_start(self.chain, self.start)
         return self
+
+
+@with_config(ConfigDict(extra="forbid"))
+class MountedArms(TypedDict, total=False):
+    """The arms of a cart by name, as pydantic validates them."""
+
+    PSM1: MountedPsm
+    PSM2: MountedPsm
+    PSM3: MountedPsm
+    ECM: MountedEcm
