@@ -12,7 +12,8 @@ demo: $(VENV)/.all ## run the palpation scenario, record it and write a report
 	trocar report $(RECORDING) -o $(RECORDING).html
 
 test: check ## everything that must hold before a change is merged; tests/docs builds the documentation
-	pytest -n 3 --dist loadgroup  # on two cores: a third of the time they wait
+	@# on two cores, as a third of the time they wait; one whose patience ends beside the others must pass by itself
+	pytest -n 3 --dist loadgroup || (python tests/failed_tests.py > .pytest_cache/failed && pytest @.pytest_cache/failed)
 
 docs: $(VENV)/.dev ## the documentation, in build/site
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict

@@ -39,7 +39,10 @@ from hub.session.session import Session
 from hub.transport.router_client import RouterClient
 from schemas.lockstep import Ack
 
-LEFT_OUT = {"keys": "a person drives it by the keyboard"}
+LEFT_OUT = {
+    "browser": "a person drives it from a page",
+    "keys": "a person drives it by the keyboard",
+}
 """Scenarios that do not run by themselves."""
 
 DOCS = Path(__file__).parent.parent / "docs" / "live.md"

@@ -21,6 +21,7 @@ NAMES = (
     "devices",
     "tasks",
     "learning",
+    "webconsole",
     "configs",
 )
 """The top-level packages of the distribution `trocar`."""

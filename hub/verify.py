@@ -6,16 +6,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from hub.hash_comparison import HashComparison
 from hub.observation.summary import Progress
-from hub.planning import registry
-from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.plan import Plan
+from hub.planning.renewal import made
+from hub.recording.fork_origin import fork_origin
 from hub.recording.recording import Recording
 from hub.recording.trust import require_trust
 from hub.session.clock import most_steps
+from hub.session.past import Past
 from hub.session.session import Session
 from schemas.errors import RecordingError
-from schemas.lockstep import Ack
-from schemas.trocar_msgs import AckMessage, GrantMessage
+from schemas.trocar_msgs import GrantMessage
 
 __all__ = ["VerifySummary", "verify"]
 
@@ -63,19 +65,22 @@ def verify(
     plan, directory = _plan(recording), directory or recording.directory()
     stepped = {name: planned for name, planned in plan.participants.items() if planned.in_step}
     require_trust(recording, stepped, directory, trust=trust)
-    made = {
-        name: registry.make(planned.kind, name, scenario.participants[name].params, directory)
+    origin = fork_origin(recording)
+    renewals = () if origin is None else origin.renewals
+    here = {
+        name: made(planned.kind, name, scenario.participants[name].params, renewals, directory)
         for name, planned in stepped.items()
         if planned.host == "hub"
     }
-    comparison = _Comparison(recording, plan)
+    comparison = HashComparison(recording, plan)
     session = Session(
         scenario,
         plan,
-        made,
+        {name: first for name, (first, _) in here.items()},
         directory,
         endpoint=endpoint,
-        grants=_grants(recording, plan, most_steps(plan, scenario.window)),
+        past=Past(_grants(recording, plan, most_steps(plan, scenario.window)), renewals=renewals),
+        successors={name: later for name, (_, later) in here.items()},
         on_ack=comparison.take,
     )
     comparison.stop = session.state.shutdown
@@ -87,44 +92,8 @@ def verify(
         steps=ran.steps,
         hashes=comparison.hashes,
         first_difference_step=None if first is None else first[0],
-        first_difference_participant=None if first is None else plan.order[first[1]],
+        first_difference_participant=None if first is None else first[1],
     )
-
-
-class _Comparison:
-    """Compares every ack with the recorded one."""
-
-    def __init__(self, recording: Recording, plan: Plan) -> None:
-        self._recorded: dict[str, Iterator[AckMessage]] = {name: recording.acks(name) for name in plan.order}
-        self._order = plan.order
-        self._differences: list[tuple[int, int]] = []
-        self.hashes = 0
-        self.stop: Callable[[], None] = lambda: None
-
-    @property
-    def first(self) -> tuple[int, int] | None:
-        """Step and place in the step order of the first difference."""
-        return min(self._differences, default=None)
-
-    def take(self, planned: PlannedParticipant, ack: Ack) -> None:
-        """Compare an ack; at the first difference, stop the session at the end of this step."""
-        then = next(self._recorded[planned.name], None)
-        if then is None:
-            return  # the recording was cut short between the grant and this ack
-        recorded = then.state_hash.tolist()
-        self.hashes += min(len(recorded), len(ack.state_hash))
-        first = next(
-            (i for i, (one, other) in enumerate(zip(recorded, ack.state_hash, strict=False)) if one != other),
-            None,
-        )
-        if then.step != ack.step or len(recorded) != len(ack.state_hash):
-            self._differ(ack.step, planned)
-        elif first is not None:
-            self._differ(ack.step + first * planned.period, planned)
-
-    def _differ(self, step: int, planned: PlannedParticipant) -> None:
-        self._differences.append((step, self._order.index(planned.name)))
-        self.stop()
 
 
 def _grants(recording: Recording, plan: Plan, most: int) -> Iterator[GrantMessage]:

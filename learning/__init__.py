@@ -1,1 +1,1 @@
-"""Learning from sessions: sweeps over parameters of a scenario."""
+"""Learning from sessions: sweeps over parameters of a scenario, and environments for Gymnasium."""

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TypeVar
+from typing import Literal, TypeVar
 
+from annotated_types import MaxLen
 from pydantic import ValidationError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from schemas import crtk, ros, trocar_msgs
+from schemas import crtk, ros, trocar_msgs, visualization
 from schemas.errors import MessageError, did_you_mean
 from schemas.message import Message, msg_text
 
 __all__ = [
+    "check_first_sequence",
     "decode",
     "encode",
     "message_type",
@@ -39,7 +41,7 @@ M = TypeVar("M", bound=Message)
 @cache
 def message_types() -> dict[str, type[Message]]:
     """Return every message model by its ROS type name."""
-    models = (value for module in (ros, crtk, trocar_msgs) for value in vars(module).values())
+    models = (value for module in (ros, crtk, visualization, trocar_msgs) for value in vars(module).values())
     return {
         m.ros_type: m for m in models if isinstance(m, type) and issubclass(m, Message) and m is not Message
     }
@@ -82,6 +84,7 @@ def decode(model: type[M], payload: bytes) -> M:
         raise MessageError(
             f"{model.ros_type}: {len(payload)} bytes are no such message (they do not begin as CDR)"
         )
+    check_first_sequence(model, payload[4:8], "big" if payload[1] == 0 else "little")
     try:
         raw = typestore().deserialize_cdr(payload, model.ros_type)
     except (
@@ -91,6 +94,27 @@ def decode(model: type[M], payload: bytes) -> M:
             f"{model.ros_type}: {len(payload)} bytes are no such message ({type(error).__name__}: {error})"
         ) from error
     return validated(model, raw)
+
+
+def check_first_sequence(model: type[Message], length: bytes, order: Literal["big", "little"]) -> None:
+    """Refuse a message that begins with a longer sequence than its type allows, before it is read.
+
+    `length`: its first four bytes, in byte `order`. Raises MessageError.
+    """
+    field, most = _first_sequence(model)
+    if field and (count := int.from_bytes(length, order)) > most:
+        raise MessageError(f"{model.ros_type}: {count} {field}, allowed are at most {most} in one message")
+
+
+@cache
+def _first_sequence(model: type[Message]) -> tuple[str, int]:
+    """Return name and greatest length of the first field if that is a list of limited length."""
+    for name, field in model.model_fields.items():
+        for mark in field.metadata:
+            if isinstance(mark, MaxLen):
+                return name, mark.max_length
+        break
+    return "", 0
 
 
 def validated(model: type[M], raw: object) -> M:

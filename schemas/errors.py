@@ -10,6 +10,7 @@ TrocarError
 │   ├── ParticipantError   a participant raised, died or stopped answering
 │   └── StateError         a participant cannot save or restore its state
 ├── RecordingError         a recording cannot be written, read or re-simulated
+│   └── CutShortError      a recording has no end: `trocar recover` saves what is whole
 ├── MotionError            an arm cannot be or go where it was asked to
 ├── DeviceError            hardware, or the program that drives it, cannot be used now
 └── ConnectError           no hub, or not the hub that was asked for
@@ -22,6 +23,7 @@ from collections.abc import Iterable
 
 __all__ = [
     "ConnectError",
+    "CutShortError",
     "DeviceError",
     "LateError",
     "MessageError",
@@ -95,6 +97,10 @@ class StateError(SessionError):
 
 class RecordingError(TrocarError):
     """A recording cannot be written, read or re-simulated."""
+
+
+class CutShortError(RecordingError):
+    """A recording has no end: its writer was killed, or the disk was full."""
 
 
 class MotionError(TrocarError):

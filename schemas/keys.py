@@ -56,6 +56,10 @@ class Keys:
         """
         return f"{self.prefix}/engine/{participant}/signals/{reader}"
 
+    def view(self, participant: str, port: str) -> str:
+        """Key of what pages see of an output; nothing waits for them."""
+        return f"{self.prefix}/engine/{participant}/view/{port}"
+
     def uses(self, device: str, participant: str) -> str:
         """Key on which a wall-clock device publishes which signals of a participant it uses."""
         return f"{self.prefix}/device/{device}/uses/{participant}"

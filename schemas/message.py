@@ -6,18 +6,20 @@ from it. Numbers must be finite: a NaN never leaves or enters a simulation.
 
 from __future__ import annotations
 
+import struct
 from functools import partial
-from typing import Annotated, Any, ClassVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, cast, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 __all__ = [
     "Bool",
     "Byte",
     "Bytes",
+    "Float32",
     "Float32Array",
     "Float64",
     "Float64Array",
@@ -35,6 +37,8 @@ __all__ = [
     "fixed_float64",
     "msg_text",
 ]
+
+_SINGLE = struct.Struct("<f")
 
 
 class RosType:
@@ -81,7 +85,16 @@ class RosType:
         return array
 
 
+def _single(value: float) -> float:
+    """Round to single precision, so that a message is what arrives of it."""
+    try:
+        return cast("float", _SINGLE.unpack(_SINGLE.pack(value))[0])
+    except OverflowError:
+        raise ValueError(f"{value:g} is beyond the range of float32") from None
+
+
 Float64 = Annotated[float, Field(allow_inf_nan=False), RosType("float64")]
+Float32 = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_single), RosType("float32")]
 Bool = Annotated[bool, RosType("bool")]
 # ROS 2 has eight bits, of which rosbags takes the eighth for a sign
 Byte = Annotated[int, Field(ge=0, lt=2**7), RosType("byte")]

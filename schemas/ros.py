@@ -49,6 +49,8 @@ __all__ = [
     "Point",
     "Pose",
     "PoseStamped",
+    "PoseWithCovariance",
+    "PoseWithCovarianceStamped",
     "Quaternion",
     "QuaternionStamped",
     "RegionOfInterest",
@@ -194,6 +196,24 @@ class PoseStamped(Message):
     ros_type: ClassVar[str] = "geometry_msgs/msg/PoseStamped"
     header: Header = Header()
     pose: Pose = Pose()
+
+
+class PoseWithCovariance(Message):
+    """A pose and the covariance of x, y, z (m) and of rotations about the frame's x, y, z (rad), 6 x 6."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/PoseWithCovariance"
+    pose: Pose = Pose()
+    covariance: Annotated[NDArray[np.float64], fixed_float64(36)] = Field(
+        default_factory=lambda: np.zeros(36)
+    )
+
+
+class PoseWithCovarianceStamped(Message):
+    """A pose with its covariance in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    header: Header = Header()
+    pose: PoseWithCovariance = PoseWithCovariance()
 
 
 class QuaternionStamped(Message):

@@ -13,9 +13,11 @@ from schemas.message import (
     Float32Array,
     Float64,
     Float64Array,
+    Int32Array,
     Int64,
     Message,
     String,
+    StringArray,
     UInt32,
     UInt32Array,
     UInt64,
@@ -45,6 +47,7 @@ __all__ = [
     "ScoreCard",
     "ScoreValue",
     "SessionStatus",
+    "ShownMarkers",
     "SoftBodyState",
     "TaskEvent",
     "TissueGrasp",
@@ -154,6 +157,42 @@ class SoftBodyState(Message):
     """
 
 
+class ShownMarkers(Message):
+    """All markers of a scene at a time, as arrays: what a camera draws without asking what came before.
+
+    One that moves with its frame is in that frame, any other in `world`. m, quaternions (x, y, z, w), colours
+    (r, g, b, a) from 0 to 1.
+    """
+
+    ros_type: ClassVar[str] = "trocar_msgs/msg/ShownMarkers"
+    header: Header
+    """The stamp is of the last change."""
+    namespaces: StringArray = Field(default_factory=list[str])
+    """With the id, the name of each of the n markers."""
+    ids: Int32Array = Field(default_factory=lambda: np.zeros(0, np.int32))
+    types: Bytes = Field(default_factory=lambda: np.zeros(0, np.uint8))
+    """As in visualization_msgs/Marker."""
+    frames: StringArray = Field(default_factory=list[str])
+    poses: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Seven numbers each: position, quaternion."""
+    scales_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """Three numbers each."""
+    colors: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
+    """Four numbers each."""
+    expires_ns: UInt64Array = Field(default_factory=lambda: np.zeros(0, np.uint64))
+    """Simulated time from which on each is gone; 0: it stays."""
+    texts: StringArray = Field(default_factory=list[str])
+    """Of each: what is written, or the object whose shape it has."""
+    point_counts: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """How many of the points each has."""
+    points_m: Float64Array = Field(default_factory=lambda: np.zeros(0))
+    """x, y, z in the markers' own frames, one marker after the other."""
+    color_counts: UInt32Array = Field(default_factory=lambda: np.zeros(0, np.uint32))
+    """How many of the points' colours each has: as many as points, or none."""
+    point_colors: Float32Array = Field(default_factory=lambda: np.zeros(0, np.float32))
+    """Four numbers for each point with a colour of its own."""
+
+
 class TissueGrasp(Message):
     """An instrument has taken hold of tissue, or has lost it."""
 
@@ -175,7 +214,8 @@ class TaskEvent(Message):
     header: Header
     event: String
     """`grasped`, `lifted`, `handed over`, `placed`, `dropped`, `out of workspace`, `out of view` or
-    `collision`.
+    `collision`; of a needle in a phantom also `entered`, `exited`, `stitched` (or, from the tissue itself,
+    `pulled out`) and `withdrawn`.
     """
     object: String = ""
     """The object of which it is; empty: none."""

@@ -224,10 +224,16 @@ class VectorCodec:
 
     def checked(self, value: Vector) -> Vector:
         """Return `value` if it is valid: float64 of the right shape, finite, any quaternion a unit one."""
-        if value.shape != (self.size,) or value.dtype != np.float64:
+        try:
+            fits = value.shape == (self.size,) and value.dtype == np.float64
+        except AttributeError:  # no array
+            fits = False
+        if not fits:
+            is_array = hasattr(value, "dtype") and hasattr(value, "shape")
+            what = f"{value.dtype} of shape {value.shape}" if is_array else f"a {type(value).__name__}"
             raise MessageError(
-                f"port '{self.port.name}': {value.dtype} of shape {value.shape}, expected float64 of shape"
-                f" ({self.size},)"
+                f"port '{self.port.name}': {what}, expected float64 of shape ({self.size},)"
+                + ("" if is_array else ": numpy.array([...], float)")
             )
         if 0 in np.isfinite(value).tobytes():  # a third of the cost of np.isfinite(...).all()
             raise MessageError(f"port '{self.port.name}': not all of {value} are finite")

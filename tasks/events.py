@@ -7,7 +7,18 @@ from typing import Literal, NamedTuple
 __all__ = ["Event", "EventKind"]
 
 EventKind = Literal[
-    "grasped", "lifted", "handed over", "placed", "dropped", "out of workspace", "out of view", "collision"
+    "grasped",
+    "lifted",
+    "handed over",
+    "placed",
+    "dropped",
+    "out of workspace",
+    "out of view",
+    "collision",
+    "entered",
+    "exited",
+    "stitched",
+    "withdrawn",
 ]
 
 

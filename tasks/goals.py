@@ -27,8 +27,6 @@ class Goals:
     """Of each object: the places where it belongs."""
     hand_over: bool = False
     """On its way, each object has to be handed over."""
-    legs: int = 1
-    """1: all objects to their targets; 2: and back."""
 
 
 class LegsState(Record):

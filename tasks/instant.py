@@ -19,7 +19,7 @@ from schemas.vectors import Vector
 from tasks.params import TaskParams
 from tasks.view import Frustum, optical_in_tip
 
-__all__ = ["Instant", "Reader", "Watched"]
+__all__ = ["Instant", "Reader", "Watched", "base_pose"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ class Watched:
     """Of each arm, whether its teleoperation is."""
     tools: bool
     """Whether the impulse between instruments is."""
+    fixtures: bool | None
+    """Whether that between instruments and fixtures is; None: the scene has no fixtures."""
     camera: bool
     """Whether there is an endoscope, and its pose is connected."""
 
@@ -72,6 +74,12 @@ class Instant:
     """Index of the arm that holds each object, -1: none."""
     impulse: float = 0.0
     """Of all contacts between instruments since the start, N s."""
+    fixture_impulse: float = 0.0
+    """Of all contacts between instruments and fixtures since the start, N s."""
+    estimate: Vector = field(init=False)
+    """Of a needle's pose, by a tracker: position, m, and quaternion, shape (7,)."""
+    reported: bool = False
+    """Whether something has been reported as done since the last instant."""
     tips_seen: NDArray[np.bool_] = field(init=False)
     """By the endoscope, shape (m,)."""
     things_seen: NDArray[np.bool_] = field(init=False)
@@ -82,6 +90,7 @@ class Instant:
         self.tips, self.turns, self.velocities = np.zeros((m, 3)), np.zeros((m, 4)), np.zeros((m, 3))
         self.jerks, self.speeds, self.forces = np.zeros((m, 3)), [0.0] * m, [0.0] * m
         self.hands, self.poses, self.holders = [()] * m, np.zeros((n, 7)), [-1] * n
+        self.estimate = np.array([*(0.0,) * 6, 1.0])
         self.tips_seen, self.things_seen = np.ones(m, bool), np.ones(n, bool)
 
 
@@ -100,13 +109,14 @@ class Reader:
             forces=tuple(not connected.isdisjoint(_wrenches(arm)) for arm in arms),
             hands=tuple(f"{arm}/following" in connected for arm in arms),
             tools="tools/impulse" in connected,
+            fixtures="fixtures/impulse" in connected if params.fixtures else None,
             camera=ecm is not None and f"{ecm}/measured_cp" in connected,
         )
-        self._bases = [_base(params, arm) for arm in params.psms]
+        self._bases = [base_pose(params, arm) for arm in params.psms]
         self._numbers = {int(arm[-1]): i for i, arm in enumerate(arms)}
         self._ecm = ecm if self.watched.camera else None
         if ecm is not None:
-            self._view_base, mounted = _base(params, ecm), cast("MountedEcm", params.arms[ecm])
+            self._view_base, mounted = base_pose(params, ecm), cast("MountedEcm", params.arms[ecm])
             self._optical_in_tip = optical_in_tip(mounted)
             self._frustum = Frustum(params.camera, params.near, params.far)
 
@@ -126,6 +136,8 @@ class Reader:
             now.poses[i] = inputs[f"{thing}/pose"]
             now.holders[i] = self._numbers.get(round(float(inputs[f"{thing}/held_by"][0])), -1)
         now.impulse = float(inputs["tools/impulse"][0])
+        if watched.fixtures:
+            now.fixture_impulse = float(inputs["fixtures/impulse"][0])
         if self._ecm is not None:
             self._look(inputs[f"{self._ecm}/measured_cp"], now)
 
@@ -141,7 +153,7 @@ def _wrenches(arm: str) -> tuple[str, str]:
     return f"{arm}/tip_wrench", f"{arm}/rigid_wrench"
 
 
-def _base(params: TaskParams, arm: CartArm) -> Vector:
+def base_pose(params: TaskParams, arm: CartArm) -> Vector:
     """Return the pose of `<arm>_base` in the world, shape (4, 4)."""
     if params.mounting == "cart":
         positions = params.setup_joints.get(arm, setup_joints.SIMULATED[arm])

@@ -12,7 +12,7 @@ from tasks.events import Event
 from tasks.instant import Instant
 from tasks.params import TaskParams
 
-__all__ = ["Things"]
+__all__ = ["CONTACT_GAP", "Things"]
 
 _REST_SPEED = 5e-3
 """m/s; a released object that is slower lies still."""
@@ -20,7 +20,7 @@ _REST_TIME = 0.1
 """s; for so long, or it has only turned round."""
 _FALL_TIME = 1.0
 """s after its release an object that rolls on has been dropped all the same."""
-_CONTACT_GAP = 0.1
+CONTACT_GAP = 0.1
 """s; instruments that touch again within this time have not parted."""
 
 
@@ -45,7 +45,7 @@ class ThingsState(Record):
     unseen = array("objects")
     impulse = number()
     """Between instruments, N s."""
-    contact_gap = number(_CONTACT_GAP)
+    contact_gap = number(CONTACT_GAP)
     """Time since instruments touched, s."""
 
 
@@ -138,6 +138,6 @@ class Things:
         state, more = self.state, now.impulse - self.state.impulse
         state.contact_gap += now.period_s
         if more > 0.0:
-            if state.contact_gap >= _CONTACT_GAP:
+            if state.contact_gap >= CONTACT_GAP:
                 yield Event("collision", value=more, unit="N*s")
             state.contact_gap, state.impulse = 0.0, now.impulse

@@ -16,6 +16,7 @@ from robots.dvrk.endoscope import StereoCamera
 from robots.dvrk.mounted import MountedArms, MountedEcm, MountedPsm
 from robots.dvrk.parameters import SetupPositions
 from robots.dvrk.setup_joints import CartArm
+from robots.training.fixtures import FixtureParams
 from schemas.quantity import Angle, Duration, Force, Length, Speed
 
 __all__ = ["TaskParams"]
@@ -37,7 +38,12 @@ class TaskParams(Params):
     objects: dict[str, Any] = Field(
         default_factory=dict[str, Any], description="as in the scene: the task watches those of its names"
     )
-    rules: tuple[str, ...] = Field(default=(), description="by which the card scores; default: all there are")
+    fixtures: dict[str, FixtureParams] = Field(
+        default_factory=dict[str, FixtureParams], description="as in the scene: boards and dishes"
+    )
+    rules: tuple[str, ...] = Field(
+        default=(), description="by which the card scores; default: all that apply"
+    )
     benchmarks: dict[str, float] = Field(
         default_factory=dict[str, float],
         description=(

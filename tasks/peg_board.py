@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots import rotation
-from robots.training.fixtures import BoardParams, FixtureParams
+from robots.training.fixtures import BoardParams
 from schemas.vectors import Vector
 from tasks.goals import Goals
 from tasks.params import TaskParams
@@ -26,8 +26,11 @@ _UPRIGHT = 0.7
 class PegBoardParams(TaskParams):
     """Which board, and what of its rules the task itself asks for."""
 
-    fixtures: dict[str, FixtureParams] = Field(description="as in the scene: one of them is the board")
-    legs: Literal[1, 2] = Field(default=1, description="1: all rings over the board; 2: and back")
+    legs: int | None = Field(
+        default=1,
+        ge=1,
+        description="1: all rings over the board; 2: and back, ...; null: until the session ends",
+    )
     hand_over: bool | None = Field(
         default=None,
         description=(
@@ -83,8 +86,12 @@ class PegBoardTask(Task):
             starts=(starts,) * count,
             targets=(targets,) * count,
             hand_over=self._hand_over,
-            legs=self._leg_count,
         )
+
+    @property
+    def goal_count(self) -> int:
+        """One for each ring and leg; 0 if it goes on until the session ends."""
+        return len(self.things) * (self._leg_count or 0)
 
     @property
     def workspace(self) -> Vector:

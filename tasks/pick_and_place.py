@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from hub.participant import Params
 from robots.training.dishes import DISH
-from robots.training.fixtures import DishParams, FixtureParams
+from robots.training.fixtures import DishParams
 from schemas.errors import did_you_mean
 from schemas.vectors import Vector
 from tasks.goals import Goals
@@ -25,7 +25,6 @@ _MARGIN, _BELOW, _ABOVE = 0.05, 0.01, 0.15
 class PickAndPlaceParams(TaskParams):
     """Which piece belongs in which dish."""
 
-    fixtures: dict[str, FixtureParams] = Field(description="as in the scene: the dishes among them")
     goals: dict[str, str] = Field(
         min_length=1, description="of each piece the dish where it belongs: `{piece1: left, ...}`"
     )

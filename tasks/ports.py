@@ -58,13 +58,19 @@ def _inputs(params: TaskParams) -> Iterator[Port]:
             type=_NUMBER,
             description="number of the PSM that holds it, 0: none",
         )
-    yield Port(
-        name="tools/impulse",
+    yield _impulse("tools", "between instruments of different arms")
+    if params.fixtures:
+        yield _impulse("fixtures", "between instruments and boards, posts, walls and dishes")
+
+
+def _impulse(what: str, between: str) -> Port:
+    return Port(
+        name=f"{what}/impulse",
         causality="input",
         type=_NUMBER,
         unit="N*s",
         start=(0.0,),
-        description="of all contacts between instruments of different arms since the start",
+        description=f"of all contacts {between} since the start",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,11 +17,12 @@ from tasks.events import Event
 from tasks.goals import Goals, Legs
 from tasks.instant import Instant, Reader
 from tasks.metrics import make_metrics
+from tasks.metrics.metric import AnyMetric
 from tasks.metrics.smoothing import Smoothing
 from tasks.objects import Things
 from tasks.params import TaskParams
 from tasks.ports import task_ports
-from tasks.rules import RULES, Setting
+from tasks.rules import GENERAL, RULES, Setting, Suture
 
 __all__ = ["Task"]
 
@@ -55,6 +56,8 @@ class Task(Controller):
     """On the score card."""
     is_board: ClassVar[bool] = False
     """Whether the rules of peg boards apply."""
+    default_rules: ClassVar[tuple[str, ...]] = GENERAL
+    """Those on the card unless the parameters name others."""
 
     def __init__(self, name: str, params: TaskParams) -> None:
         super().__init__(name, params)
@@ -70,7 +73,7 @@ class Task(Controller):
     @property
     def goal_count(self) -> int:
         """How many events have to reach a goal until the task is done."""
-        return len(self.things) * self.goals.legs
+        return len(self.things)
 
     @property
     def workspace(self) -> Vector | None:
@@ -80,6 +83,23 @@ class Task(Controller):
     def place_of(self, thing: int, pose: Vector) -> int:  # noqa: ARG002
         """Return the index of the place at which object `thing` lies at `pose`, shape (7,); -1: none."""
         return -1
+
+    @property
+    def suture(self) -> Suture | None:
+        """Of a task in which a needle goes through a phantom: what rules know of it."""
+        return None
+
+    @property
+    def more_metrics(self) -> tuple[AnyMetric, ...]:
+        """Metrics of this task alone."""
+        return ()
+
+    def observe(self, inputs: Inputs, now: Instant) -> None:
+        """Read inputs that only this task has, at the beginning of a step."""
+
+    def more_events(self, now: Instant) -> Iterable[Event]:  # noqa: ARG002
+        """Return events that only this task has, after those of the objects."""
+        return ()
 
     def reaches(self, event: Event) -> bool:
         """Say whether a goal is reached by `event`; called once for each event, in order."""
@@ -103,8 +123,11 @@ class Task(Controller):
         self._events = Things(len(watched.things), params, box, self.place_of)
         self._legs = Legs(goals, hand_over=goals.hand_over) if goals.targets else None
         self._time, self._metrics = make_metrics(params, watched)
-        setting = Setting(watched.things, goals, self.is_board, watched.camera, params.benchmarks)
-        self._rules = [RULES[name](setting) for name in params.rules or RULES]
+        self._metrics = (*self._metrics, *self.more_metrics)
+        setting = Setting(
+            watched.things, goals, self.is_board, watched.camera, params.benchmarks, self.suture
+        )
+        self._rules = [RULES[name](setting) for name in params.rules or self.default_rules]
         self._state = TaskState()
         self.keep(*self._records())
         self._outputs: dict[str, Any] = {
@@ -118,7 +141,7 @@ class Task(Controller):
     def _check_names(self) -> None:
         """Raise ScenarioError if there are no such rules, or no metric of a benchmark."""
         _, metrics = make_metrics(self.params, Reader(self.params, frozenset()).watched)
-        names = {value.name for metric in metrics for value in metric.values()}
+        names = {value.name for metric in (*metrics, *self.more_metrics) for value in metric.values()}
         wanted = [("rules", i, name, RULES) for i, name in enumerate(self.params.rules)]
         wanted += [("benchmarks", name, name, names) for name in self.params.benchmarks]
         for part, key, name, known in wanted:
@@ -142,12 +165,13 @@ class Task(Controller):
         """Watch what has happened until `t + h`."""
         now, state = self._now, self._state
         self._reader.read(inputs, now)
+        self.observe(inputs, now)
         now.time_s = (t + h) / 1e9
         if not state.begun:
             state.begun = True
             self._events.start(now)
         self._smoothing.take(now)
-        events = tuple(self._events.take(now))
+        events = (*self._events.take(now), *self.more_events(now))
         if not state.done[0]:
             for metric in self._metrics:
                 metric.take(now, events)

@@ -21,6 +21,7 @@ names = st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,8}", fullmatch=True)
 
 _SCALARS: dict[str, st.SearchStrategy[Any]] = {
     "float64": finite,
+    "float32": st.floats(width=32, allow_nan=False, allow_infinity=False),
     "bool": st.booleans(),
     "byte": st.integers(0, 2**7 - 1),
     "string": texts,

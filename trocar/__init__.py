@@ -7,12 +7,14 @@
     joints.time, joints["position"]     # (n,) s of simulated time, (n, 6) rad and m
 
 What is in `__all__` here, in `trocar.messages` (ROS 2 messages), in `trocar.quantities` (parameters with
-units), in `trocar.records` (state with named fields) and in `trocar.tasks` (training tasks) is public. All
-other modules of the distribution (`schemas`, `robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`,
-`learning`, `configs`) are private: they may change in any release. `python -m trocar` is the command line.
+units), in `trocar.records` (state with named fields) and in `trocar.tasks` (training tasks) is public, and so
+is `learning.environments` (environments for Gymnasium). All other modules of the distribution (`schemas`,
+`robots`, `hub`, `engines`, `controllers`, `devices`, `tasks`, `learning`, `configs`) are private: they may
+change in any release. `python -m trocar` is the command line.
 
-Sessions          `run`, `verify`, `load_scenario`, `run_in_process`
-Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `write_bag` for samples to play
+Sessions          `run`, `verify`, `fork`, `load_scenario`, `run_in_process`, `SteppedSession`
+Results           `Recording`, `Series`, `Summary`, `VerifySummary`; `recover` for a recording that was cut
+                  short; `write_bag` for samples to play
 Participants      `Stepped`, `Controller`, `Device`, `Params`, `Setup`, `Port`, `Inputs`, `Outputs`,
                   `Sample`, `Value`, `state_hash`, `restore_arrays`
 Power bonds       `BondSide`, `BondPlan`, `ForceSide`, `MotionSide`
@@ -47,15 +49,17 @@ if TYPE_CHECKING:
         state_hash,
     )
     from hub.recording.recording import Recording
+    from hub.recording.recover import recover
     from hub.recording.ros_bag_writer import write_bag
     from hub.recording.series import Series
+    from hub.session.stepped_session import SteppedSession
     from hub.testing import check_device, check_engine, run_in_process
     from hub.verify import VerifySummary
     from robots.dvrk.arms import chain
     from robots.dvrk.inverse import inverse
     from schemas.errors import TrocarError
     from schemas.ports import BondSide, Port
-    from trocar.sessions import load_scenario, run, verify
+    from trocar.sessions import fork, load_scenario, run, verify
 
 __all__ = [
     "BondPlan",
@@ -73,6 +77,7 @@ __all__ = [
     "Series",
     "Setup",
     "Stepped",
+    "SteppedSession",
     "Summary",
     "TrocarError",
     "Value",
@@ -80,8 +85,10 @@ __all__ = [
     "chain",
     "check_device",
     "check_engine",
+    "fork",
     "inverse",
     "load_scenario",
+    "recover",
     "restore_arrays",
     "run",
     "run_in_process",
@@ -110,14 +117,16 @@ _MODULES = {
     ),
     "hub.recording.ros_bag_writer": ("write_bag",),
     "hub.recording.recording": ("Recording",),
+    "hub.recording.recover": ("recover",),
     "hub.recording.series": ("Series",),
+    "hub.session.stepped_session": ("SteppedSession",),
     "hub.testing": ("check_device", "check_engine", "run_in_process"),
     "hub.verify": ("VerifySummary",),
     "robots.dvrk.arms": ("chain",),
     "robots.dvrk.inverse": ("inverse",),
     "schemas.errors": ("TrocarError",),
     "schemas.ports": ("BondSide", "Port"),
-    "trocar.sessions": ("load_scenario", "run", "verify"),
+    "trocar.sessions": ("fork", "load_scenario", "run", "verify"),
 }
 _ORIGINS = {name: module for module, names in _MODULES.items() for name in names}
 

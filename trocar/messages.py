@@ -13,8 +13,24 @@ from schemas.crtk import *  # noqa: F403  (its __all__)
 from schemas.message import Message
 from schemas.ros import *  # noqa: F403
 from schemas.trocar_msgs import *  # noqa: F403
+from schemas.visualization import (
+    ColorRGBA,
+    DurationMessage,
+    Marker,
+    MarkerArray,
+    MeshFile,
+    UVCoordinate,
+)
 
-__all__ = ["Message"]
+__all__ = [
+    "ColorRGBA",
+    "DurationMessage",
+    "Marker",
+    "MarkerArray",
+    "MeshFile",
+    "Message",
+    "UVCoordinate",
+]
 __all__ += crtk.__all__
 __all__ += ros.__all__
 __all__ += trocar_msgs.__all__

@@ -19,6 +19,7 @@ _LATE = {name: value for name, value in os.environ.items() if _environment.get(n
 if "numpy" not in sys.modules:
     _LATE.clear()
 
+from hub.fork import Fork  # noqa: E402
 from hub.observation.summary import Progress, Summary  # noqa: E402
 from hub.planning.scenario_file import ScenarioFile, load, located  # noqa: E402
 from hub.recording.recording import Recording  # noqa: E402
@@ -27,7 +28,7 @@ from hub.verify import VerifySummary  # noqa: E402
 from hub.verify import verify as resimulate  # noqa: E402
 from schemas.errors import ScenarioError  # noqa: E402
 
-__all__ = ["load_scenario", "run", "verify"]
+__all__ = ["fork", "load_scenario", "run", "verify"]
 
 log = logging.getLogger(__name__)
 
@@ -49,11 +50,14 @@ def load_scenario(
     Raises:
         ScenarioError: The scenario is not valid; one line for each problem, with file, line and column.
     """
-    overrides = [
+    return load(str(scenario), _overrides(set))
+
+
+def _overrides(values: Mapping[str, Any] | None) -> list[str]:
+    return [
         f"{path}={value if isinstance(value, str) else json.dumps(value, default=str)}"
-        for path, value in (set or {}).items()
+        for path, value in (values or {}).items()
     ]
-    return load(str(scenario), overrides)
 
 
 def run(
@@ -122,6 +126,55 @@ def verify(
     opened = recording if isinstance(recording, Recording) else Recording(Path(recording))
     start = None if directory is None else Path(directory)
     return resimulate(opened, trust=trust, directory=start, progress=progress)
+
+
+def fork(
+    recording: str | Path | Recording,
+    at: float,
+    *,
+    record: str | Path | None = None,
+    set: Mapping[str, Any] | None = None,  # noqa: A002  (the word of the command line)
+    trust: bool = False,
+    directory: str | Path | None = None,
+    one_host: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> Summary:
+    """Go on from an instant of a recording and return the summary of the whole. Call it in the main thread.
+
+        trocar.fork("recordings/table", 4.0, set={"teleop.scale": 0.1}, record="recordings/slower")
+
+    Up to the instant all is simulated again, and every state hash compared; then the devices of the scenario
+    lead. The fork's own recording is complete in itself.
+
+    Args:
+        recording: A recording, or the path of its directory or MCAP file.
+        at: Simulated time, s; it is rounded down to a communication point.
+        record: A new directory for the fork's recording.
+        set: What changes there, as in `load_scenario`: devices, pace, duration, measures, and parameters of
+            engines and controllers that can save their state.
+        trust: As in `verify`.
+        directory: As in `verify`.
+        one_host: Run every participant in this process.
+        progress: Is called several times a second of wall time.
+
+    Raises:
+        ScenarioError: A change that is not valid, or not possible in a session that runs.
+        RecordingError: Not a recording of a session, or one without this instant.
+        TrustError: It asks for what `trust` allows; the message lists it.
+        SessionError: The session failed, or its past has other state hashes than the recording.
+    """
+    _warn_of_other_bits()
+    opened = recording if isinstance(recording, Recording) else Recording(Path(recording))
+    made = Fork(
+        opened,
+        round(at * 1e9),
+        _overrides(set),
+        record=None if record is None else Path(record),
+        trust=trust,
+        directory=None if directory is None else Path(directory),
+        one_host=one_host,
+    )
+    return made.run(progress)
 
 
 def _warn_of_other_bits() -> None:

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, ClassVar, cast
 
-from controllers.expert.chores import Chore, PegBoard, PickAndPlace
+import numpy as np
+
+from controllers.expert.chores import Chore
+from controllers.expert.dishes import PickAndPlace
 from controllers.expert.hand import Hand, Phase, framed
 from controllers.expert.params import ExpertParams
-from controllers.expert.ports import EVENTS, expert_ports
-from controllers.expert.transfer import Progress, Role, Seen, Transfer
+from controllers.expert.ports import EVENTS, PROGRESS, expert_ports
+from controllers.expert.posts import PegBoard
+from controllers.expert.progress import Progress, Seen, Verdict
+from controllers.expert.team import Team
+from controllers.expert.transfer import Transfer
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams, PsmParams
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
+from robots.dvrk.parameters import ArmName
 from robots.training.fixtures import DishParams
 from schemas.errors import SessionError
 from schemas.ports import Port
 from schemas.ros import StringMessage
 
 __all__ = ["Expert"]
+
+_VERDICTS = {
+    Verdict.NOT_REACHABLE: "is not reachable",
+    Verdict.LOST: "has fallen off the table",
+    Verdict.BLOCKED: "is blocked: jaws have closed on it too often",
+}
 
 
 class Expert(Controller):
@@ -28,77 +42,121 @@ class Expert(Controller):
 
     def __init__(self, name: str, params: ExpertParams) -> None:
         super().__init__(name, params)
-        self._chore = _chore(params)
-        self._progress, self._seen = Progress(), Seen(n=len(self._chore.things))
-        self._transfers = self._hands()
-        self.keep(self._progress, self._seen, *(each.state for each in self._transfers))
-        self._outputs: dict[str, Any] = {
-            field: self._progress.part(field) for field in ("done", "placed", "attempts", "dropped")
-        }
-        self._outputs |= {f"{each.hand.arm}/phase": each.state.part("phase") for each in self._transfers}
+        chore = self._chore = _chore(params)
+        self._progress, self._seen = Progress(), Seen(n=len(chore.things))
+        self._team = Team(chore, self._seen, self._progress, hand_over=params.hand_over)
+        for arm in params.hands:
+            self._team.add(Transfer(self._hand(arm), self._team, len(chore.things)))
+        self.keep(
+            self._progress,
+            self._seen,
+            *(part for each in self._team.hands for part in (each.state, each.refusals)),
+        )
+        self._outputs: dict[str, Any] = {field: self._progress.part(field) for field in PROGRESS}
+        self._outputs |= {f"{each.hand.arm}/phase": each.state.part("phase") for each in self._team.hands}
 
-    def _hands(self) -> list[Transfer]:
+    def _hand(self, arm: ArmName) -> Hand:
         params = self.params
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        roles: tuple[Role, ...] = ("taker", "giver") if params.hand_over else ("alone", "alone")
-        transfers = list[Transfer]()
-        for arm, role in zip(params.hands, roles, strict=False):
-            held = cast("PsmParams", params.arms.driven[arm])
-            if held.tool.jaw is None:
-                raise SessionError(f"expert '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
-            hand = Hand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
-            transfers.append(Transfer(hand, role, self._chore, self._seen, self._progress))
-        if len(transfers) == 2:
-            transfers[0].other, transfers[1].other = transfers[1], transfers[0]
-        return transfers
+        held = cast("PsmParams", params.arms.driven[arm])
+        if held.tool.jaw is None:
+            raise SessionError(f"expert '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
+        return Hand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Measured tips and jaws and the things' poses and holders in; commands and progress out."""
-        return expert_ports([each.hand.arm for each in self._transfers], self._chore.things)
+        return expert_ports([each.hand.arm for each in self._team.hands], self._chore.things)
 
     @property
     def ended(self) -> str:
-        """Ends the session once all is where it belongs and the hands are idle."""
-        return "the task is done" if self._progress.done and self.params.end else ""
+        """Ends the session once all is where it belongs, or nothing more can be done."""
+        if not self.params.end or not self._progress.over:
+            return ""
+        return "the task is done" if self._progress.done else f"nothing more can be done: {self._left()}"
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""
-        for each in self._transfers:
+        for each in self._team.hands:
             each.hand.period = setup.period_ns * 1e-9
             self._outputs |= {f"{each.hand.arm}/servo_cp": (), f"{each.hand.arm}/jaw/move_jp": ()}
+        self._outputs["status"] = ()
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Read what is measured, let every hand do what comes next, and send the commands.
 
-        Raises SessionError if a command is refused.
+        Raises SessionError if a command to a hand that carries something is refused.
         """
+        hands = self._team.hands
         self._sense(inputs)
-        for each in self._transfers:
+        for each in hands:
             if t == 0:
                 each.hand.stay()
             each.step()
-        for each in self._transfers:
+        for each in hands:
             arm = each.hand.arm
             self._outputs[f"{arm}/servo_cp"] = (each.hand.advance(settle=each.settles),)
             self._outputs[f"{arm}/jaw/move_jp"] = each.hand.jaw_commands()
-        poses, idle = self._seen.poses, all(each.state.phase is Phase.IDLE for each in self._transfers)
-        self._progress.placed = sum(self._chore.is_done(i, poses) for i in range(len(poses)))
-        self._progress.done = self._progress.done or (idle and self._progress.placed == len(poses))
+        self._judge()
         return self._outputs
 
+    def _judge(self) -> None:
+        """See how far the task is, begin the next leg where one is over, and say what is left."""
+        team, progress, seen = self._team, self._progress, self._seen
+        team.judge()
+        verdicts = seen.verdicts.tolist()
+        progress.not_reachable = verdicts.count(Verdict.NOT_REACHABLE)
+        progress.lost, progress.blocked = verdicts.count(Verdict.LOST), verdicts.count(Verdict.BLOCKED)
+        if not progress.over:
+            done = [team.is_done(thing) for thing in range(len(verdicts))]
+            progress.placed = sum(done)
+            settled = all(is_done or verdict for is_done, verdict in zip(done, verdicts, strict=True))
+            if settled and all(each.state.phase is Phase.IDLE for each in team.hands):
+                self._end_leg()
+        self._outputs["status"] = tuple(self._news())
+
+    def _end_leg(self) -> None:
+        progress, seen = self._progress, self._seen
+        legs, is_whole = self.params.legs, progress.placed == len(seen.tries)
+        seen.tries[:] = 0.0
+        if progress.placed and (legs is None or progress.leg + 1 < legs):
+            progress.leg += 1
+            seen.verdicts[seen.verdicts == Verdict.BLOCKED] = Verdict.NONE
+        else:
+            progress.over, progress.done = True, is_whole
+
+    def _news(self) -> Iterator[StringMessage]:
+        """Yield a sentence on each thing of which the verdict is new."""
+        seen = self._seen
+        for thing in np.flatnonzero(seen.verdicts != seen.said).tolist():
+            if seen.verdicts[thing]:
+                yield StringMessage(data=self._sentence(thing))
+        seen.said[:] = seen.verdicts
+
+    def _left(self) -> str:
+        return "; ".join(self._sentence(thing) for thing in np.flatnonzero(self._seen.verdicts).tolist())
+
+    def _sentence(self, thing: int) -> str:
+        seen = self._seen
+        why = _VERDICTS[Verdict(int(seen.verdicts[thing]))]
+        x, y, z = (1e3 * seen.poses[thing, :3, 3]).tolist()
+        return f"{self._chore.things[thing]} {why}, at ({x:.0f}, {y:.0f}, {z:.0f}) mm"
+
     def _sense(self, inputs: Inputs) -> None:
-        for each in self._transfers:
+        for each in self._team.hands:
             arm = each.hand.arm
             for event in EVENTS:
                 for message in inputs.events(f"{arm}/{event}"):
                     phase, text = each.state.phase.name.lower(), cast("StringMessage", message).data
-                    raise SessionError(f"expert '{self.name}', {arm} in phase '{phase}': {text}")
+                    if not each.refuse():
+                        raise SessionError(f"expert '{self.name}', {arm} in phase '{phase}': {text}")
             each.hand.sense(inputs[f"{arm}/local/measured_cp"], float(inputs[f"{arm}/jaw/measured_js"][0]))
         for i, thing in enumerate(self._chore.things):
-            self._seen.poses[i] = framed(inputs[f"objects/{thing}/pose"])
-            self._seen.holders[i] = inputs[f"objects/{thing}/held_by"][0]
+            holder = float(inputs[f"objects/{thing}/held_by"][0])
+            self._seen.take(
+                i, framed(inputs[f"objects/{thing}/pose"]), holder, self._team.hands[0].hand.period
+            )
 
 
 def _chore(params: ExpertParams) -> Chore:

@@ -1,4 +1,4 @@
-"""How a jaw may take hold of a thing from above.
+"""How a jaw may take hold of a thing that stands upright, or of a block in any attitude.
 
 A grasp is a pose of the tip, shape (4, 4), whose z points along the closed fingers and whose y is the way the
 left finger opens; the tip's origin is in the wrist yaw axis (robots.dvrk.instruments). Metres and radians,
@@ -16,7 +16,7 @@ from robots.training.boards import Ring
 from robots.training.dishes import PIECE
 from schemas.vectors import Vector
 
-__all__ = ["Grasps", "of_piece", "of_ring"]
+__all__ = ["AJAR", "FINGER", "FREE", "UPRIGHT", "Grasps", "of_piece", "of_ring"]
 
 _BITE = 1.0e-3
 """How far from the ends of the fingers the edges of a block touch them, m."""
@@ -28,58 +28,69 @@ _DEPTH = 5.0e-3
 """How deep the fingers reach into a ring, m."""
 _ASIDE = 3.5e-3
 """How far from the middle of a ring's wall they take it, m: away from the post, clear of the next wall."""
-_AJAR = 0.20
+AJAR = 0.20
 """Opening with which a jaw comes down on the wall of a ring, rad."""
-_FINGER = (1.4e-3, 2.1e-3)
+FINGER = (1.4e-3, 2.1e-3)
 """Thickness and half the width of a finger of a needle driver near its end, m (engines.mujoco.looks)."""
-_FREE = 0.3e-3
+FREE = 0.3e-3
 """Between the finger in a ring and the post, m."""
-_UPRIGHT = cos(0.35)
-"""Of the axis of a ring that can be taken by a wall."""
+UPRIGHT = cos(0.35)
+"""Height of the axis of a thing that need not be put upright, over its length."""
+_STEEP = 0.5
+"""The same of the face of a block through which fingers reach for it."""
 
 
 class Grasps(NamedTuple):
     """Ways to take hold of one thing."""
 
     poses: Vector
-    """Of the tip, shape (n, 4, 4); none where the thing cannot be taken from above."""
+    """Of the tip, shape (n, 4, 4); none where the thing cannot be taken."""
     opening: Vector
     """Of the jaw before it closes, rad, shape (n,)."""
     outwards: Vector
     """Horizontal direction from the thing's middle to the grasp, shape (n, 2), of length 1 or, amid it, 0."""
+    ups: Vector
+    """Axis of the thing that is upright, or is to be before it is put down, shape (n, 3), in the world."""
 
 
 def of_piece(pose: Vector, reach: float) -> Grasps:
-    """Return the grasps of a block lying or standing with `pose`, shape (4, 4).
+    """Return the grasps of a block with `pose`, shape (4, 4), through each of its faces that looks upwards.
 
-    The block's upper edges come between the fingers, which are a wedge as long as the jaw is open: `reach` is
+    The edges of that face come between the fingers, which are a wedge as long as the jaw is open: `reach` is
     their length. Either side that is narrow enough will do, and either finger on either side.
     """
     axes, half = pose[:3, :3], np.array(PIECE.size) / 2.0
-    up = int(np.abs(axes[2]).argmax())
-    top = pose[:3, 3] + [0.0, 0.0, np.abs(axes[2]) @ half]
-    poses, openings = list[Vector](), list[float]()
-    for side in range(3):
-        wedge = asin(min(1.0, half[side] / (reach - _BITE)))
-        over = half[side] / tan(wedge)
-        opening = 2.0 * atan2(half[side] + _ROOM, over)
-        if side == up or opening > _WIDEST:
+    poses, openings, ups = list[Vector](), list[float](), list[Vector]()
+    for face in range(3):
+        up = axes[:, face] * (1.0 if axes[2, face] > 0.0 else -1.0)
+        if up[2] < _STEEP:
             continue
-        turn = atan2(axes[1, side], axes[0, side])
-        for way in (0.0, pi):
-            poses.append(_downwards(top, over, turn + way))
-            openings.append(opening)
-    return _grasps(poses, openings, [(0.0, 0.0)] * len(poses))
+        top = pose[:3, 3] + half[face] * up
+        for side in (k for k in range(3) if k != face):
+            wedge = asin(min(1.0, half[side] / (reach - _BITE)))
+            over = half[side] / tan(wedge)
+            opening = 2.0 * atan2(half[side] + _ROOM, over)
+            if opening > _WIDEST:
+                continue
+            for way in (1.0, -1.0):
+                poses.append(_reaching(top + over * up, -up, way * axes[:, side]))
+                openings.append(opening)
+                ups.append(up)
+    return _grasps(poses, openings, [(0.0, 0.0)] * len(poses), ups)
 
 
 def of_ring(ring: Ring, pose: Vector, reach: float, post: tuple[Vector, float] | None) -> Grasps:
     """Return the grasps of an upright ring with `pose`, shape (4, 4): one finger in the hole, one outside.
 
+    None of a ring that leans by more than `UPRIGHT`: see controllers.expert.fallen_rings.
+
     `post`: the one it is around, if any: where it stands (x, y), m, and its radius, m.
     """
     poses, outwards = list[Vector](), list[tuple[float, float]]()
-    if abs(float(pose[2, 2])) < _UPRIGHT:
-        return _grasps([], [], [])
+    if abs(float(pose[2, 2])) < UPRIGHT:
+        return _grasps([], [], [], [])
+    up = pose[:3, 2] * (1.0 if pose[2, 2] > 0.0 else -1.0)
+    centre = pose[:3, 3] + ring.height / 2.0 * (up - [0.0, 0.0, 1.0])  # below the middle of its upper rim
     spin = atan2(pose[1, 1], pose[0, 1])  # of the corner on y
     middle, over = ring.inradius + ring.thickness / 2.0, ring.height / 2.0 + reach - _DEPTH
     for k in range(3):
@@ -87,21 +98,34 @@ def of_ring(ring: Ring, pose: Vector, reach: float, post: tuple[Vector, float] |
         axes = np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
         for aside in (-_ASIDE, _ASIDE):
             if post is not None:
-                inner = middle - reach * sin(_AJAR / 2.0) - _FINGER[0] / 2.0
-                off = np.abs(axes @ (post[0] - pose[:2, 3]) - [inner, aside]) - [_FINGER[0] / 2.0, _FINGER[1]]
-                if np.linalg.norm(np.maximum(off, 0.0)) < post[1] + _FREE:
+                inner = middle - reach * sin(AJAR / 2.0) - FINGER[0] / 2.0
+                off = np.abs(axes @ (post[0] - centre[:2]) - [inner, aside]) - [FINGER[0] / 2.0, FINGER[1]]
+                if np.linalg.norm(np.maximum(off, 0.0)) < post[1] + FREE:
                     continue
             away = np.array([middle, aside]) @ axes
             for way in (0.0, pi):
-                poses.append(_downwards(pose[:3, 3] + np.append(away, 0.0), over, turn + way))
+                poses.append(_downwards(centre + np.append(away, 0.0), over, turn + way))
                 outwards.append(tuple(away / sqrt(float(away @ away))))
-    return _grasps(poses, [_AJAR] * len(poses), outwards)
+    return _grasps(poses, [AJAR] * len(poses), outwards, [up] * len(poses))
 
 
-def _grasps(poses: list[Vector], openings: list[float], outwards: list[tuple[float, float]]) -> Grasps:
+def _grasps(
+    poses: list[Vector], openings: list[float], outwards: list[tuple[float, float]], ups: list[Vector]
+) -> Grasps:
     return Grasps(
-        np.array(poses).reshape(-1, 4, 4), np.array(openings), np.array(outwards, np.float64).reshape(-1, 2)
+        np.array(poses).reshape(-1, 4, 4),
+        np.array(openings),
+        np.array(outwards, np.float64).reshape(-1, 2),
+        np.array(ups).reshape(-1, 3),
     )
+
+
+def _reaching(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
+    """Return the tip's pose at `origin` (m), whose fingers point along and open across these unit vectors."""
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack([np.cross(opening, fingers), opening, fingers])
+    pose[:3, 3] = origin
+    return pose
 
 
 def _downwards(point: Vector, over: float, turn: float) -> Vector:

@@ -12,7 +12,7 @@ from math import sqrt
 
 import numpy as np
 
-from hub.participant import Record, array, choice, integer, number
+from hub.participant import Record, array, choice, flag, integer, number
 from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import base_frame
@@ -21,7 +21,7 @@ from robots.serial_chain import SerialChain
 from schemas.ros import Header, JointState, Point, Pose, PoseStamped, Quaternion
 from schemas.vectors import Vector
 
-__all__ = ["Hand", "HandState", "Phase", "framed", "pose_of"]
+__all__ = ["Hand", "HandState", "Phase", "Role", "framed", "pose_of"]
 
 _ACCELERATION, _TURN = 1.0, 12.0
 """Of a line: largest acceleration, m/s^2 and rad/s^2."""
@@ -33,6 +33,10 @@ _LEAST = 0.05
 """Shortest line, s."""
 _SETTLING, _MOST = 0.06, 4.0e-3
 """Time constant (s) with which what is missing is added, and the most of it, m."""
+_ACCURATE, _SETTLED = 0.2e-3, 0.05
+"""m and s: a tip has settled that has been so near to the end of its line for so long. A tip that only passes
+there goes on by 1 mm.
+"""
 
 
 class Phase(IntEnum):
@@ -51,12 +55,26 @@ class Phase(IntEnum):
     RETREAT = 10
     OFFER = 11
     TAKE = 12
+    REACH = 13
+    TURN = 14
+
+
+class Role(IntEnum):
+    """What a hand does with a thing."""
+
+    ALONE = 0
+    """It takes the thing and puts it down."""
+    GIVER = 1
+    """It takes the thing and gives it to the other hand."""
+    TAKER = 2
+    """It takes the thing from the other hand and puts it down."""
 
 
 class HandState(Record):
     """All of one hand that changes."""
 
     phase = choice(Phase.IDLE)
+    role = choice(Role.ALONE)
     thing = integer(-1)
     """Index of the object that it is after or carries; -1: none."""
     place = array(3)
@@ -67,12 +85,22 @@ class HandState(Record):
     """Pose of the tip where it takes hold."""
     opening = number()
     """Of the jaw before it closes, rad."""
+    leans = flag()
+    """Whether the thing has to be put upright, and the fingers do not point down."""
+    up = array(3)
+    """Its axis that is to be up then, in its own frame."""
+    upright = array(4)
+    """Orientation of the tip that is planned for that."""
+    turns = integer()
+    """How often the hand has turned to bring it there."""
     duration = number()
     """Of the line from `start` to `goal`, s."""
     elapsed = number()
     """s since the line began."""
     waited = number()
     """s since then that the line is done."""
+    settled = number()
+    """s for which the tip has been where it was sent."""
     unheld = number()
     """s for which nothing has held the thing."""
     correction = array(3)
@@ -101,6 +129,11 @@ class Hand:
     def has_arrived(self) -> bool:
         """Whether the line is done."""
         return self.state.elapsed >= self.state.duration
+
+    @property
+    def has_settled(self) -> bool:
+        """Whether the tip rests at the end of its line."""
+        return self.state.settled >= _SETTLED
 
     @property
     def error(self) -> float:
@@ -132,7 +165,7 @@ class Hand:
             sqrt(_PEAK_ACCELERATION * way / _ACCELERATION),
             sqrt(_PEAK_ACCELERATION * angle / _TURN),
         )
-        state.elapsed = 0.0
+        state.elapsed = state.settled = 0.0
 
     def move_jaw(self, angle: float) -> None:
         """Tell the jaw to go to an angle, rad."""
@@ -160,6 +193,7 @@ class Hand:
         state, h = self.state, self.period
         if self.has_arrived:
             state.waited += h
+            state.settled = state.settled + h if self.error < _ACCURATE else 0.0
         state.elapsed = min(state.elapsed + h, state.duration)
         if settle and self.has_arrived:
             state.correction += (state.goal[:3] - self.measured[:3]) * (h / _SETTLING)

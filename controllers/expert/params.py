@@ -46,7 +46,17 @@ class ExpertParams(Params):
     goals: dict[Name, Name] = Field(
         default_factory=dict[str, str], description="of each piece: the dish that it is carried to"
     )
-    end: bool = Field(default=True, description="whether the session ends when the task is done")
+    legs: int | None = Field(
+        default=1,
+        ge=1,
+        description=(
+            "of a board: how often all rings are carried, 1: over, 2: over and back, ...; null: until the"
+            " session ends"
+        ),
+    )
+    end: bool = Field(
+        default=True, description="whether the session ends when the task is done, or nothing more can be"
+    )
 
     @model_validator(mode="after")
     def _is_a_task(self) -> Self:
@@ -62,6 +72,8 @@ class ExpertParams(Params):
                 raise ValueError(f"goals: no dish '{dish}'.{did_you_mean(dish, dishes)}")
         if not self.goals and self.board is None:
             raise ValueError("nothing to do: give `goals` of pieces, or a fixture of kind board")
+        if self.goals and self.legs != 1:
+            raise ValueError("legs: pieces are carried one way; only rings of a board go back")
         return self
 
     @property

@@ -1,33 +1,33 @@
 """One hand's way with one thing after the other: what comes next, from what is measured.
 
-A thing is grasped where it is seen, held if the engine says so, brought in line by its own pose over its
-place, and taken up again if it has been dropped or is not where it belongs. SI units, poses in the world.
+A thing is grasped where it is seen, held if the engine says so, put upright if it has fallen, brought in
+line by its own pose over its place, and taken up again if it has been dropped or is not where it belongs. SI
+units, poses in the world.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
-from typing import Literal
+from math import acos, hypot
 
 import numpy as np
 
-from controllers.expert.chores import Chore
-from controllers.expert.grasps import Grasps
-from controllers.expert.hand import Hand, Phase, pose_of
-from controllers.expert.reach import margins
-from hub.participant import Record, array, flag, integer
+from controllers.expert.fallen_rings import BESIDE
+from controllers.expert.grasps import UPRIGHT
+from controllers.expert.hand import Hand, Phase, Role
+from controllers.expert.plans import Plan, plan, plan_leaning, upright
+from controllers.expert.team import Refusals, Team
 from robots import rotation
 from schemas.vectors import Vector
 
-__all__ = ["Progress", "Role", "Seen", "Transfer"]
+__all__ = ["Transfer"]
 
 _HOVER = 0.020
 """Of a tip over its grasp before it goes down and after it has let go, m."""
-_ACCURATE, _IN_LINE = 0.2e-3, 0.5e-3
-"""m: of a tip at its grasp; of a thing over its place."""
+_IN_LINE = 0.5e-3
+"""m: of a thing over its place."""
 _PATIENCE = 0.6
-"""s: for these; then it goes on with what has been reached."""
+"""s: for this, and for a tip to settle; then it goes on with what has been reached."""
 _ALIGNING = 0.08
 """Time constant with which a thing is brought in line, s."""
 _SHUT = -0.3
@@ -42,52 +42,34 @@ _OPENED = 0.25
 """s: for a jaw to let go."""
 _GENTLE = 0.4
 """Share of the speed with which a hand comes down on things."""
-_COMFORT, _PER_TURN, _PER_OPENING, _PER_SIDE = 0.25, 0.02, 0.2, 0.2
-"""Of a grasp: the joints' margin beyond which more is no better; what a radian of turning and a radian of the
-jaw's opening cost, and what a side that leaves room to the other hand is worth, in margins.
-"""
-_PICKING = {Phase.RISE, Phase.ACROSS, Phase.DESCEND, Phase.CLOSE, Phase.LIFT}
+_OFFERED = 20.0
+"""s: for the other hand to take what is offered; it may have to put something down before."""
+_TURNING = 0.015
+"""m: so much higher than it travels a thing is put upright, as it swings about the tip."""
+_STRAIGHT, _TURNS = 0.05, 3
+"""rad: of a thing that is upright; how often a hand turns to bring it there."""
+_APPROACHING = {Phase.RISE, Phase.ACROSS, Phase.DESCEND, Phase.REACH}
+_GIVING_UP = {Phase.OPEN, Phase.RETREAT, Phase.IDLE}
 _LEAVING = {Phase.OFFER, Phase.OPEN, Phase.RETREAT}
-
-Role = Literal["alone", "giver", "taker"]
-
-
-class Progress(Record):
-    """Of the task."""
-
-    done = flag()
-    placed = integer()
-    """How many things are where they belong."""
-    attempts = integer()
-    """How often a jaw has closed on a thing."""
-    dropped = integer()
-    """How often a thing was not held any more on its way."""
-
-
-class Seen(Record):
-    """The things as they are measured, by index."""
-
-    poses = array("n", 4, 4)
-    holders = array("n")
-    """Number of the arm that holds each, 0: none."""
 
 
 class Transfer:
     """What one hand does."""
 
-    def __init__(self, hand: Hand, role: Role, chore: Chore, seen: Seen, progress: Progress) -> None:
-        """Take the hand, its role, the task, and what all hands share."""
-        self.hand, self.role, self._chore, self._seen, self._progress = hand, role, chore, seen, progress
-        self.state = hand.state
-        self.other: Transfer | None = None
-        """The other hand, if there is one."""
+    def __init__(self, hand: Hand, team: Team, things: int) -> None:
+        """Take the hand, its team, and how many things there are."""
+        self.hand, self.team, self.state = hand, team, hand.state
+        self._chore, self._seen, self._progress = team.chore, team.seen, team.progress
+        self.refusals = Refusals(n=things)
         self._next: dict[Phase, Callable[[], None]] = {
             Phase.IDLE: self._idle,
             Phase.RISE: self._rise,
             Phase.ACROSS: self._across,
             Phase.DESCEND: self._descend,
+            Phase.REACH: self._reach,
             Phase.CLOSE: self._close,
             Phase.LIFT: self._lift,
+            Phase.TURN: self._turn,
             Phase.CARRY: self._carry,
             Phase.ALIGN: self._align,
             Phase.LOWER: self._lower,
@@ -101,13 +83,27 @@ class Transfer:
         """Begin the next phase where the present one is over."""
         seen = self.state.thing >= 0 and self._seen.holders[self.state.thing] != 0.0
         self.state.unheld = 0.0 if seen else self.state.unheld + self.hand.period
+        self.refusals.things[self._seen.still == 0.0] = 0.0
         if self.hand.has_arrived:
             self._next[self.state.phase]()
+
+    def refuse(self) -> bool:
+        """Leave the thing after a command on the way to it was refused; return whether that is possible.
+
+        Commands that were under way may be refused afterwards.
+        """
+        if self.state.phase not in _APPROACHING:
+            return self.state.phase in _GIVING_UP and bool(self.refusals.things.any())
+        self.refusals.things[self.state.thing] = 1.0
+        self.hand.stay()
+        self.state.correction[:] = 0.0
+        self._let_go()
+        return True
 
     @property
     def settles(self) -> bool:
         """Whether the tip is to be brought exactly where it was sent."""
-        return self.state.phase in (Phase.ACROSS, Phase.DESCEND)
+        return self.state.phase in (Phase.ACROSS, Phase.DESCEND, Phase.REACH)
 
     def _enter(self, phase: Phase, goal: Vector | None = None, share: float = 1.0) -> None:
         """Begin `phase`, with a line to `goal` or, without one, where the tip stands."""
@@ -125,10 +121,27 @@ class Transfer:
         goal[:3] += by
         return goal
 
+    def _lifted(self) -> Vector:
+        """Return the pose of the tip at which the thing's middle is as high as it travels."""
+        height = self._chore.travel + (_TURNING if self.state.leans else 0.0)
+        return self._moved(np.array([0.0, 0.0, height - self._middle[2]]))
+
     @property
     def _middle(self) -> Vector:
         """Where the middle of the thing is, m."""
         return self._seen.poses[self.state.thing, :3, 3]
+
+    @property
+    def _up(self) -> Vector:
+        """The axis of the thing that is to be up, in the world."""
+        return self._seen.poses[self.state.thing, :3, :3] @ self.state.up
+
+    @property
+    def _before(self) -> Vector:
+        """The pose of the tip from which its fingers go straight to the grasp."""
+        goal = self.state.grasp.copy()
+        goal[:3] -= (BESIDE if self.state.leans else _HOVER) * rotation.matrix(goal[3:])[:, 2]
+        return goal
 
     @property
     def _holds(self) -> bool:
@@ -139,69 +152,142 @@ class Transfer:
         return self.state.unheld < _UNHELD and self.hand.angle > _HELD_OPEN
 
     @property
-    def _length(self) -> float:
-        return self.hand.jaw.length
+    def _is_there(self) -> bool:
+        """Whether the tip rests where it was sent, or has tried for long enough."""
+        return self.hand.has_settled or self.state.waited > _PATIENCE
+
+    @property
+    def _level(self) -> float:
+        """Height of the tip at which an empty hand passes over everything, m."""
+        return max(self._chore.clear + self.hand.jaw.length, self._before[2])
 
     def _idle(self) -> None:
-        thing = self._choice()
+        thing, role = self.team.choice(self)
         if thing < 0:
             return
-        grasp = self._plan(thing)
-        if grasp is None:
+        self.state.role = role
+        found = self._plan(thing)
+        if found is None:
+            self.refusals.things[thing] = float(role is not Role.TAKER)
             return
         self.state.thing = thing
-        level = max(self._chore.clear + self._length, self.state.grasp[2] + _HOVER)
-        self._enter(Phase.RISE, self._raised(level))
+        self._follow(found)
+        self._enter(Phase.RISE, self._raised(self._level))
+
+    def _follow(self, found: Plan) -> None:
+        """Take a plan for that of this hand."""
+        state = self.state
+        state.grasp[:], state.opening, state.leans = found.grasp, found.opening, found.leans
+        state.up[:] = self._seen.poses[state.thing, :3, :3].T @ found.up
+        state.upright[:], state.turns = found.upright, 0
+        if found.leans:
+            state.role = Role.ALONE
 
     def _rise(self) -> None:
-        goal = self.state.grasp.copy()
-        goal[2] = max(self._chore.clear + self._length, goal[2] + _HOVER)
+        goal = self._before
+        goal[2] = self._level
         self.hand.move_jaw(self.state.opening)
         self._enter(Phase.ACROSS, goal)
 
     def _across(self) -> None:
-        if self.hand.error > _ACCURATE and self.state.waited < _PATIENCE:
+        if not self._is_there:
             return
-        if self._plan(self.state.thing) is None:
-            self._enter(Phase.IDLE)
+        if self.state.leans:
+            self._go_beside()
             return
+        found = self._plan(self.state.thing)
+        if found is None or found.leans:
+            self._give_up()
+            return
+        self._follow(found)
         self._enter(Phase.DESCEND, self.state.grasp, _GENTLE)
 
+    def _go_beside(self) -> None:
+        """Go down beside a fallen thing, if it still lies there."""
+        if self._seen.is_free(self.state.thing):
+            self._enter(Phase.DESCEND, self._before, _GENTLE)
+        else:
+            self._give_up()
+
+    def _give_up(self) -> None:
+        self.state.thing = -1
+        self._enter(Phase.IDLE)
+
     def _descend(self) -> None:
-        if self.state.waited < _PATIENCE and self._plan(self.state.thing) is not None:
+        if self.state.leans:
+            if self._is_there:
+                self._enter(Phase.REACH, self.state.grasp, _GENTLE)
+            return
+        if self.state.waited < _PATIENCE and (found := self._plan(self.state.thing)) and not found.leans:
+            self._follow(found)
             self.state.goal[:] = self.state.grasp  # the other hand may still bring it to rest
-            if self.hand.error > _ACCURATE:
+            if not self.hand.has_settled:
                 return
+        self._shut()
+
+    def _reach(self) -> None:
+        if self._is_there:
+            self._shut()
+
+    def _shut(self) -> None:
         self.hand.move_jaw(_SHUT)
         self._progress.attempts += 1
+        self._seen.tries[self.state.thing] += 1.0
         self._enter(Phase.CLOSE)
 
     def _close(self) -> None:
         if self.state.waited < _PRESSED:
             return
         if self._holds and self._seen.holders[self.state.thing]:
-            if self.role == "taker":
+            if self.state.role is Role.TAKER:
                 self._enter(Phase.TAKE)
             else:
-                up = self._chore.travel - self._middle[2]
-                self._enter(Phase.LIFT, self._moved(np.array([0.0, 0.0, up])))
+                self._enter(Phase.LIFT, self._lifted())
         elif self.state.waited > _GIVEN_UP:
             self._let_go()
 
     def _lift(self) -> None:
         if self._lost():
             return
-        to = self._chore.meeting if self.role == "giver" else self._place()
+        if self.state.leans:
+            goal = self.hand.line()
+            goal[3:] = self.state.upright
+            self._enter(Phase.TURN, goal)
+            return
+        self._bring(self._chore.meeting if self.state.role is Role.GIVER else self._place())
+
+    def _turn(self) -> None:
+        """Turn on until the thing is upright by its own pose, then bring it where it can stand."""
+        if self._lost():
+            return
+        self.state.turns += 1
+        if acos(min(1.0, self._up[2])) > _STRAIGHT and self.state.turns <= _TURNS:
+            goal = self.hand.line()
+            goal[3:] = rotation.product(rotation.from_matrix(upright(self._up)), goal[3:])
+            self._enter(Phase.TURN, goal)
+            return
+        self._put_aside()
+
+    def _put_aside(self) -> None:
+        """Bring the thing where it can stand by itself, on the side where it is."""
+        poses, thing = self._seen.poses, self.state.thing
+        self.state.role = Role.ALONE
+        self.state.place[:] = self._chore.rest(thing, poses, self._chore.side(thing, poses))
+        self._bring(self.state.place)
+
+    def _bring(self, to: Vector) -> None:
         self._enter(Phase.CARRY, self._moved(np.append((to - self._middle)[:2], 0.0)))
 
     def _place(self) -> Vector:
-        self.state.place[:] = self._chore.place(self.state.thing, self._seen.poses)
+        self.state.place[:] = self._chore.place(
+            self.state.thing, self._seen.poses, self.team.destination(self)
+        )
         return self.state.place
 
     def _carry(self) -> None:
         if self._lost():
             return
-        if self.role == "giver":
+        if self.state.role is Role.GIVER:
             self._enter(Phase.OFFER)
             return
         down = self._chore.above(self.state.place) - self._middle[2]
@@ -233,73 +319,43 @@ class Transfer:
 
     def _open(self) -> None:
         if self.state.waited > _OPENED:
-            self._enter(Phase.RETREAT, self._moved(np.array([0.0, 0.0, _HOVER])), _GENTLE)
+            back = -(BESIDE if self.state.leans else _HOVER) * rotation.matrix(self.hand.line()[3:])[:, 2]
+            self._enter(Phase.RETREAT, self._moved(back), _GENTLE)
 
     def _retreat(self) -> None:
-        self.state.thing = -1
-        self._enter(Phase.IDLE)
+        self._give_up()
 
     def _offer(self) -> None:
         if self._lost():
             return
-        if self.other is not None and self.other.state.phase is Phase.TAKE:
+        other = self.team.other(self)
+        if other is not None and other.state.phase is Phase.TAKE:
             self._let_go()
+        elif self.state.waited > _OFFERED:
+            self._put_aside()
 
     def _take(self) -> None:
-        if self.other is not None and self.other.state.phase in _LEAVING:
+        other = self.team.other(self)
+        if other is not None and other.state.phase in _LEAVING:
             return
         if not self._lost():
-            up = self._chore.travel - self._middle[2]
-            self._enter(Phase.LIFT, self._moved(np.array([0.0, 0.0, up])))
+            self._enter(Phase.LIFT, self._lifted())
 
-    def _choice(self) -> int:
-        """Return the index of the thing to take next, -1: none."""
-        other = self.other
-        if self.role == "taker":
-            return other.state.thing if other is not None and other.state.phase is Phase.OFFER else -1
-        if self.role == "alone" and other is not None and other.state.phase in _PICKING:
-            return -1
-        taken = -1 if other is None else other.state.thing
-        for thing in range(len(self._seen.holders)):
-            if thing == taken or self._seen.holders[thing] or self._chore.is_done(thing, self._seen.poses):
-                continue
-            if other is None or self.role == "giver" or self._is_nearer(thing, other):
-                return thing
-        return -1
-
-    def _is_nearer(self, thing: int, other: Transfer) -> bool:
-        """Say whether the place of a thing is nearer to this hand's arm than to the other's."""
-        place = self._chore.place(thing, self._seen.poses)[:2]
-        mine, others = (np.linalg.norm(each.hand.base[:2, 3] - place) for each in (self, other))
-        return bool(mine <= others)
-
-    def _plan(self, thing: int) -> Vector | None:
-        """Choose how to take hold of a thing, into `grasp` and `opening`; None: it cannot be taken."""
-        pose = self._seen.poses[thing]
-        found = self._chore.grasps(thing, pose, self._length)
-        if not len(found.poses):
-            return None
-        score = self._score(thing, found)
-        best = int(score.argmax())
-        self.state.grasp[:], self.state.opening = pose_of(found.poses[best]), float(found.opening[best])
-        return self.state.grasp
-
-    def _score(self, thing: int, found: Grasps) -> Vector:
-        middle = self._seen.poses[thing, :3, 3]
-        tips = np.repeat(found.poses[:, None], 3, axis=1)
-        tips[:, 1, 2, 3] += self._chore.travel - middle[2]
-        if self.role != "alone" and self.other is not None:
-            end = self._chore.meeting
-        else:
-            end = self._chore.place(thing, self._seen.poses)
-        tips[:, 2, :3, 3] += end - middle
-        score = np.minimum(margins(self.hand.chain, self.hand.base, tips), _COMFORT)
-        now = self.hand.line()[3:]
-        turns = [
-            rotation.log(rotation.product(pose_of(tip)[3:], rotation.conjugate(now))) for tip in found.poses
-        ]
-        score -= _PER_TURN * np.linalg.norm(turns, axis=1) + _PER_OPENING * found.opening
-        if self.role != "alone" and self.other is not None:
-            away = (self.hand.base - self.other.hand.base)[:2, 3]
-            score += _PER_SIDE * found.outwards @ (away / np.linalg.norm(away))
-        return score
+    def _plan(self, thing: int) -> Plan | None:
+        """Return how to take hold of a thing; None: it cannot be taken."""
+        poses, hand = self._seen.poses, self.hand
+        found = self._chore.grasps(thing, poses[thing], hand.jaw.length)
+        middle, role = poses[thing, :3, 3], self.state.role
+        lift = self._chore.travel - middle[2]
+        if len(found.ups) and found.ups[0, 2] < UPRIGHT:
+            if role is Role.TAKER:
+                return None
+            rest = self._chore.rest(thing, poses, self._chore.side(thing, poses))
+            return plan_leaning(hand, found, middle, lift + _TURNING, rest)
+        to, away = self._chore.meeting, np.zeros(2)
+        if role is not Role.GIVER:
+            to = self._chore.place(thing, poses, self.team.destination(self))
+        if role is not Role.ALONE and (other := self.team.other(self)) is not None:
+            away = (hand.base - other.hand.base)[:2, 3]
+            away /= np.linalg.norm(away)
+        return plan(hand, found, lift, to - middle, away)

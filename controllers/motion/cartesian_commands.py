@@ -124,7 +124,7 @@ class CartesianCommands:
     def _solve(self, message: PoseStamped) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame."""
         frame = self._from(message.header.frame_id)
-        return self._inverse(frame @ goals.frame(message.pose))
+        return self._inverse(frame.dot(goals.frame(message.pose)))
 
     def _from(self, frame_id: str) -> Vector:
         """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4).

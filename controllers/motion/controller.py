@@ -114,7 +114,7 @@ class MotionController(Controller):
         """Update the states that are not published at every step."""
         for name, arm in self._arms.items():
             arm.publish(telemetry.rows[name])
-        telemetry.update()
+        telemetry.update(wrenches=not telemetry.wrenches <= self.unread)
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state, of trajectories from their start, goal and age."""

@@ -85,6 +85,10 @@ class Telemetry:
         self._poses, self._twists = np.zeros((count, 5, 7)), np.zeros((count, 4, 6))
         self._ratios = np.zeros((count, 3))
         self._groups: list[_Group] = []
+        self._behind: list[_Group] = []
+        """Groups whose wrenches are those of an earlier state, as they were not used."""
+        self.wrenches: frozenset[str] = frozenset()
+        """Names of the outputs that `update` may leave as they are: Jacobians, wrenches, known weight."""
         self.rows: dict[str, TelemetryRow] = {}
         """What to write to, by arm."""
         self.outputs: dict[str, Vector] = {}
@@ -102,30 +106,43 @@ class Telemetry:
         self.rows[arm] = TelemetryRow(
             state[0], state[1].reshape(-1), self._base[i], self._ratio[i], self._switches[i]
         )
-        self.outputs |= group.outputs_of(member, arm)
+        self.outputs |= group.outputs_of(member, arm) | (wrenches := group.wrenches_of(member, arm))
+        self.wrenches |= wrenches.keys()
         for names, values in ((_POSES, self._poses[i]), (_TWISTS, self._twists[i])):
             self.outputs |= {name.format(arm): value for name, value in zip(names, values, strict=True)}
         self.outputs |= {
             f"{arm}/trajectory_j/{name}": self._ratios[i, j : j + 1] for j, name in enumerate(_RATIOS)
         }
 
-    def update(self) -> None:
-        """Compute all states from `rows`, except those that follow from the bits of the last time."""
+    def update(self, *, wrenches: bool = True) -> None:
+        """Compute all states from `rows`, except those that follow from the bits of the last time.
+
+        `wrenches`: somebody uses one of those outputs.
+        """
+        if changed := self._changed():
+            for group in changed:
+                group.update_tips()
+            self._update_poses()
+            self._update_twists()
+            self._behind = [group for group in self._groups if group in changed or group in self._behind]
+        if wrenches and self._behind:
+            self._update_wrenches(self._behind)
+            self._behind = []
+
+    def _changed(self) -> list[_Group]:
+        """Return the groups whose states follow from other bits than the last time."""
         given = self._given.tobytes()
         changed = [group for group in self._groups if group.is_new()] if given == self._seen else self._groups
-        if not changed:
-            return
         if given != self._seen:
             self._seen = given
             self._update_ratios()
-        for group in changed:
-            group.update_tips()
-        self._update_poses()
-        self._update_twists()
+        return changed
+
+    def _update_wrenches(self, groups: Sequence[_Group]) -> None:
         spatial, first = body_to_spatial(self._tips[:, 1]), 0
         for group in self._groups:
             part = slice(first, first + len(group.state))
-            if group in changed:
+            if group in groups:
                 group.update_wrenches(spatial[part], self._base[part], self._switches[part])
             first = part.stop
 
@@ -173,6 +190,11 @@ class _Group:
         return {
             f"{arm}/measured_js": measured,
             f"{arm}/setpoint_js": setpoint,
+        }
+
+    def wrenches_of(self, i: int, arm: str) -> dict[str, Vector]:
+        """Return those of arm number `i` that `update_wrenches` writes."""
+        return {
             f"{arm}/gravity_compensation/setpoint_js": self._carried[i],
             **{f"{arm}/{kind}/jacobian": self._jacobians[i, j].reshape(-1) for j, kind in enumerate(_KINDS)},
             **{f"{arm}/{kind}/measured_cf": self._wrenches[i, j] for j, kind in enumerate(_KINDS)},

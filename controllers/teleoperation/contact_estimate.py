@@ -60,7 +60,7 @@ class ContactEstimate(Record):
 
     def depth(self, tip: Vector) -> float:
         """Return how far a tip at this position (3,), m, is below the surface, m."""
-        return float(self.tip_depth + self.normal @ (self.tip - tip))
+        return float(self.tip_depth + self.normal.dot(self.tip - tip))
 
     def update(self, tip: Vector, force: Vector, scale: float, elapsed: float) -> None:
         """Update the surface by one sample.
@@ -89,7 +89,7 @@ class ContactEstimate(Record):
             return
         self._turn(mean_force / size)
         self.touched[:], self.known = mean_tip, True
-        push = float(self.normal @ self.force)
+        push = float(self.normal.dot(self.force))
         depth = self.tip_depth = max(self.tip_depth, push / _STIFFEST)
         across = _length(self.force - push * self.normal)
         self.stiffness += _approach(self.stiffness, push / depth, elapsed)
@@ -100,13 +100,13 @@ class ContactEstimate(Record):
 
         Less what sliding may seem to add where friction has tilted the normal.
         """
-        along = float(self.normal @ move)
+        along = float(self.normal.dot(move))
         across = _length(move - along * self.normal)
         self.tip_depth -= copysign(max(0.0, abs(along) - _CONE * across), along)
 
     def _turn(self, direction: Vector) -> None:
         """Turn the normal just enough to have `direction` (3,) in the friction cone; keep the depth."""
-        along = float(self.normal @ direction)
+        along = float(self.normal.dot(direction))
         aside = self.normal - along * direction
         size = _length(aside)
         if not self.known or not size:

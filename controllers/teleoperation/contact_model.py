@@ -126,8 +126,8 @@ class ContactModelBuilder:
         planes = [
             self._plane(
                 hand,
-                to_base.T @ normal,
-                (plane.distance - float(normal @ tip)) / scale,
+                to_base.T.dot(normal),
+                (plane.distance - float(normal.dot(tip))) / scale,
                 gain * plane.stiffness,
                 gain * plane.damping,
                 plane.friction,
@@ -138,7 +138,7 @@ class ContactModelBuilder:
         planes += [
             self._plane(
                 hand,
-                to_base.T @ surface.normal,
+                to_base.T.dot(surface.normal),
                 surface.depth(tip) / scale,
                 gain * surface.stiffness,
                 self._force.damping,
@@ -155,7 +155,7 @@ class ContactModelBuilder:
         x, y, z = normal.tolist()
         return ContactPlane(
             normal=Vector3(x=x, y=y, z=z),
-            distance=float(normal @ hand) + depth,
+            distance=float(normal.dot(hand)) + depth,
             stiffness=min(stiffness, self._force.max_stiffness),
             damping=damping,
             friction=friction,

@@ -92,7 +92,7 @@ class PoseLaw:
         self._hand[:] = hand
         self._find_offset(to_base, seen)
         goal = self.goal
-        goal[:3] = self._tip0[:3] + scale * (self._turn_to_base @ (hand[:3] - self._hand0[:3]))
+        goal[:3] = self._tip0[:3] + scale * self._turn_to_base.dot(hand[:3] - self._hand0[:3])
         if self._turns:
             turned = rotation.product(rotation.product(to_base, hand[3:]), self._offset)
             goal[3:] = turned / sqrt(turned.dot(turned))

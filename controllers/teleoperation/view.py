@@ -16,6 +16,8 @@ the display's frame, whose axes correspond to those of the camera's: with `view:
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from controllers.teleoperation.params import TeleoperationParams
@@ -56,5 +58,5 @@ class View:
             return self._hand_in_base
         self._seen = seen
         orientation = rotation.product(rotation.conjugate(base_in_view[3:]), self._hand_in_camera)
-        self._hand_in_base = orientation / np.linalg.norm(orientation)
+        self._hand_in_base = orientation / sqrt(orientation.dot(orientation))
         return self._hand_in_base

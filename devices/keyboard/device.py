@@ -8,18 +8,19 @@ from __future__ import annotations
 import os
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
 from devices.diagnosis import Diagnosis, Level
+from devices.keyboard.hand_ports import StandsFor, hand_ports
 from devices.keyboard.virtual_stylus import VirtualStylus
 from devices.samples import SampleTimer, button_sample, pose_sample, twist_sample
 from hub.participant import Device, Params, Sample
 from schemas.errors import DeviceError, MissingExtraError
 from schemas.ports import Port
 from schemas.quantity import Duration, Speed
-from schemas.ros import Float64Message, Joy, PoseStamped, TwistStamped
+from schemas.ros import Float64Message
 
 if TYPE_CHECKING:
     from devices.keyboard.window import Window
@@ -29,17 +30,12 @@ __all__ = ["Keyboard", "KeyboardParams"]
 _LONGEST_NS = 100_000_000
 """After a longer pause between reads the stylus moves for this time only: it must not leap."""
 
-_FRAMES = {
-    "stylus": "of the tip; z out of the point, x to the right when it points away from the user",
-    "head": "of the head: x ahead, y to the left, z up",
-}
-
 
 class KeyboardParams(Params):
     """What the keys move, and how fast it moves."""
 
     stands_for: Annotated[
-        Literal["stylus", "head"],
+        StandsFor,
         Field(
             description="whose axes the moved frame has: a stylus', z out of its point, or a head's, x ahead"
         ),
@@ -65,37 +61,8 @@ class Keyboard(Device):
     def __init__(self, name: str, params: KeyboardParams) -> None:
         super().__init__(name, params)
         self._diagnosis = Diagnosis(name)
-        frame = f"{name}_base"
-        self._pose, self._twist = (
-            Port(
-                name=port,
-                causality="output",
-                type=type_,
-                frame=frame,
-                max_age_ns=params.max_age,
-                clock="wall",
-                description=text,
-            )
-            for port, type_, text in (
-                ("pose", PoseStamped.ros_type, _FRAMES[params.stands_for]),
-                ("twist", TwistStamped.ros_type, "of the same, along the axes of the base frame"),
-            )
-        )
-        self._buttons = Port(
-            name="buttons",
-            causality="output",
-            type=Joy.ros_type,
-            variability="event",
-            frame=frame,
-            clock="wall",
-            description="each press and release: 0 the dead-man, 1 the jaw",
-        )
-        self._gripper = Port(
-            name="gripper",
-            causality="output",
-            type=Float64Message.ros_type,
-            clock="wall",
-            description="0 closed, 1 open",
+        self._pose, self._twist, self._buttons, self._gripper = hand_ports(
+            name, params.stands_for, params.max_age
         )
         self._window: Window | None = None
         self._reset()

@@ -23,7 +23,7 @@ from hub.command_line.app import app
 from hub.participant import Stepped
 from hub.planning import limits, registry
 from hub.planning.scenario_file import installed_scenarios, load
-from schemas import crtk, quantity, ros, trocar_msgs
+from schemas import crtk, quantity, ros, trocar_msgs, visualization
 from schemas.message import Message, msg_text
 from schemas.ports import Port, bond_ports
 from schemas.scenario import MAX_NAME, Scenario
@@ -419,7 +419,7 @@ def messages() -> str:
         lines += [f"- `{field}`: {_cell(text)}" for field, text in notes.items()]
         lines.append("")
     lines += ["## Standard types", "", "| type | fields |", "|---|---|"]
-    for module in (ros, crtk):
+    for module in (ros, crtk, visualization):
         for model in _models(module):
             fields = "; ".join(f"`{line}`" for line in msg_text(model).splitlines())
             lines.append(f"| `{model.ros_type.replace('/msg/', '/')}` | {fields} |")

@@ -9,22 +9,25 @@ from __future__ import annotations
 
 import logging
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
 import numpy as np
 
+from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams
 from engines.mujoco.pictures.opengl import import_mujoco
-from engines.mujoco.ports import bond_sides, scene_ports
-from hub.participant import Inputs, Outputs, Params, Setup, Stepped, Value, state_hash
+from engines.mujoco.ports import WIRE, bond_sides, scene_ports
+from hub.participant import BondPlan, Inputs, MotionSide, Outputs, Params, Setup, Stepped, Value, state_hash
 from robots.dvrk.mounted import MountedPsm
 from schemas.errors import MissingExtraError, ScenarioError, SessionError, StateError
 from schemas.ports import BondSide, Port
+from schemas.ros import PoseStamped
 from schemas.vectors import Vector
 
 if TYPE_CHECKING:
     from engines.mujoco.interaction.contact_spheres import Spheres
     from engines.mujoco.interaction.probe import Probe
+    from engines.mujoco.interaction.wire import Wire
 
 __all__ = ["MujocoEngine"]
 
@@ -47,7 +50,8 @@ class MujocoEngine(Stepped):
 
     def __init__(self, name: str, params: MujocoParams) -> None:
         super().__init__(name, params)
-        self._touching: list[Probe | Spheres] = []
+        self._touching: list[Probe | Spheres | Wire] = []
+        self._wires: list[Wire] = []
         self._keepers: list[_Keeper] = []
         self._effective_mass: dict[str, float] = {}
         self._outputs: dict[str, Value] = {}
@@ -65,6 +69,7 @@ class MujocoEngine(Stepped):
         """The sphere of every palpation probe, `<arm>/probe`, and the contact spheres of instruments.
 
         The latter are called `<arm>/contact`; positions are those of the spheres' centres, in the world.
+        Of needles, `<needle>/wire` is base, middle and tip.
         """
         return tuple(
             side.model_copy(update={"effective_mass": self._effective_mass.get(side.name)})
@@ -108,9 +113,15 @@ class MujocoEngine(Stepped):
         self._holding = holding.Holding(
             self._model, self._data, self.params, self.params.publish_period * 1e-9
         )
-        psms = (arm for arm, params in self.params.arms.items() if isinstance(params, MountedPsm))
-        self._rigid = RigidContact(self._model, self._data, psms)
-        self._outputs.update({**self._readings.outputs, **self._holding.outputs, **self._rigid.outputs})
+        psms = [arm for arm, params in self.params.arms.items() if isinstance(params, MountedPsm)]
+        fixtures = tuple(self.params.fixtures)
+        self._outputs.update({**self._readings.outputs, **self._holding.outputs})
+        self._rigid = None
+        if self.params.rigid_wrench and (psms or fixtures):
+            self._rigid = RigidContact(
+                self._model, self._data, psms, fixtures=fixtures, substep=timestep * 1e-9
+            )
+            self._outputs.update(self._rigid.outputs)
         self._couple(setup)
         self._readings.refresh()
         self._holding.refresh()
@@ -119,6 +130,7 @@ class MujocoEngine(Stepped):
             self._brakes,
             self._holding,
             *(touching.motion for touching in self._touching),
+            *([] if self._rigid is None or self._rigid.collisions is None else [self._rigid.collisions]),
         ]
         trouble = mujoco.mjtWarning
         self._trouble = self._data.warning.number.data[trouble.mjWARN_BADQPOS : trouble.mjWARN_BADCTRL + 1]
@@ -130,22 +142,52 @@ class MujocoEngine(Stepped):
     def _couple(self, setup: Setup) -> None:
         from engines.mujoco.interaction.contact_spheres import Spheres
         from engines.mujoco.interaction.probe import Probe
-        from hub.participant import MotionSide
 
         kinds = {"probe": Probe, "contact": Spheres}
         for bond in self.bonds:
-            arm, _, kind = bond.name.partition("/")
-            self._effective_mass[bond.name] = kinds[kind].least_mass(arm, self._model, self._data)
-            self._outputs[f"{arm}/tip_wrench"] = np.zeros(6)
-            if plan := setup.bonds.get(bond.name):
-                touching = kinds[kind](arm, MotionSide(bond, plan), self._model, self._data)
+            owner, _, kind = bond.name.partition("/")
+            plan = setup.bonds.get(bond.name)
+            if kind == WIRE:
+                self._couple_needle(owner, bond, plan)
+                continue
+            self._effective_mass[bond.name] = kinds[kind].least_mass(owner, self._model, self._data)
+            self._outputs[f"{owner}/tip_wrench"] = np.zeros(6)
+            if plan:
+                touching = kinds[kind](owner, MotionSide(bond, plan), self._model, self._data)
                 self._touching.append(touching)
                 self._outputs.update(touching.outputs)
+        bonded = {touching.bond.partition("/")[0] for touching in self._touching}
+        felt = {arm: self._outputs.get(f"{arm}/tip_wrench") for arm in self.params.arms}
+        self._felt = {arm: cast("Vector", wrench) for arm, wrench in felt.items() if wrench is not None}
+        self._untouched = [wrench for arm, wrench in self._felt.items() if arm not in bonded]
         self._renewed = [
             touching
             for touching in self._touching
             if touching.acts_off_centre or setup.bonds[touching.bond].correction is not None
         ]
+
+    def _couple_needle(self, thing: str, bond: BondSide, plan: BondPlan | None) -> None:
+        from engines.mujoco.interaction.wire import Wire
+
+        params = cast("NeedleParams", self.params.objects[thing])
+        self._effective_mass[bond.name] = Wire.least_mass(thing, params, self._model, self._data)
+        if plan:
+            wire = Wire(thing, params, MotionSide(bond, plan), self._model, self._data)
+            self._touching.append(wire)
+            self._wires.append(wire)
+            self._outputs.update(wire.outputs)
+
+    def _feel_needles(self) -> None:
+        """Give what a bond does to a held needle to the arm that holds it, as `tip_wrench`.
+
+        It comes through the jaws, so it is taken out of the arm's `rigid_wrench`.
+        """
+        for wrench in self._untouched:
+            wrench[:] = 0.0
+        for wire in self._wires:
+            arm = self._holding.holder(wire.thing)
+            if self._rigid is not None and arm in self._felt:
+                self._rigid.give(arm, wire.wrench, self._felt[arm])
 
     def _what_is_state(self) -> int:
         """Return which parts of MuJoCo's data are state.
@@ -158,10 +200,44 @@ class MujocoEngine(Stepped):
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
         """Advance all arms by `h` nanoseconds. Raises SessionError if the simulation has become unstable."""
-        model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
-        add_rigid = self._rigid.add
+        if not inputs.quiet:
+            self._place(inputs)
         self._servos.begin(inputs)
         self._brakes.set(on="ECM" in self._servos.off)
+        if self._rigid is None and not self._touching:
+            self._sub_steps(h // self.params.timestep)
+        else:
+            self._watched_sub_steps(h, inputs)
+        self._readings.update()
+        if (t + h) % self.params.publish_period == 0:
+            self._readings.refresh()
+            self._holding.update()
+            if self._rigid is not None:
+                self._rigid.refresh()
+        if any(self._trouble):
+            raise SessionError(self._diagnosis(t, inputs))
+        return self._outputs
+
+    def _place(self, inputs: Inputs) -> None:
+        """Put objects where events want them."""
+        from engines.mujoco.interaction.placing import place
+
+        for thing in self.params.objects:
+            for message in inputs.events(f"{thing}/place"):
+                place(self._model, self._data, thing, cast("PoseStamped", message))
+
+    def _sub_steps(self, count: int) -> None:
+        """Take sub-steps between which nothing is read or renewed."""
+        model, data = self._model, self._data
+        self._mujoco.mj_step2(model, data)
+        if count > 1:
+            self._mujoco.mj_step(model, data, count - 1)
+        self._mujoco.mj_step1(model, data)
+
+    def _watched_sub_steps(self, h: int, inputs: Inputs) -> None:
+        """Take the sub-steps of `h` nanoseconds, and sum or renew between them what bonds and contacts do."""
+        model, data, step1, step2 = self._model, self._data, self._mujoco.mj_step1, self._mujoco.mj_step2
+        add_rigid = (lambda: None) if self._rigid is None else self._rigid.add
         for touching in self._touching:
             touching.begin(inputs)
         for tau in range(0, h, self.params.timestep):
@@ -171,25 +247,20 @@ class MujocoEngine(Stepped):
             step2(model, data)
             add_rigid()
             step1(model, data)
-        self._rigid.end()
+        if self._rigid is not None:
+            self._rigid.end()
         for touching in self._touching:
             touching.end()
-        self._readings.update()
-        if (t + h) % self.params.publish_period == 0:
-            self._readings.refresh()
-            self._holding.update()
-        if any(self._trouble):
-            raise SessionError(self._diagnosis(t, inputs))
-        return self._outputs
+        if self._wires:
+            self._feel_needles()
 
     def _diagnosis(self, t: int, inputs: Inputs) -> str:
         bad = self._mujoco.mjtWarning(
             self._mujoco.mjtWarning.mjWARN_BADQPOS + list(map(bool, self._trouble)).index(True)
         )
         where = f"MuJoCo reports {bad.name} in the step from {t * 1e-9:g} s"
-        for port in [port.name for port in self.ports if port.causality == "input"] + [
-            touching.motion.force_port for touching in self._touching
-        ]:
+        read = [p.name for p in self.ports if p.causality == "input" and p.variability == "signal"]
+        for port in read + [touching.motion.force_port for touching in self._touching]:
             if not np.isfinite(inputs[port]).all():
                 return f"{where}: input '{port}' is {inputs[port]}; every number must be finite"
         return (
@@ -237,11 +308,14 @@ class MujocoEngine(Stepped):
         self._readings.update()
         self._readings.refresh()
         self._holding.refresh()
+        if self._rigid is not None:
+            self._rigid.refresh()
         for touching in self._touching:
             touching.refresh()
 
     def close(self) -> None:
         """Release model and data."""
         self._touching.clear()
+        self._wires.clear()
         self._keepers.clear()
         self._outputs.clear()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import pi, radians
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
@@ -12,7 +12,8 @@ from robots.dvrk.instruments import STEEL_DENSITY
 from robots.dvrk.parameters import UnitQuaternion
 from robots.training.boards import BOARDS, Ring
 from robots.training.fixtures import BoardName
-from schemas.quantity import Angle, Density, Length
+from robots.training.needles import DEFAULT, NEEDLES, NeedleName
+from schemas.quantity import Angle, Damping, Density, Length
 
 __all__ = [
     "BlockParams",
@@ -82,16 +83,47 @@ class RingParams(_Wire):
 class NeedleParams(_Wire):
     """A round wire bent to an arc.
 
-    Its frame is in the arc's centre, z normal to its plane, x to the middle of the wire. The defaults are the
+    Its frame is in the arc's centre, z normal to its plane, x to the middle of the wire. The default is the
     needle of unina-icaros/dvrk-vrep (dVRK-suturing.ttt): an arc of 180.9 degrees, centre line 11.44 mm, wire
     0.8 mm.
     """
 
     kind: Literal["needle"]
+    needle: NeedleName = Field(
+        default=DEFAULT, description="gives radius, wire_radius and arc where they are not given"
+    )
     radius: Length = Field(default=11.44e-3, gt=0.0, description="of the centre line")
     wire_radius: Length = Field(default=0.4e-3, gt=0.0, description="of the cross-section")
     arc: Angle = Field(default=radians(180.9), gt=0.0, lt=2.0 * pi, description="from end to end")
     density: Density = Field(default=STEEL_DENSITY, gt=0.0)
+    drag: Damping = Field(
+        default=8.0,
+        ge=0.0,
+        description=(
+            "viscous resistance of the tissue that a bond at the wire stands for, while it pushes: 0.05 N at"
+            " 6 mm/s. A needle that no jaw holds is at rest in tissue as stiff as this over four steps"
+        ),
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_wire(cls, given: Any) -> Any:
+        """Take the measures of the named needle where none are given; what is not a name is refused later."""
+        if not isinstance(given, dict):
+            return given
+        stated = cast("dict[str, Any]", given)
+        if stated.get("needle") not in NEEDLES:
+            return stated
+        wire = NEEDLES[stated["needle"]]
+        return {"radius": wire.radius, "wire_radius": wire.wire_radius, "arc": wire.arc, **stated}
+
+    marked: bool = Field(
+        default=False,
+        description=(
+            "green, with a blue ball of 0.9 mm at the tip, as in the authors' scene of needle tracking; it is"
+            " seen and not felt"
+        ),
+    )
 
 
 class BlockParams(_Object):
@@ -134,3 +166,10 @@ class TableParams(Params):
 
     position: tuple[Length, Length, Length] = Field(description="of the middle of its top in the world")
     size: tuple[_Side, _Side, _Side] = Field(default=(0.4972, 0.6952, 0.02), description="along x, y and z")
+    soft: bool = Field(
+        default=False,
+        description=(
+            "a pad of foam: instruments reach into it without resistance, so that a jaw can take a thin thing"
+            " that lies on it well inside its fingers"
+        ),
+    )

@@ -74,7 +74,7 @@ class SceneParams(Params):
     )
     table: TableParams | None = None
     fixtures: dict[Name, FixtureParams] = Field(
-        default_factory=dict[str, FixtureParams], description="boards and dishes, which stand fast"
+        default_factory=dict[str, FixtureParams], description="boards, dishes and phantoms, which stand fast"
     )
     objects: Annotated[dict[str, ObjectParams], AfterValidator(_object_names)] = Field(
         default_factory=dict[str, ObjectParams]
@@ -145,6 +145,13 @@ class MujocoParams(SceneParams):
         description=(
             "how often measured_cp, setpoint_js, qpos and the objects' poses are published; a multiple of the"
             " period"
+        ),
+    )
+    rigid_wrench: bool = Field(
+        default=True,
+        description=(
+            "measure `rigid_wrench`, for which the contacts of every sub-step are summed; without it and"
+            " without bonds all sub-steps of a step are one call"
         ),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from engines.mujoco.object_params import NeedleParams
 from engines.mujoco.params import MujocoParams, SceneParams, has_jaw, has_probe, has_spheres
 from robots.dvrk import ecm
 from robots.dvrk.linkage import LINKAGES
@@ -12,7 +13,7 @@ from robots.dvrk.rolling_needle_driver import PADS
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message, JointState, PoseStamped, WrenchStamped
 
-__all__ = ["bond_sides", "position_count", "scene_ports"]
+__all__ = ["WIRE", "bond_sides", "position_count", "scene_ports"]
 
 _JOINT_STATE, _POSE, _WRENCH = JointState.ros_type, PoseStamped.ros_type, WrenchStamped.ros_type
 _ALL = ("position", "velocity", "effort")
@@ -20,6 +21,8 @@ _MODES = (
     "[arm, jaw or hand]: 0 off (the ECM's brakes hold), 1 position servo, 2 effort; 3 and 4 the last two"
     " without gravity compensation"
 )
+WIRE = "wire"
+"""Of a needle: the bond at three points of it."""
 _FREE_BODY = 7
 """Position and quaternion."""
 
@@ -30,7 +33,7 @@ def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
     ports = [
         port
         for name, arm in params.arms.items()
-        for port in (*_arm_ports(name, arm, slow), *_jaw_ports(name, arm), *_hand_ports(name, arm))
+        for port in (*_arm_ports(name, arm, params), *_jaw_ports(name, arm), *_hand_ports(name, arm))
     ]
     size = position_count(params)
     ports.append(
@@ -42,15 +45,39 @@ def scene_ports(params: MujocoParams) -> tuple[Port, ...]:
             description="joint positions of the whole model, as MuJoCo has them",
         )
     )
+    if params.fixtures and params.rigid_wrench:
+        ports += _collision_ports(slow)
     return (*ports, *(port for name in params.objects for port in _object_ports(name, slow)))
+
+
+def _collision_ports(slow: int) -> Iterator[Port]:
+    for what, meaning in (
+        ("tools", "of all contacts between instruments of different arms since the start"),
+        (
+            "fixtures",
+            "of all contacts between instruments and boards, posts, walls and dishes since the start",
+        ),
+    ):
+        yield Port(
+            name=f"{what}/impulse",
+            causality="output",
+            type=Float64Message.ros_type,
+            unit="N*s",
+            period_ns=slow,
+            description=meaning,
+        )
 
 
 def bond_sides(params: MujocoParams) -> tuple[BondSide, ...]:
     """Return the bonds `<arm>/probe` of palpation probes and `<arm>/contact` of contact spheres.
 
-    All are in the world.
+    Needles have `<needle>/wire`: base, middle and tip of the wire. All are in the world.
     """
-    return tuple(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm))
+    needles = (name for name, thing in params.objects.items() if isinstance(thing, NeedleParams))
+    return (
+        *(side for name, arm in params.arms.items() for side in _arm_bonds(name, arm)),
+        *(BondSide(name=f"{name}/{WIRE}", side="motion", dof=3, points=3, frame="world") for name in needles),
+    )
 
 
 def _arm_bonds(name: str, arm: MountedPsm | MountedEcm) -> Iterator[BondSide]:
@@ -60,7 +87,8 @@ def _arm_bonds(name: str, arm: MountedPsm | MountedEcm) -> Iterator[BondSide]:
         yield BondSide(name=f"{name}/contact", side="motion", dof=3, points=len(spheres), frame="world")
 
 
-def _arm_ports(arm: str, params: MountedPsm | MountedEcm, slow: int) -> Iterator[Port]:
+def _arm_ports(arm: str, params: MountedPsm | MountedEcm, engine: MujocoParams) -> Iterator[Port]:
+    slow = engine.publish_period
     names = tuple(joint.name for joint in params.chain.joints)
     still = (0.0,) * len(names)
     yield Port(
@@ -92,7 +120,7 @@ def _arm_ports(arm: str, params: MountedPsm | MountedEcm, slow: int) -> Iterator
         yield Port(
             name=f"{arm}/tip_wrench", causality="output", type=_WRENCH, frame=f"{arm}_base", description=felt
         )
-    if isinstance(params, MountedPsm):
+    if isinstance(params, MountedPsm) and engine.rigid_wrench:
         felt = (
             "the same of rigid contacts: table, objects, cart, other arms; an object in the jaws pulls with"
             " its weight"
@@ -179,6 +207,14 @@ def _hand_ports(arm: str, params: MountedPsm | MountedEcm) -> Iterator[Port]:
 
 
 def _object_ports(thing: str, slow: int) -> Iterator[Port]:
+    yield Port(
+        name=f"{thing}/place",
+        causality="input",
+        type=_POSE,
+        frame="world",
+        variability="event",
+        description="puts it there, at rest",
+    )
     yield Port(name=f"{thing}/pose", causality="output", type=_POSE, frame="world", period_ns=slow)
     holder = "number of the PSM whose jaws hold it (the first, where two hold it), 0 while none does"
     yield Port(

@@ -15,6 +15,7 @@ from hub.command_line import certs, plugins, recordings
 from hub.command_line.check import check, schema
 from hub.command_line.display import console
 from hub.command_line.doctor import doctor
+from hub.command_line.forks import fork, forks
 from hub.command_line.hosts import device, engine
 from hub.command_line.link import link
 from hub.command_line.ls import ls
@@ -47,6 +48,8 @@ for command in (
     recordings.verify,
     recordings.replay,
     recordings.recover,
+    fork,
+    forks,
     recordings.report,
     ls,
     link,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping
+from typing import Annotated
 
 import typer
 from rich.markup import escape
@@ -17,8 +19,16 @@ from hub.session.launch import plan_of
 __all__ = ["check", "schema"]
 
 
-def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json = False) -> None:
-    """Check a scenario without starting anything, and show its ports and connections.
+def check(
+    scenario: ScenarioName,
+    *,
+    overrides: Overrides = None,
+    with_ports: Annotated[
+        bool, typer.Option("--ports", help="Show all ports, and where each input comes from.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Check a scenario without starting anything, and show its participants.
 
     A class that it names as a kind is imported, which one line says before: only the class has the ports.
     """
@@ -28,12 +38,12 @@ def check(scenario: ScenarioName, *, overrides: Overrides = None, as_json: Json 
     if as_json:
         typer.echo(plan.model_dump_json(indent=2))
         return
-    _print_plan(plan)
+    _print_plan(plan, with_ports=with_ports)
     console.print(f"[green]{escape(str(file.source.file))} is a valid scenario.", soft_wrap=True)
 
 
-def _print_plan(plan: Plan) -> None:
-    """Print every participant with its ports and the sources of its inputs."""
+def _print_plan(plan: Plan, *, with_ports: bool) -> None:
+    """Print every participant with its ports and the sources of its inputs, or with their numbers."""
     sources: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for connection in (*plan.connections, *plan.from_devices, *plan.to_devices):
         source = f"{connection.source}.{connection.source_port}"
@@ -44,7 +54,9 @@ def _print_plan(plan: Plan) -> None:
             f" {planned.host}{escape(_time(planned))}",
             soft_wrap=True,
         )
-        for port in planned.ports:
+        if not with_ports:
+            console.print(f"    {_counts(planned, sources)}", soft_wrap=True)
+        for port in planned.ports if with_ports else ():
             arrow = "->" if port.causality == "output" else "<-"
             details = (port.type, port.unit, port.frame and f"in {port.frame}")
             detail = " ".join(part for part in details if part)
@@ -55,6 +67,16 @@ def _print_plan(plan: Plan) -> None:
             )
     if plan.order:
         console.print(f"order of stepping: {', '.join(plan.order)}", soft_wrap=True)
+
+
+def _counts(planned: PlannedParticipant, sources: Mapping[tuple[str, str], list[str]]) -> str:
+    """Return how many ports there are, and the participants from which inputs come."""
+    inputs = [port.name for port in planned.ports if port.causality == "input"]
+    connected = [port for port in inputs if (planned.name, port) in sources]
+    origins = {one.partition(".")[0] for port in connected for one in sources[planned.name, port]}
+    outputs = len(planned.ports) - len(inputs)
+    text = f"{outputs} output{'s'[outputs == 1 :]}, {len(inputs)} input{'s'[len(inputs) == 1 :]}"
+    return f"{text}, {len(connected)} of them from {', '.join(sorted(origins))}" if connected else text
 
 
 def _time(planned: PlannedParticipant) -> str:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from hub.command_line.display import RunProgress, console, show
+from hub.command_line.open_page import page_of_this_process
 from hub.command_line.options import Certificates, Json, Overrides, ScenarioName, with_places
+from hub.observation.summary import Summary
 from hub.planning.scenario_file import load
 from hub.session.launch import launch
 from hub.transport.loopback_port import listening_ports
 
-__all__ = ["run"]
+__all__ = ["Listening", "OneHost", "RecordTo", "require_complete", "run"]
 
 
 def _check_new(directory: Path | None) -> Path | None:
@@ -22,33 +25,49 @@ def _check_new(directory: Path | None) -> Path | None:
     raise typer.BadParameter(f"'{directory}' exists already; name a new directory.")
 
 
+RecordTo = Annotated[
+    Path | None,
+    typer.Option(
+        "--record", metavar="DIR", callback=_check_new, help="Record to a new directory, a rosbag2 bag."
+    ),
+]
+Listening = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--listen",
+        metavar="ENDPOINT",
+        help=(
+            "Where to listen besides loopback, such as tls/0.0.0.0:7447, or the endpoint on loopback."
+            " May be repeated."
+        ),
+    ),
+]
+OneHost = Annotated[bool, typer.Option("--one-host", help="Run every participant in the hub's process.")]
+
+
+def require_complete(summary: Summary) -> None:
+    """End with exit code 1 if a recording was asked for and is not complete."""
+    if summary.recording_complete is False:
+        console.print("[bold red]error:[/] the recording is incomplete")
+        raise typer.Exit(1)
+
+
 def run(
     scenario: ScenarioName,
     *,
-    record: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", callback=_check_new, help="Record to a new directory, a rosbag2 bag."),
-    ] = None,
+    record: RecordTo = None,
     overrides: Overrides = None,
     pace: Annotated[
         Literal["fast", "realtime"] | None, typer.Option(help="Replace the pace of the scenario.")
     ] = None,
-    listen: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ENDPOINT",
-            help=(
-                "Where to listen besides loopback, such as tls/0.0.0.0:7447, or the endpoint on loopback."
-                " May be repeated."
-            ),
-        ),
-    ] = None,
+    listen: Listening = None,
     certs: Certificates = None,
-    one_host: Annotated[
-        bool, typer.Option("--one-host", help="Run every participant in the hub's process.")
-    ] = False,
+    one_host: OneHost = False,
     profile: Annotated[
         bool, typer.Option("--profile", help="Show where the time goes: by participant, process and phase.")
+    ] = False,
+    open_page: Annotated[
+        bool, typer.Option("--open", help="Show the session on a page in the browser, as `trocar view` does.")
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -65,9 +84,10 @@ def run(
             one_host=one_host,
             profile=profile,
         )
-        with RunProgress(session.scenario) as progress:
+        with (
+            page_of_this_process() if open_page else nullcontext(),
+            RunProgress(session.scenario) as progress,
+        ):
             summary = session.run(progress)
     show(summary.as_dict(), as_json=as_json)
-    if summary.recording_complete is False:
-        console.print("[bold red]error:[/] the recording is incomplete")
-        raise typer.Exit(1)
+    require_complete(summary)

@@ -98,7 +98,7 @@ class DeviceReceiver:
             if subscription.waiting:  # otherwise newer signals have taken its place
                 sample = subscription.waiting.popleft()
                 try:
-                    subscription.receive(sample, self._run.number)
+                    subscription.receive(sample, self._run)
                 except MessageError as error:
                     self._refusals.refuse_sample(sample, error)
 
@@ -136,12 +136,14 @@ class _Subscription:
         self.waiting: deque[zenoh.Sample] = deque(maxlen=None if whole else _MOST_WAITING)
         """What has arrived and is not yet handled."""
 
-    def receive(self, sample: zenoh.Sample, run: int) -> None:
+    def receive(self, sample: zenoh.Sample, run: RunInfo) -> None:
         """Give a message's values to the inputs; raises MessageError if it is invalid or of another run."""
         tag = Tag.of(sample)
-        if tag.run != run:
-            raise MessageError(f"belongs to run {tag.run:x}, this is run {run:x}")
+        if tag.run != run.number:
+            raise MessageError(f"belongs to run {tag.run:x}, this is run {run.number:x}")
         if not tag.count:  # no events in this step
+            return
+        if tag.step > INITIAL and tag.time_ns < run.live_from_ns:
             return
         payload = sample.payload.to_bytes()
         if self._whole:

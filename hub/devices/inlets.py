@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -135,6 +136,22 @@ class Inlets:
             inlet.queue.append((payload, now_ns, None if stamp is None else stamp.sent_ns))
             inlet.arrived_ns = now_ns
             self._offered.add(inlet.number)
+
+    def restart(self, devices: Collection[str]) -> list[Entering]:
+        """Forget all samples of `devices`; return what enters for that: their signals are stale.
+
+        So an arm holds until its hand has spoken, and pressed the button, anew.
+        """
+        entering: list[Entering] = []
+        with self._lock:
+            for inlet in self._all:
+                if inlet.source in devices:
+                    inlet.queue.clear()
+                    inlet.arrived_ns, inlet.stale = None, True
+                    self._offered.discard(inlet.number)
+                    if not inlet.codec.is_event:
+                        entering.append(_sample(inlet, b"", stale=True, age_ns=0))
+        return entering
 
     def sample(self, time_ns: int, wall_ns: int) -> list[Entering]:
         """Return what enters at a communication point: samples that are new, and changes of staleness.

@@ -20,3 +20,5 @@ class RunInfo:
     """Tells the messages of this run from those of any other."""
     admission: int = 0
     """The number that the hub has given to this host when it joined; 0 in the hub's own process."""
+    live_from_ns: int = 0
+    """Simulated time before which the run repeats a recorded one: devices receive nothing of that."""

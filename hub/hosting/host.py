@@ -13,10 +13,13 @@ from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
 
+import numpy as np
+
 from hub.hosting.host_layout import HostLayout, Listeners
 from hub.hosting.hosted_participant import HostedParticipant
 from hub.participant import Outputs, Setup, Stepped
 from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.renewal import Successors
 from hub.transport.cells import INITIAL
 from hub.transport.envelope import Tag
 from hub.transport.host_link import IDLE
@@ -45,6 +48,7 @@ class Host:
         wire: Carries values to and from other processes; None if there are none.
         listeners: Returns what is called with the values of outputs; None: nothing is.
         place: Of one element, where `run` notes the place of the participant that it steps; IDLE after it.
+        successors: Who takes over the state of a participant, and before which step.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class Host:
         wire: Wire | None = None,
         listeners: Listeners | None = None,
         place: memoryview[int] | None = None,
+        successors: Successors | None = None,
     ) -> None:
         self.name = name
         self.plan = plan
@@ -70,7 +75,14 @@ class Host:
         """The inputs of the devices here that live in simulated time."""
         self.step = INITIAL
         """The step in which it is or was last."""
+        self._noted = -1  # of the wire's changes
         self._place: memoryview[int] | list[int] = [IDLE] if place is None else place
+        given = successors or {}
+        self._successors = sorted(
+            ((step, one, new) for one in self._hosted for step, new in given.get(one.name, ())),
+            key=lambda renewal: renewal[0],
+        )
+        """Who has not taken over yet: the step, the participant as it is hosted, and its successor."""
 
     @property
     def participants(self) -> Sequence[PlannedParticipant]:
@@ -98,8 +110,14 @@ class Host:
         bonds: dict[str, tuple[BondSide, ...]] = {}
         for one in self._hosted:
             setup = Setup(one.h_ns, directory, one.planned.bond_plans, self.plan.connected(one.name))
+            last = one.participant
             try:
                 self._publish(one, INITIAL, 0, one.participant.configure(setup))
+                for _, its, new in self._successors:
+                    if its is one:
+                        new.configure(setup)
+                        new.restore(one.participant.save())  # now rather than when all was simulated again
+                        last = new
             except ParticipantError:
                 raise
             except TrocarError as error:
@@ -107,8 +125,17 @@ class Host:
             except Exception as error:
                 log.exception("participant '%s' raised while it was configured", one.name)
                 raise ParticipantError(one.name, INITIAL, f"{type(error).__name__}: {error}") from error
-            bonds[one.name] = one.participant.bonds
+            bonds[one.name] = last.bonds
         return bonds
+
+    def begin(self, outputs: Mapping[str, Outputs]) -> None:
+        """Publish the outputs at time 0, by participant, of those that are configured already."""
+        for one in self._hosted:
+            self._publish(one, INITIAL, 0, outputs[one.name])
+
+    def newest(self, name: str) -> Outputs:
+        """Return what a participant has returned last; its arrays may be written to in the next step."""
+        return next(one.newest for one in self._hosted if one.name == name)
 
     def publish_initial(self) -> None:
         """Publish the outputs at time 0 once more, for hosts that did not yet listen."""
@@ -131,6 +158,8 @@ class Host:
         `done` is called with the ack of each participant as soon as its last step is done. Raises
         ParticipantError.
         """
+        while self._successors and self._successors[0][0] <= grant.step:
+            self._renew(*self._successors.pop(0))
         for sample in grant.inlets:
             for one, port, codec in self._inlets.get((sample.participant, sample.port), ()):
                 _enter(one, port, codec, sample.payload.tobytes(), stale=sample.stale)
@@ -140,6 +169,7 @@ class Host:
             one.hashes, one.compute_ns, one.work_j = [], [], []
         for step in range(grant.step, end):
             self.step = step
+            self._note_users()
             for place, one in enumerate(self._hosted):
                 period = one.period
                 if step % period:
@@ -154,6 +184,32 @@ class Host:
             cell.take_until(
                 min(cell.tag(-(-end // period) * period, fresh=fresh) for period, fresh in readers)
             )
+
+    def _renew(self, step: int, one: HostedParticipant, new: Stepped) -> None:
+        """Let `new` go on in the place of a participant, with its state."""
+        try:
+            new.restore(one.participant.save())
+        except TrocarError as error:
+            raise ParticipantError(one.name, step, f"cannot take other parameters: {error}") from error
+        starts = {port.name: port.start for port in one.participant.ports}
+        connected = self.plan.connected(one.name)
+        for port in new.ports:
+            if port.start not in (None, starts[port.name]) and port.name not in connected:
+                one.values[port.name] = np.array(port.start, np.float64)
+        new.unread = one.participant.unread
+        one.participant.close()
+        one.participant = new
+
+    def _note_users(self) -> None:
+        """Note for the participants which of their outputs are not used, if that may have changed."""
+        changes = 0 if self._wire is None else self._wire.changes
+        if changes == self._noted:
+            return
+        self._noted = changes
+        if self._wire is not None:
+            self._wire.noted = changes
+        for one in self._hosted:
+            one.participant.unread = frozenset(o.port.name for o in one.ports if not o.is_used)
 
     def _step(self, one: HostedParticipant, step: int, t: int) -> None:
         name = one.name
@@ -199,6 +255,7 @@ class Host:
 
     def _publish(self, one: HostedParticipant, step: int, time_ns: int, returned: Outputs) -> None:
         """Check the outputs that are due, and pass them on to readers here and elsewhere."""
+        one.newest = returned
         for stride, outputs in one.outputs:
             if step == INITIAL or not (step + one.period) % stride:
                 outputs.put(step, time_ns, returned)
@@ -221,6 +278,7 @@ class Host:
         one.hashes.clear()
         one.compute_ns.clear()
         self.step = time_ns // self.plan.step_ns
+        self._note_users()
         self._step(one, self.step, time_ns)
 
     def drain(self) -> None:
@@ -230,11 +288,13 @@ class Host:
 
     def close(self) -> None:
         """Close every participant, the last first; an error in one does not keep the others open."""
-        for one in reversed(self._hosted):
+        every = [(one.name, one.participant) for one in self._hosted]
+        every += [(one.name, new) for _, one, new in self._successors]
+        for name, participant in reversed(every):
             try:
-                one.participant.close()
+                participant.close()
             except Exception:
-                log.exception("participant '%s' raised while it was closed", one.name)
+                log.exception("participant '%s' raised while it was closed", name)
         if self._wire is not None:
             self._wire.close()
 

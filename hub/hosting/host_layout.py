@@ -32,6 +32,10 @@ class Listeners(Protocol):
         """Return the listener of vectors that are due together."""
         ...
 
+    def watches(self, participant: str, port: str) -> bool:
+        """Return whether the values of an output are used."""
+        ...
+
 
 _MANY = 32
 """Values of one port that may wait for their reader; the sender waits at some 160, a socket of Linux."""
@@ -116,6 +120,8 @@ class HostLayout:
                 publisher,
                 listeners.listener(planned, port) if listeners is not None and codec is None else None,
             )
+            output.watched = listeners is not None and listeners.watches(planned.name, port.name)
+            one.ports.append(output)
             # an observer misses steps: of each that it takes, all is published
             outputs = by_stride.setdefault(1 if planned.observer else stride, [])
             outputs.insert(0 if hosts else len(outputs), output)  # first what another host waits for
@@ -270,6 +276,8 @@ class HostLayout:
             source = plan.participants[inlet.source].port(inlet.source_port)
             entries = inlets.setdefault((inlet.source, inlet.source_port), [])
             entries.append((one, port.name, PortCodec(port.filled_from(source))))
+            # the grants of a session that was forked may hold a value by the input that it enters
+            inlets[one.name, port.name] = [(one, port.name, PortCodec(port.filled_from(source)))]
             if port.variability == "signal":
                 one.stale.add(port.name)
         every = (*plan.connections, *plan.from_devices, *plan.to_devices)

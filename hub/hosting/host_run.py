@@ -18,10 +18,11 @@ from hub.devices.uplink import DeviceUplink
 from hub.hosting.host import Host
 from hub.hosting.host_profile import HostProfile
 from hub.hosting.hub_channel import HubChannel, LinkChannel, ZenohChannel
+from hub.hosting.low_priority import lower_priority
 from hub.hosting.observing import Observing
 from hub.participant import Device, Stepped
 from hub.planning.plan import PlannedParticipant
-from hub.planning.registry import make
+from hub.planning.renewal import made
 from hub.transport.control_client import ask
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.host_link import HostLink
@@ -64,9 +65,11 @@ class HostRun:
         self._ended: set[str] = set()
         plan, host, keys = reply.plan, request.host, self._keys
         mine = {name: planned for name, planned in plan.participants.items() if planned.host == host}
-        made = {
-            name: make(planned.kind, name, reply.params[name], directory) for name, planned in mine.items()
+        ready = {
+            name: made(planned.kind, name, reply.params[name], reply.renewals, directory)
+            for name, planned in mine.items()
         }
+        participants = {name: first for name, (first, _) in ready.items()}
         first = next(iter(mine.values()))
         refused = session.declare_publisher(
             keys.refused(first.key_role, first.name), encoding=zenoh.Encoding.APPLICATION_CDR
@@ -74,17 +77,24 @@ class HostRun:
         self._refusals = Refusals(report=lambda key: refused.put(encode(StringMessage(data=key))))
         spin = may_spin(len(plan.hosts()))
         wire = Wire(session, keys, reply.run, self._refusals, host, spin=spin, watched=reply.watched)
-        stepped = {name: p for name, p in made.items() if isinstance(p, Stepped)}
+        stepped = {name: p for name, p in participants.items() if isinstance(p, Stepped)}
         self._profile = HostProfile(session, keys, host, plan, reply.run) if reply.profile else None
         if self._profile is not None:
             self._profile.process.prepare(stepped, wire)
-        self._host = Host(host, plan, stepped, wire=wire, place=None if link is None else link.place)
+        self._host = Host(
+            host,
+            plan,
+            stepped,
+            wire=wire,
+            place=None if link is None else link.place,
+            successors={name: later for name, (_, later) in ready.items()},
+        )
         self._hub = self._channel(bytes.fromhex(reply.ack_key), link)
         self._stack = ExitStack()
         if self._profile is not None:
             self._stack.callback(self._profile.undeclare)
             self._profile.attach(self._host, self._acknowledge)
-        devices = {name: device for name, device in made.items() if isinstance(device, Device)}
+        devices = {name: device for name, device in participants.items() if isinstance(device, Device)}
         self._threads = self._attach_devices(reply, devices, connect)
         self._observing: Observing | None = None
         if any(planned.observer for planned in mine.values()):
@@ -112,7 +122,7 @@ class HostRun:
             return []
         threads: list[DeviceThread] = []
         clock = self._stack.enter_context(ClockSync(self._session, self._keys))
-        run = RunInfo(reply.plan, self._keys, reply.run, reply.admission)
+        run = RunInfo(reply.plan, self._keys, reply.run, reply.admission, reply.live_from_ns)
         for name, device in devices.items():
             if isinstance(device, RouterClient):
                 device.learn_hub(_to_programs(reply) or connect)
@@ -126,6 +136,8 @@ class HostRun:
 
     def serve(self) -> None:
         """Configure, report ready, and step as the hub grants, or look on, until interrupted."""
+        if self._observing is not None:
+            lower_priority()  # first: a renderer starts threads while it is configured
         try:
             bonds = self._host.configure(self._directory)
             for thread in self._threads:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hub.hosting.outputs import DueOutputs
-from hub.participant import Inputs, Stepped
+from hub.hosting.outputs import DueOutputs, Output
+from hub.participant import Inputs, Outputs, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
 from hub.transport.port_codec import PortCodec
@@ -43,8 +43,12 @@ class HostedParticipant:
     """Those of its inputs that no neighbour sets, in the order of the connections."""
     outputs: list[tuple[int, DueOutputs]] = field(default_factory=list[tuple[int, DueOutputs]])
     """With their stride, so that a step looks only at those that are due."""
+    ports: list[Output] = field(default_factory=list[Output])
+    """All of its outputs."""
     bundles: dict[str, Bundle] = field(default_factory=dict[str, Bundle])
     """By the device or observer that they are for."""
+    newest: Outputs = field(default_factory=dict[str, Any])
+    """What it has returned last."""
     hashes: list[int] = field(default_factory=list[int])
     """Of its steps in the present grant, as are `compute_ns` and `work_j`."""
     compute_ns: list[int] = field(default_factory=list[int])

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from operator import is_, itemgetter
+from operator import attrgetter, is_, itemgetter
 from typing import Any
 
 import numpy as np
@@ -52,10 +52,22 @@ class Output:
     queues: list[Queue] = field(default_factory=list[Queue])
     """The event inputs in this process that get all of its messages."""
 
+    watched: bool = False
+    """A measure or the recorder uses its values."""
+
+    @property
+    def is_used(self) -> bool:
+        """Whether anybody uses its values now."""
+        here = self.watched or self.inputs or self.queues or self.cell is not None
+        return bool(here) or (self.publisher is not None and self.publisher.needed)
+
     def set_inputs(self, value: Any) -> None:
         """Write `value` into the inputs that hold the newest one."""
         for values, port in self.inputs:
             values[port] = value
+
+
+_layout = attrgetter("shape", "dtype")
 
 
 class _Passage:
@@ -72,8 +84,8 @@ class _Passage:
     def put(self, step: int, time_ns: int, values: Sequence[Any]) -> None:
         """Pass on the values computed in `step`, valid at `time_ns`."""
         if self._wire is not None:
-            if self._changes != self._wire.changes:
-                self._changes = self._wire.changes  # first, or a change meanwhile would be missed
+            if self._changes != self._wire.noted:
+                self._changes = self._wire.noted
                 self._needed = [one for one in self._publishers if one[1].needed]
             for i, publisher in self._needed:
                 publisher.put(step, time_ns, values[i])
@@ -93,7 +105,7 @@ class _Vectors:
         self._values: Sequence[Vector] = ()
         self._bytes = b""
         self._codecs = [output.codec for output in outputs if output.codec is not None]
-        self._shapes = [codec.neutral.shape for codec in self._codecs]
+        self._layouts = [_layout(codec.neutral) for codec in self._codecs]
         self._size = sum(codec.neutral.nbytes for codec in self._codecs)
         read = [(i, output) for i, output in enumerate(outputs) if output.inputs]
         self._shared = [(i, output) for i, output in read if not output.copied]
@@ -103,7 +115,7 @@ class _Vectors:
     def put(self, step: int, time_ns: int, values: Sequence[Vector]) -> None:
         before, self._values = self._values, values
         same = len(before) == len(values) and all(map(is_, values, before))
-        if not same and [value.shape for value in values] != self._shapes:
+        if not same and not self._fits(values):
             self._check(values)
         data = joined(values)
         if data != self._bytes:
@@ -118,6 +130,12 @@ class _Vectors:
         self._passage.put(step, time_ns, values)
         if self._listener is not None:
             self._listener(step, time_ns, data)
+
+    def _fits(self, values: Sequence[Vector]) -> bool:
+        try:
+            return list(map(_layout, values)) == self._layouts
+        except AttributeError:  # one is no array
+            return False
 
     def _check(self, values: Sequence[Vector]) -> None:
         for codec, value in zip(self._codecs, values, strict=True):
@@ -204,6 +222,7 @@ class DueOutputs:
             if output.publisher is not None:
                 value: Any = returned[output.port.name]
                 self._initial.append((output.publisher, value if output.codec is None else value.copy()))
+                output.publisher.keep_first(value)
 
     def put_initial_again(self) -> None:
         """Publish the values at time 0 once more."""

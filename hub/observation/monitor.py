@@ -224,9 +224,9 @@ class Monitor:
         if self._recorder is not None:
             self._recorder.write(watched.channel, tag.time_ns, payload)
 
-    def watches(self, device: str, port: str) -> bool:
-        """Return whether an observer uses an output of a device, whether or not it enters the simulation."""
-        return self._recorder is not None or (device, port) in self.measures.by_port
+    def watches(self, participant: str, port: str) -> bool:
+        """Return whether recorder or measures use an output; of a device, also one that enters nothing."""
+        return self._recorder is not None or (participant, port) in self.measures.by_port
 
     def device(self, device: str, port: str, time_ns: int, payload: bytes, *, enters: bool) -> None:
         """Receive a message of a device; one that enters the simulation is recorded with its grant.

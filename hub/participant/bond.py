@@ -56,7 +56,7 @@ class ForceSide:
         x, v = inputs[self._position][: self._linear], inputs[self._velocity]
         if self._started:
             jump = x - self.position(self._duration)
-            self._work[0] += float(self._spring @ jump + 0.5 * self._stiffness * (jump @ jump))
+            self._work[0] += float(self._spring.dot(jump) + 0.5 * self._stiffness * jump.dot(jump))
             if self._is_sloped:
                 self._a = (v - self._v_before) / h
         self._x, self._v, self._v_before = x.copy(), v.copy(), v.copy()
@@ -85,7 +85,7 @@ class ForceSide:
         self._impulse += dt * force
         self._summed += dt
         moved = damper if self._plan.prediction == "hold" else force
-        self._work[0] += dt * float(moved @ self.velocity(tau))
+        self._work[0] += dt * float(moved.dot(self.velocity(tau)))
 
     def result(self, spring: Vector, damper: Vector) -> dict[str, Vector]:
         """Return the outputs of the bond: the work, and the reaction on the other side.

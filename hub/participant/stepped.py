@@ -90,6 +90,13 @@ class Stepped(Participant):
     wait for it.
     """
 
+    unread: frozenset[str] = frozenset()
+    """Outputs that are not used in this step: no reader, no measure, no recorder, no subscriber.
+
+    The host notes them before the step. What they would be computed from must not be forgotten: somebody may
+    use them in the next step. They need not be computed, and no state may depend on them.
+    """
+
     @property
     def bonds(self) -> tuple[BondSide, ...]:
         """The bonds that may be connected; after `configure` with their effective masses."""

@@ -179,6 +179,15 @@ class Plan(_Part):
             if planned.simulated_time and (planned.name in written or planned.network_link is not None)
         )
 
+    def stops(self) -> list[int]:
+        """Return the periods, in steps, at whose multiples a grant must end, in ascending order.
+
+        Inside a grant, no participant that reads a device may start a step, or it would miss the newest
+        samples; and no device may be due that is written what the others have computed.
+        """
+        reading = {self.participants[inlet.target].period for inlet in self.from_devices}
+        return sorted(reading | {device.period for device in self.meetings()})
+
     def seen_from(self, host: str) -> Plan:
         """Return the part of the plan that another machine needs to run host `host`.
 

@@ -24,7 +24,7 @@ from hub.planning.validation_errors import problems
 from schemas.errors import ScenarioError, did_you_mean
 from schemas.scenario import ParticipantSpec, Scenario
 
-__all__ = ["ScenarioFile", "installed_scenarios", "load", "located"]
+__all__ = ["ScenarioFile", "installed_scenarios", "load", "located", "validated"]
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +48,14 @@ def load(name_or_path: str, overrides: Sequence[str] = ()) -> ScenarioFile:
 
     Raises ScenarioError with one line for each problem.
     """
-    source = read(_find(name_or_path))
+    return validated(read(_find(name_or_path)), overrides)
+
+
+def validated(source: Source, overrides: Sequence[str] = ()) -> ScenarioFile:
+    """Return the scenario in `source`, with overrides `a.b.c=value` applied.
+
+    Raises ScenarioError with one line for each problem.
+    """
     for override in overrides:
         source.override(override)
     _check_number(source)

@@ -30,6 +30,8 @@ class Source:
     tree: dict[str, Any]
     marks: dict[Location, tuple[_Mark, _Mark]]
     """Line and column, counted from 1, of each key (for a list item: of the item) and of its value."""
+    text: str = ""
+    """What is in the file."""
     overrides: dict[Location, str] = field(default_factory=dict[Location, str])
     """The values set on the command line, each with the text that sets it."""
     _written: dict[Location, Location] = field(default_factory=dict[Location, Location])
@@ -117,7 +119,8 @@ def read(file: Path) -> Source:
     Raises ScenarioError if it cannot be read or is not one YAML mapping.
     """
     try:
-        root = compose(_text(file))
+        text = _text(file)
+        root = compose(text)
         marks = {} if root is None else dict(_marks(root, root, ()))
         tree: Any = _copied(construct(root))
     except MarkedYAMLError as error:
@@ -133,7 +136,7 @@ def read(file: Path) -> Source:
         raise ScenarioError(
             f"{file}:1:1: a scenario is a mapping with at least the keys name, step and participants"
         )
-    return Source(file, cast("dict[str, Any]", tree), marks)
+    return Source(file, cast("dict[str, Any]", tree), marks, text)
 
 
 def _text(file: Path) -> str:

@@ -13,10 +13,13 @@ __all__ = ["check_order", "reads_this_step", "step_order"]
 
 
 def check_order(scenario: Scenario, participants: Mapping[str, PlannedParticipant]) -> None:
-    """Raise ScenarioError if the scenario's `order` names something that does not step."""
+    """Raise ScenarioError if the scenario's `order` names something that is no participant.
+
+    A device that it names does not step: it stands where a controller was that it takes the place of.
+    """
     stepped = {name: None for name, planned in participants.items() if planned.role != "device"}
     for index, name in enumerate(scenario.order or ()):
-        if name not in stepped:
+        if name not in participants:
             problem = f"unknown stepped participant '{name}'.{did_you_mean(name, stepped)}"
             raise ScenarioError(problem, path=("order", index))
 

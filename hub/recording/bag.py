@@ -13,7 +13,7 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Chunk
+from mcap.records import Chunk, ChunkIndex
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from schemas import ros
 from schemas.codec import decode, message_type
-from schemas.errors import MessageError, RecordingError, did_you_mean
+from schemas.errors import CutShortError, MessageError, RecordingError, did_you_mean
 from schemas.ports import Port
 from schemas.vectors import has_vector
 
@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 MAX_RECORD_BYTES = 64 * 2**20
-"""A longer MCAP record is not read: chunks have 64 KiB, or one image."""
+"""A longer MCAP record is not read: chunks have 192 KiB and a step, or one image."""
 
 _RECORD = struct.Struct("<BQ")
 """Opcode and length of a record."""
@@ -194,6 +194,52 @@ class Bag:
             payloads += [records[m.offset + MESSAGE_HEADER_BYTES : m.end] for m in found]
         return np.array(times, np.int64), payloads
 
+    @property
+    def chunks(self) -> list[ChunkIndex]:
+        """The chunks in the order in which they are in the file."""
+        return sorted(self._summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
+
+    def chunks_with(self, topic: str) -> list[ChunkIndex]:
+        """Return the chunks that may hold messages of `topic`, in the order in which they are in the file."""
+        ids = self._ids(topic)
+        return [
+            index
+            for index in self.chunks
+            if not index.message_index_offsets or not ids.isdisjoint(index.message_index_offsets)
+        ]
+
+    def chunk(self, index: ChunkIndex) -> bytes:
+        """Return the uncompressed records of a chunk; raises RecordingError if they are damaged."""
+        with reading(self.file), self.file.open("rb") as stream:
+            stream.seek(index.chunk_start_offset + _RECORD.size)
+            return chunk_records(Chunk.read(ReadDataStream(stream)))
+
+    def message_index(self, index: ChunkIndex, topic: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return times (ns) and places of the messages of `topic` in a chunk, shape (n,) each.
+
+        Raises RecordingError if its index is damaged.
+        """
+        ids, places = self._ids(topic), index.message_index_offsets
+        if not places:  # another writer's: the chunk itself says it
+            with reading(self.file):
+                found = [one for one in located_messages(self.chunk(index)) if one.channel in ids]
+            return np.array([m.time_ns for m in found], np.int64), np.array(
+                [m.offset for m in found], np.int64
+            )
+        with reading(self.file), self.file.open("rb") as stream:
+            entries = [_entries(stream, places[channel], channel) for channel in sorted(ids & places.keys())]
+        all_ = np.concatenate(entries) if entries else np.zeros(0, _INDEX_ENTRY)
+        return all_["time"].astype(np.int64), all_["offset"].astype(np.int64)
+
+    def payload(self, records: bytes, offset: int) -> bytes:
+        """Return the message at a place in the records of a chunk; raises RecordingError if there is none."""
+        with reading(self.file):
+            found = _message_at(records, offset, set(self._summary.channels))
+            return records[found.offset + MESSAGE_HEADER_BYTES : found.end]
+
+    def _ids(self, topic: str) -> set[int]:
+        return {one.id for one in self._summary.channels.values() if one.topic == topic}
+
     def _read_summary(self) -> Summary:
         with self.file.open("rb") as stream:
             size = stream.seek(0, 2)
@@ -202,7 +248,7 @@ class Bag:
                 raise RecordingError(f"'{self.file}' is not an MCAP file")
             stream.seek(max(0, size - len(MCAP0_MAGIC)))
             if size < 2 * len(MCAP0_MAGIC) or stream.read() != MCAP0_MAGIC:
-                raise RecordingError(
+                raise CutShortError(
                     f"'{self.file}' was cut short; `trocar recover {self.file}` saves what is whole"
                 )
             stream.seek(0)
@@ -244,11 +290,16 @@ class LocatedMessage(NamedTuple):
 
 def _offsets(stream: BinaryIO, place: int, channel: int) -> list[int]:
     """Return where the messages of `channel` start in their chunk, from the message index at `place`."""
+    return _entries(stream, place, channel)["offset"].tolist()
+
+
+def _entries(stream: BinaryIO, place: int, channel: int) -> NDArray[np.void]:
+    """Return time and place in their chunk of the messages of `channel`, from the index at `place`."""
     stream.seek(place)
     opcode, length, stated, size = _MESSAGE_INDEX.unpack(stream.read(_MESSAGE_INDEX.size))
     if (opcode, stated, length) != (Opcode.MESSAGE_INDEX, channel, size + 6) or length > MAX_RECORD_BYTES:
         raise ValueError(f"there is no index of channel {channel} at {place}")
-    return np.frombuffer(stream.read(size), _INDEX_ENTRY)["offset"].tolist()
+    return np.frombuffer(stream.read(size), _INDEX_ENTRY)
 
 
 def _message_at(records: bytes, offset: int, channels: set[int]) -> LocatedMessage:

@@ -28,11 +28,11 @@ from schemas.vectors import VectorCodec
 
 __all__ = ["Recorder", "RecorderSummary"]
 
-CHUNK_BYTES = 64 * 2**10
+CHUNK_BYTES = 192 * 2**10
 """A killed process loses about this much.
 
-Small, so that building a chunk does not hold the interpreter for long, which the step loop needs
-(docs/decisions/0005-recorder.md).
+Vectors of many steps are laid out by a few calls of numpy, whatever their number: of a chunk of 64 KiB these
+calls were two fifths of the cost (docs/decisions/0061-fewer-calls.md).
 """
 
 CHUNK_AGE_S = 1.0

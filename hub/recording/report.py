@@ -23,6 +23,7 @@ from hub.recording.report_figures import (
     step_time_figures,
 )
 from hub.recording.report_scores import score_figures, score_table, scored
+from hub.recording.report_vision import vision_figures
 from hub.recording.series import Series
 from schemas.errors import RecordingError
 from schemas.scenario import Bond, Scenario
@@ -47,9 +48,10 @@ def report(recording: Recording, output: Path) -> None:
         title=escape(scenario.name),
         description=escape(scenario.description),
         numbers=_numbers(recording, scenario, statuses[-1][1] if statuses else None, traces, books),
-        bonds=_sections(_bond_figures(traces, books)),
-        steps=_sections(_step_figures(recording, scenario, statuses)),
+        bonds=_section("Coupling", _bond_figures(traces, books)),
+        steps=_section("Timing", _step_figures(recording, scenario, statuses)),
         scores=_scores(recording),
+        vision=_vision(recording),
         profile=_profile(recording),
         ports=_table(("topic", "type", "messages", "per second"), _ports(recording)),
         scenario=escape(recording.attachments.get("scenario.yaml", b"").decode("utf-8", "replace")),
@@ -133,7 +135,7 @@ def _numbers(
     rows: list[tuple[str, str]] = []
     if status is not None:
         rows += [
-            ("ended", status.state + (f" ({status.detail})" if status.detail else "")),
+            ("ended", status.state),
             ("steps", f"{status.step:,}"),
             ("simulated time", f"{status.sim_time_ns * 1e-9:.3f} s"),
             ("real-time factor", f"{status.real_time_factor:.2f}"),
@@ -151,7 +153,10 @@ def _numbers(
         ("messages", f"{sum(recording.counts.values()):,}"),
         ("recording", f"{recording.file.stat().st_size / 1e6:.1f} MB"),
     ]
-    return "\n".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in rows)
+    lines = [f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in rows]
+    if status is not None and status.detail:
+        lines[0] = lines[0].replace("</dd>", f"<p>{escape(status.detail)}</p></dd>")
+    return "\n".join(lines)
 
 
 def _profile(recording: Recording) -> str:
@@ -163,10 +168,19 @@ def _profile(recording: Recording) -> str:
     return f'<section aria-labelledby="h-profile"><h2 id="h-profile">Processor time</h2>{tables}</section>'
 
 
+def _vision(recording: Recording) -> str:
+    """Return the section about what controllers saw; empty if there was none."""
+    figures = _sections(vision_figures(recording))
+    if not figures:
+        return ""
+    heading = '<h2 id="h-vision">Vision</h2>'
+    return f'<section aria-labelledby="h-vision">{heading}<div class="figures">{figures}</div></section>'
+
+
 def _scores(recording: Recording) -> str:
     """Return the sections about training tasks; empty if there was none."""
     return "\n".join(
-        f'<section class="score" aria-labelledby="h-{escape(name)}"><h2 id="h-{escape(name)}">Task'
+        f'<section class="score" aria-labelledby="h-{escape(name)}"><h2 id="h-{escape(name)}">Score:'
         f" {escape(name)}</h2>{score_table(name, card)}"
         f'<div class="figures">{_sections(score_figures(recording, name))}</div></section>'
         for name, card in scored(recording).items()
@@ -177,6 +191,15 @@ def _ports(recording: Recording) -> Iterator[tuple[str, str, str, str]]:
     seconds = recording.duration_ns * 1e-9
     for name, count in sorted(recording.counts.items()):
         yield name, recording.topics[name], f"{count:,}", f"{count / seconds:.1f}" if seconds else ""
+
+
+def _section(title: str, figures: Iterable[Figure]) -> str:
+    """Return a section with figures; empty if there are none."""
+    found, key = _sections(figures), f"h-{title.lower()}"
+    if not found:
+        return ""
+    heading = f'<h2 id="{key}">{title}</h2>'
+    return f'<section aria-labelledby="{key}">{heading}<div class="figures">{found}</div></section>'
 
 
 def _sections(figures: Iterable[Figure]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from schemas.errors import MissingExtraError
 from schemas.vectors import Vector
 
-__all__ = ["INK", "SERIES", "Canvas", "Figure", "axes_of", "legend", "thin"]
+__all__ = ["INK", "SERIES", "Canvas", "Figure", "axes_of", "legend", "line_of", "thin"]
 
 _POINTS = 1200
 """Points of a line; at the width of a page more make no difference."""
@@ -97,6 +97,11 @@ def axes_of(x: str, y: str) -> Generator[tuple[Any, Canvas]]:
         stream = io.StringIO()
         figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
     result.text = stream.getvalue()
+
+
+def line_of(i: int) -> dict[str, str]:
+    """Return colour and style of the line `i`; from the fifth on the colours come again, dashed, dotted."""
+    return {"color": SERIES[i % len(SERIES)], "linestyle": ("-", "--", ":")[i // len(SERIES) % 3]}
 
 
 def legend(axes: Any) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend, thin
+from hub.recording.report_canvas import INK, SERIES, Figure, axes_of, legend, line_of, thin
 from schemas.vectors import Vector
 
 __all__ = [
@@ -171,7 +171,7 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
     with axes_of("compute time per step (µs)", "share of steps (%)") as (axes, spread):
         for i, (name, (_, spent)) in enumerate(compute.items()):
             share = np.histogram(spent * 1e6, bins)[0] * (100.0 / len(spent))
-            axes.stairs(share, bins, color=SERIES[i % len(SERIES)], label=name, linewidth=1.4)
+            axes.stairs(share, bins, label=name, linewidth=1.4, **line_of(i))
         axes.set_xscale("log")
         axes.axvline(step_s * 1e6, color=INK, linestyle=":", linewidth=1, label="communication step")
         legend(axes)
@@ -185,7 +185,7 @@ def step_time_figures(compute: dict[str, tuple[Vector, Vector]], step_s: float) 
                 axes.plot(
                     middle,
                     line,
-                    color=SERIES[i % len(SERIES)],
+                    **line_of(i),
                     linewidth=width,
                     label=name if percentile == 50 else None,
                 )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -29,32 +31,47 @@ def scored(recording: Recording) -> dict[str, ScoreCard]:
 
 
 def score_table(name: str, card: ScoreCard) -> str:
-    """Return the tables of a card as HTML, with a bar beside each number, by the largest of the same unit."""
+    """Return the tables of a card as HTML, with bars beside what can be compared."""
     numbers = score_numbers(card)
-    largest: dict[str, float] = {}
-    for one in numbers["metrics"].values():
-        if one["value"] is not None:
-            largest[one["unit"]] = max(largest.get(one["unit"], 0.0), abs(one["value"]))
+    bars = _bars(numbers["metrics"])
     tables: list[str] = []
     for heads, rows in score_tables(name, numbers):
+        keys = [row[0].replace(" ", "_") for row in rows]
+        barred = heads[0].startswith(name) and any(key in bars for key in keys)
         head = "".join(f'<th scope="col">{escape(text)}</th>' for text in heads)
+        head += "<th></th>" if barred else ""
         lines: list[str] = []
-        for row in rows:
-            metric = numbers["metrics"].get(row[0].replace(" ", "_"))
-            bar = "" if metric is None else _bar(metric["value"], largest[metric["unit"]])
-            cells = "".join(f"<td>{escape(cell)}</td>" for cell in row)
-            lines.append(f"<tr>{cells}<td>{bar}</td></tr>")
+        for key, row in zip(keys, rows, strict=True):
+            cells = "".join(f"<td>{_worded(cell)}</td>" for cell in row)
+            cells += f"<td>{bars.get(key, '')}</td>" if barred else ""
+            lines.append(f"<tr>{cells}</tr>")
         body = "\n".join(lines)
         region = f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(heads[0])}">'
-        tables.append(
-            f"{region}<table><thead><tr>{head}<th></th></tr></thead><tbody>{body}</tbody></table></div>"
-        )
-    return "\n".join(tables)
+        tables.append(f"{region}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>")
+    return f'<div class="cards">{"".join(tables)}</div>'
 
 
-def _bar(value: float, largest: float) -> str:
-    share = 100.0 * abs(value) / largest if largest else 0.0
-    return f'<span class="bar" style="width:{share:.1f}%"></span>'
+def _bars(metrics: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Return a bar for each metric that has something to be compared with.
+
+    Times are shown by the longest, which is the trial's; what each arm has, by the larger of the arms.
+    """
+    groups: dict[str, dict[str, float]] = {}
+    for name, one in metrics.items():
+        if one["value"] is not None:
+            group = "s" if one["unit"] == "s" else name.rpartition("/")[2]
+            groups.setdefault(group, {})[name] = abs(one["value"])
+    return {
+        name: f'<span class="bar" style="width:{100.0 * value / max(group.values()):.1f}%"></span>'
+        for group in groups.values()
+        if len(group) > 1 and max(group.values()) > 0.0
+        for name, value in group.items()
+    }
+
+
+def _worded(text: str) -> str:
+    """Return a text as HTML, with what stands between backticks as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def score_figures(recording: Recording, name: str) -> Iterator[Figure]:

@@ -101,7 +101,7 @@ class DeviceHost:
         """Take part in a run until it is over."""
         keys, planned = Keys(reply.session), reply.plan.participants[self._name]
         self._over.clear()
-        run = RunInfo(reply.plan, keys, reply.run, reply.admission)
+        run = RunInfo(reply.plan, keys, reply.run, reply.admission, reply.live_from_ns)
         with ExitStack() as stack:
             gone = session.liveliness().declare_subscriber(
                 keys.alive("hub", "hub"), Callback(self._on_hub, indirect=True), history=True

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import struct
 from collections.abc import Callable
 from time import monotonic_ns
 
@@ -17,6 +15,7 @@ from hub.recording.recorder import RecorderSummary
 from hub.recording.scores import score_numbers
 from hub.session.clock import Clock
 from hub.session.observer_reports import ObserverReports
+from hub.session.state_digests import StateDigests
 from hub.transport.refusals import Refusals
 from schemas.lockstep import Ack
 from schemas.scenario import Scenario
@@ -52,7 +51,7 @@ class Bookkeeping:
         self._devices = devices
         self._observer_reports = observer_reports
         self._answers = Histogram()
-        self._digests = {name: hashlib.blake2b(digest_size=16) for name in plan.order}
+        self._digests = StateDigests(plan.order)
         self._last_steps = dict.fromkeys(plan.order, -1)
         self._started_ns: int | None = None
         self._wall_ns: int | None = None
@@ -72,7 +71,7 @@ class Bookkeeping:
 
     def book(self, planned: PlannedParticipant, ack: Ack) -> int:
         """Book the hashes and the last step of an ack; return the simulated time (ns) at its end."""
-        self._digests[planned.name].update(struct.pack(f"<{len(ack.state_hash)}Q", *ack.state_hash))
+        self._digests.take(planned.name, ack.state_hash)
         first = ack.step + -ack.step % planned.period
         last = self._last_steps[planned.name] = first + (len(ack.state_hash) - 1) * planned.period
         return (last + planned.period) * self._plan.step_ns
@@ -126,9 +125,6 @@ class Bookkeeping:
 
     def summary(self, recorded: RecorderSummary | None, profile: Profile | None) -> Summary:
         """Return the summary of the run."""
-        digest = hashlib.blake2b(digest_size=16)
-        for name, part in sorted(self._digests.items()):
-            digest.update(name.encode() + part.digest())
         progress = self.progress()
         return Summary(
             session=self._scenario.name,
@@ -139,7 +135,7 @@ class Bookkeeping:
             real_time_factor=progress.real_time_factor,
             late_steps=progress.late_steps,
             dropped_messages=self._dropped,
-            state_hash=digest.hexdigest(),
+            state_hash=self._digests.whole,
             recording=None if recorded is None else str(recorded.path),
             recording_complete=None if recorded is None else recorded.complete,
             energy_residual_j=self._monitor.energy.residual_j,

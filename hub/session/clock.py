@@ -45,21 +45,22 @@ class Clock:
         window: The most steps of a grant; None: as many as are of use.
         realtime: Follow the wall clock.
         steps: The number of steps of the whole run; None: until it is stopped.
+        live_from: The steps before this one do not follow the wall clock.
     """
 
-    def __init__(self, plan: Plan, *, window: int | None, realtime: bool, steps: int | None) -> None:
+    def __init__(
+        self, plan: Plan, *, window: int | None, realtime: bool, steps: int | None, live_from: int = 0
+    ) -> None:
         self.step_ns = plan.step_ns
         self.step = 0
         self.late_steps = 0
         alone = not realtime and len(plan.hosts()) == 1
         self._window = most_steps(plan, window) if window or alone else 1
-        self.realtime = realtime
+        self.realtime = realtime and not live_from
         """Whether steps follow the wall clock."""
+        self._paced = realtime
         self.steps = steps
-        self._periods = sorted(
-            {plan.participants[inlet.target].period for inlet in plan.from_devices}
-            | {device.period for device in plan.meetings()}
-        )
+        self._periods = plan.stops()
         self._follows = bool(plan.from_devices)
         self._wall_zero_ns = self._observed_from_ns = monotonic_ns()
         self._slipped_ns = self._next_report_ns = 0
@@ -75,17 +76,18 @@ class Clock:
         return self.steps is not None and self.step >= self.steps
 
     def horizon(self, most: int | None = None) -> int:
-        """Return how many steps the next grant covers.
-
-        Inside a grant, no participant that reads a device may start a step, or it would miss the newest
-        samples; and no device may be due that is written what the others have computed.
-        """
+        """Return how many steps the next grant covers."""
         count = self._window if most is None else min(self._window, most)
         if self.steps is not None:
             count = min(count, self.steps - self.step)
         for period in self._periods:
             count = min(count, period - self.step % period)
         return count
+
+    def go_live(self) -> None:
+        """Follow the wall clock from now on, if the session does."""
+        self.realtime = self._paced
+        self.start()
 
     def start(self) -> None:
         """Let wall time run from now, at the start and after a pause."""

@@ -1,4 +1,4 @@
-"""The control queryables of a session: join, clock, pause, resume, step, set, link, shutdown."""
+"""The control queryables of a session: join, describe, clock, pause, resume, step, set, link, shutdown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,15 @@ from hub.devices.inlets import Inlets
 from hub.devices.network_link_control import NetworkLinkControl, NetworkLinkRequest
 from hub.participant.token_bucket import TokenBucket
 from hub.session.run_state import RunState
-from hub.transport.control_messages import ClockReply, Empty, JoinRequest, Refusal, SetRequest, StepRequest
+from hub.transport.control_messages import (
+    ClockReply,
+    DescribeReply,
+    Empty,
+    JoinRequest,
+    Refusal,
+    SetRequest,
+    StepRequest,
+)
 from hub.transport.control_text import MOST_BYTES, control_text
 from hub.transport.port_codec import PortCodec
 from hub.transport.refusals import Refusals
@@ -63,6 +71,7 @@ class ControlServer:
         inlets: What `set` writes into.
         network_links: What `link` changes.
         joins: What answers `join`.
+        description: The answer to `describe`.
         refusals: Counts the requests that are refused.
     """
 
@@ -74,6 +83,7 @@ class ControlServer:
         inlets: Inlets,
         network_links: NetworkLinkControl,
         joins: Joins,
+        description: DescribeReply,
         refusals: Refusals,
     ) -> None:
         self._refusals = refusals
@@ -85,6 +95,7 @@ class ControlServer:
             self._declare(
                 session, keys.join("**"), JoinRequest, joins.join, lambda request: keys.join(request.host)
             ),
+            self._declare(session, keys.control("describe"), Empty, lambda _: description),
             self._declare(session, keys.control("pause"), Empty, lambda _: self._done(state.pause())),
             self._declare(session, keys.control("resume"), Empty, lambda _: self._done(state.resume())),
             self._declare(

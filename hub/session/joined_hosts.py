@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from hub.planning.plan import Plan
+from hub.planning.renewal import Renewal
 from hub.transport.control_messages import Empty, JoinReply, JoinRequest
 from hub.transport.zenoh_session import LEASE_MS
 from schemas.errors import MessageError
@@ -31,6 +32,8 @@ class JoinedHosts:
         ack_keys: By host, the key with which it signs its acks.
         programs_endpoint: Where programs outside Trocar connect, on this machine.
         profile: The hosts of this machine keep a profile.
+        renewals: Where participants take other parameters.
+        live_from_ns: Simulated time before which the run repeats a recorded one.
     """
 
     def __init__(
@@ -46,8 +49,11 @@ class JoinedHosts:
         ack_keys: Mapping[str, bytes],
         programs_endpoint: str = "",
         profile: bool = False,
+        renewals: Sequence[Renewal] = (),
+        live_from_ns: int = 0,
     ) -> None:
         self._profile = profile
+        self._renewals, self._live_from_ns = renewals, live_from_ns
         self._ack_keys = ack_keys
         self._programs_endpoint = programs_endpoint
         self._watched = list(watched)
@@ -109,6 +115,8 @@ class JoinedHosts:
             ack_key=self._ack_keys[request.host].hex(),
             programs_endpoint="" if far else self._programs_endpoint,
             profile=self._profile and not far,
+            renewals=[one.of(names) for one in self._renewals],
+            live_from_ns=self._live_from_ns,
         )
 
     def lose(self, host: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import distributions
 from pathlib import Path
 from time import time_ns
@@ -13,19 +14,36 @@ from typing import Any
 from hub.participant import Device, Params, Stepped
 from hub.planning import registry
 from hub.planning.plan import Plan
+from hub.planning.renewal import made
 from hub.planning.scenario_file import ScenarioFile
 from hub.planning.wiring import make_plan
 from hub.recording.file_hashes import file_hashes
+from hub.recording.fork_origin import ATTACHMENT, ForkOrigin
 from hub.security import revoked
 from hub.security.access import access_settings
 from hub.security.credentials import HUB, examine, load
 from hub.security.gate import Gate
+from hub.session.past import Past
 from hub.session.session import Session
+from hub.session.step_loop import OnAck
 from hub.transport.loopback_port import LoopbackPort
 from hub.transport.router_client import RouterClient
 from schemas.scenario import Scenario
 
-__all__ = ["in_one_host", "launch", "plan_of"]
+__all__ = ["Continuation", "attachments_of", "in_one_host", "launch", "plan_of"]
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """A fork: how a session goes on from a recorded one."""
+
+    plan: Plan
+    """That of the scenario, with the start values of the parent."""
+    past: Past
+    origin: ForkOrigin
+    """It is kept in the recording."""
+    on_ack: OnAck
+    """Is called with every ack."""
 
 
 def plan_of(scenario: Scenario, params: Mapping[str, Params]) -> tuple[Plan, dict[str, Stepped | Device]]:
@@ -55,17 +73,27 @@ def launch(
     record: Path | None = None,
     one_host: bool = False,
     profile: bool = False,
+    continuation: Continuation | None = None,
 ) -> Session:
     """Return a session of a scenario file, ready to run; `one_host` puts every participant into this process.
 
     `outside` are the endpoints where other machines may join by TLS, with the hub's certificate from
-    `certificates`, by default this user's directory. `profile` measures where the time goes.
+    `certificates`, by default this user's directory. `profile` measures where the time goes. A fork is the
+    `continuation` of a recorded session.
     """
     scenario = in_one_host(loaded.scenario) if one_host else loaded.scenario
     plan, participants = plan_of(scenario, loaded.params)
-    here = {name: p for name, p in participants.items() if plan.participants[name].host == "hub"}
     directory = loaded.source.directory
-    attachments = {} if record is None else _attachments(scenario, plan, loaded)
+    here = {name: p for name, p in participants.items() if plan.participants[name].host == "hub"}
+    successors: dict[str, list[tuple[int, Stepped]]] = {}
+    if continuation is not None:
+        plan = continuation.plan
+        for name in here:
+            spec, renewals = scenario.participants[name], continuation.past.renewals
+            here[name], successors[name] = made(spec.kind, name, spec.params, renewals, directory)
+    attachments = {} if record is None else attachments_of(scenario, plan, loaded)
+    if continuation is not None:
+        attachments[ATTACHMENT] = continuation.origin.model_dump_json(indent=2).encode()
     foreign = {name: p.foreign_keys for name, p in participants.items() if isinstance(p, RouterClient)}
     gate = _gate(outside, certificates, access_settings(plan, scenario.name, foreign)) if outside else None
     return Session(
@@ -78,6 +106,9 @@ def launch(
         foreign_keys=[key for keys in foreign.values() for key in keys],
         record=record,
         attachments=attachments,
+        past=None if continuation is None else continuation.past,
+        successors=successors,
+        on_ack=None if continuation is None else continuation.on_ack,
         profile=profile,
     )
 
@@ -89,7 +120,7 @@ def _gate(endpoints: Sequence[str], certificates: Path | None, access: dict[str,
     return Gate(endpoints, credentials.listening() | access, credentials.file.parent / revoked.FILE)
 
 
-def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:
+def attachments_of(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[str, bytes]:
     """Return what a recording needs to be understood and re-simulated elsewhere."""
     source = loaded.source
     versions = {"python": platform.python_version(), "platform": platform.platform()}
@@ -103,7 +134,7 @@ def _attachments(scenario: Scenario, plan: Plan, loaded: ScenarioFile) -> dict[s
         "started_ns": time_ns(),
     }
     return {
-        "scenario.yaml": source.file.read_bytes(),
+        "scenario.yaml": source.text.encode(),
         "scenario.json": scenario.model_dump_json(indent=2).encode(),
         "plan.json": plan.model_dump_json(indent=2).encode(),
         "origin.json": json.dumps(origin, indent=2).encode(),

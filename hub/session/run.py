@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import zenoh
@@ -22,6 +22,7 @@ from hub.observation.measures import Measures
 from hub.observation.monitor import Monitor
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
+from hub.planning.renewal import Successors
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
 from hub.session.ack_receiver import AckReceiver
@@ -31,10 +32,12 @@ from hub.session.control_server import ControlServer
 from hub.session.first_failure import FirstFailure
 from hub.session.joined_hosts import JoinedHosts
 from hub.session.observer_reports import ObserverReports
+from hub.session.past import Past
 from hub.session.remote_reports import RemoteReports
 from hub.session.run_profile import RunProfile
 from hub.session.run_state import RunState
 from hub.session.status_reporter import StatusReporter
+from hub.transport.control_messages import DescribeReply
 from hub.transport.host_link import HubLink, has_link
 from hub.transport.lane import may_spin
 from hub.transport.refusals import Refusals
@@ -67,10 +70,19 @@ class SessionSpec:
     """Where programs outside Trocar connect; empty if no device has keys for them."""
     gate: Gate | None
     """Lets other machines in."""
-    resimulated: bool
-    """Grants come from a recording: no device is needed."""
+    past: Past | None = None
+    """What a recording has of this run."""
+    successors: Successors = field(default_factory=dict[str, Sequence[tuple[int, Stepped]]])
+    """Those of this process that take over from `participants`, and before which step."""
     profiled: bool = False
     """Where the time goes is measured."""
+    recording: str = ""
+    """The directory of the recording; empty: there is none."""
+
+    @property
+    def live_from(self) -> int | None:
+        """The step from which on devices lead; None: they never do."""
+        return 0 if self.past is None else self.past.live_from
 
     @property
     def stepped(self) -> dict[str, Stepped]:
@@ -80,7 +92,7 @@ class SessionSpec:
     @property
     def devices(self) -> dict[str, Device]:
         """The devices of this process that the run needs."""
-        if self.resimulated:
+        if self.live_from is None:
             return {}
         return {name: p for name, p in self.participants.items() if isinstance(p, Device)}
 
@@ -110,7 +122,7 @@ class Run:
         self.processes = HostProcesses(_links(plan))
         stack.callback(self.processes.end)
         self.refusals = Refusals()
-        self.clock = _clock(scenario, plan)
+        self.clock = _clock(scenario, plan, spec.live_from or 0)
         self.monitor = Monitor(plan, keys, self.number, Measures(scenario, plan), recorder)
         ack_keys = {host: secrets.token_bytes(_KEY_BYTES) for host in plan.hosts()}
         self.acks = AckReceiver(
@@ -147,6 +159,8 @@ class Run:
             ack_keys=ack_keys,
             programs_endpoint=spec.programs_endpoint,
             profile=spec.profiled,
+            renewals=() if spec.past is None else spec.past.renewals,
+            live_from_ns=self.live_from_ns,
         )
         self.status = StatusReporter(session, keys, self.bookkeeping, self.joined_hosts, self.monitor)
         answering.callback(self.status.undeclare)
@@ -182,6 +196,11 @@ class Run:
             log.info("%s", self.bookkeeping.detail)
         self.state.shutdown()
 
+    @property
+    def live_from_ns(self) -> int:
+        """Simulated time before which the run repeats a recorded one."""
+        return (self.spec.live_from or 0) * self.spec.plan.step_ns
+
     def _profile(self) -> RunProfile:
         return RunProfile(
             self.session, self.keys, self.spec.plan, self.number, self.clock, self.monitor, self.refusals
@@ -193,7 +212,10 @@ class Run:
         wire = Wire(self.session, self.keys, self.number, self.refusals, "hub", spin=spin)
         if self.profile is not None:
             self.profile.prepare(self.spec.stepped, wire)
-        return Host("hub", self.spec.plan, self.spec.stepped, wire=wire, listeners=self.monitor)
+        spec = self.spec
+        return Host(
+            "hub", spec.plan, spec.stepped, wire=wire, listeners=self.monitor, successors=spec.successors
+        )
 
     def _devices(self) -> SessionDevices:
         """Return the devices of the session, those of this process not yet open."""
@@ -202,7 +224,7 @@ class Run:
             if isinstance(device, RouterClient):
                 device.learn_hub(lambda: open_session("client", connect=[endpoint]))
         return SessionDevices(
-            RunInfo(self.spec.plan, self.keys, self.number),
+            RunInfo(self.spec.plan, self.keys, self.number, live_from_ns=self.live_from_ns),
             self.session,
             devices,
             self.host.device_inputs,
@@ -233,6 +255,13 @@ class Run:
             self.devices.inlets,
             self.devices.network_links,
             self.joined_hosts,
+            DescribeReply(
+                session=self.spec.scenario.name,
+                run=self.number,
+                scenario=self.spec.scenario,
+                plan=self.spec.plan,
+                recording=self.spec.recording,
+            ),
             self.refusals,
         )
         answering.callback(control.undeclare)
@@ -241,9 +270,10 @@ class Run:
             answering.callback(watch.undeclare)
 
 
-def _clock(scenario: Scenario, plan: Plan) -> Clock:
+def _clock(scenario: Scenario, plan: Plan, live_from: int) -> Clock:
     steps = None if scenario.duration is None else max(1, round(scenario.duration / scenario.step))
-    return Clock(plan, window=scenario.window, realtime=scenario.pace == "realtime", steps=steps)
+    realtime = scenario.pace == "realtime"
+    return Clock(plan, window=scenario.window, realtime=realtime, steps=steps, live_from=live_from)
 
 
 def _links(plan: Plan) -> dict[str, HubLink]:

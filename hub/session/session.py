@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -12,9 +12,11 @@ from hub.hosting.open_files import allow_open_files
 from hub.observation.summary import Progress, Summary
 from hub.participant import Device, Stepped
 from hub.planning.plan import Plan
+from hub.planning.renewal import Successors
 from hub.recording.recorder import Recorder
 from hub.security.gate import Gate
 from hub.security.outer_router import OuterRouter
+from hub.session.past import Past
 from hub.session.run import Run, SessionSpec
 from hub.session.run_state import RunState
 from hub.session.startup import start
@@ -24,7 +26,7 @@ from hub.transport.loopback_port import LoopbackPort
 from hub.transport.session_secret import listen_with_secret
 from schemas.errors import ScenarioError, SessionError
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import GrantMessage, Profile
+from schemas.trocar_msgs import Profile
 
 __all__ = ["Session"]
 
@@ -44,7 +46,8 @@ class Session:
         foreign_keys: Keys that devices share with programs, which meet them at a router of their own.
         record: The directory of the recording.
         attachments: What is kept in the recording beside the messages, by name.
-        grants: Re-simulate these instead of reading devices.
+        past: What a recording has of this run, to be simulated again before it goes on, or instead.
+        successors: Those of this process that take over from `participants`, and before which step.
         on_ack: Is called with every participant's ack of every grant.
         profile: Measure where the time goes, for summary, recording and `trocar ls`.
     """
@@ -61,7 +64,8 @@ class Session:
         foreign_keys: Sequence[str] = (),
         record: Path | None = None,
         attachments: Mapping[str, bytes] | None = None,
-        grants: Iterator[GrantMessage] | None = None,
+        past: Past | None = None,
+        successors: Successors | None = None,
         on_ack: OnAck | None = None,
         profile: bool = False,
     ) -> None:
@@ -81,7 +85,8 @@ class Session:
         self._directory = directory
         self._record = record
         self._attachments = dict(attachments or {})
-        self._grants = grants
+        self._past = past
+        self._successors = successors or {}
         self._on_ack = on_ack
         self._profiled = profile
         self._profile: Profile | None = None
@@ -123,8 +128,10 @@ class Session:
                         self.endpoint,
                         self.programs_endpoint,
                         self.gate,
-                        resimulated=self._grants is not None,
+                        past=self._past,
+                        successors=self._successors,
                         profiled=self._profiled,
+                        recording="" if self._record is None else str(self._record.resolve()),
                     )
                     run = Run(stack, spec, session, self.state, interrupt, recorder)
                     self._step(run, interrupt, progress)
@@ -135,7 +142,7 @@ class Session:
 
     def _step(self, run: Run, interrupt: Interrupt, progress: Callable[[Progress], None] | None) -> None:
         """Start a run and step it to its end, which its last status reports."""
-        steps = StepLoop(run, self._grants, self._on_ack)
+        steps = StepLoop(run, self._on_ack)
         if run.profile is not None:
             steps.show_to(run.profile)
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection
 from time import monotonic, monotonic_ns, sleep
 
 import zenoh
@@ -15,7 +15,6 @@ from hub.session.run import Run
 from hub.session.run_profile import RunProfile
 from hub.transport.publisher import Publisher
 from schemas.lockstep import Ack, Grant, pack_grant
-from schemas.trocar_msgs import GrantMessage
 
 __all__ = ["OnAck", "StepLoop"]
 
@@ -30,14 +29,11 @@ OnAck = Callable[[PlannedParticipant, Ack], None]
 
 
 class StepLoop:
-    """Steps a run to its end.
+    """Steps a run to its end; `on_ack` is called with every ack."""
 
-    `recorded` are the grants of an earlier run, to be given again; `on_ack` is called with every ack.
-    """
-
-    def __init__(self, run: Run, recorded: Iterator[GrantMessage] | None, on_ack: OnAck | None) -> None:
+    def __init__(self, run: Run, on_ack: OnAck | None) -> None:
         plan, session, keys = run.spec.plan, run.session, run.keys
-        self._run, self._recorded, self._on_ack = run, recorded, on_ack
+        self._run, self._on_ack, self._past = run, on_ack, run.spec.past
         self._step_ns = plan.step_ns
         self._participants = plan.participants
         self._order = plan.order
@@ -125,14 +121,29 @@ class StepLoop:
     def _next_grant(self, budget: int | None) -> Grant | None:
         """Return the next grant, of at most `budget` steps, with the samples that enter there."""
         run = self._run
-        if self._recorded is not None:
-            then = next(self._recorded, None)
-            if then is None:
+        if self._past is not None:
+            then = next(self._past.grants, None)
+            if then is not None:
+                if self._past.live_from is not None:
+                    run.devices.enter(then.start_ns, then.step)  # they are where they were at its end
+                return Grant(run.number, then.epoch, then.step, then.start_ns, then.horizon_ns, then.inlets)
+            if run.clock.step != self._past.live_from:
                 return None
-            return Grant(run.number, then.epoch, then.step, then.start_ns, then.horizon_ns, then.inlets)
+            return self._first_live(self._past.new_devices)
         step, time_ns = run.clock.step, run.clock.time_ns
         horizon_ns = time_ns + run.clock.horizon(budget) * self._step_ns
         return Grant(run.number, 0, step, time_ns, horizon_ns, run.devices.enter(time_ns, step))
+
+    def _first_live(self, new_devices: Collection[str]) -> Grant:
+        """Return the grant of one step with which the run goes on from its past."""
+        run, self._past = self._run, None
+        step, time_ns = run.clock.step, run.clock.time_ns
+        run.clock.go_live()
+        entering = run.devices.enter(time_ns, step)
+        entering = [one for one in entering if one.participant not in new_devices]
+        entering += run.devices.inlets.restart(new_devices)
+        log.info("live from %g s on", time_ns / 1e9)
+        return Grant(run.number, 0, step, time_ns, time_ns + self._step_ns, entering)
 
     def _step(self, grant: Grant) -> None:
         """Give a grant, take part in it, and wait until all others have.

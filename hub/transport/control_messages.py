@@ -7,9 +7,20 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from hub.planning.plan import Plan
+from hub.planning.renewal import Renewal
 from schemas.ports import BondSide
+from schemas.scenario import Scenario
 
-__all__ = ["ClockReply", "Empty", "JoinReply", "JoinRequest", "Refusal", "SetRequest", "StepRequest"]
+__all__ = [
+    "ClockReply",
+    "DescribeReply",
+    "Empty",
+    "JoinReply",
+    "JoinRequest",
+    "Refusal",
+    "SetRequest",
+    "StepRequest",
+]
 
 
 class _Json(BaseModel):
@@ -62,6 +73,17 @@ class ClockReply(_Json):
     replied_ns: int
 
 
+class DescribeReply(_Json):
+    """What a session is: for pages on the hub's machine."""
+
+    session: str
+    run: int
+    scenario: Scenario
+    plan: Plan
+    recording: str = ""
+    """The directory to which it is recorded; empty: it is not."""
+
+
 class JoinReply(_Json):
     """All that a host needs to create its participants."""
 
@@ -84,3 +106,7 @@ class JoinReply(_Json):
     """Where devices on the hub's machine meet programs outside Trocar; empty on other machines."""
     profile: bool = False
     """The host keeps a profile, for which the hub asks."""
+    renewals: list[Renewal] = []
+    """Where participants take other parameters."""
+    live_from_ns: int = 0
+    """Simulated time before which the run repeats a recorded one."""

@@ -11,6 +11,7 @@ from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
 from hub.transport.envelope import Tag
 from hub.transport.lane import LaneSender
+from hub.transport.page_feed import PageFeed
 from hub.transport.port_codec import PortCodec
 from hub.transport.publisher import Publisher
 from schemas.codec import encode
@@ -70,6 +71,7 @@ class PortPublisher:
         if feeds:
             key = keys.feed(planned.name, port.name)
             self._publishers.append(Publisher(session, key, block, self._update, always=False))
+        self._pages = PageFeed(session, keys.view(planned.name, port.name), self.codec, run, changed)
         self._update()
 
     def _update(self) -> None:
@@ -80,7 +82,11 @@ class PortPublisher:
     def needed(self) -> bool:
         """Whether anybody receives the values."""
         bundled = any(bundle.needs(index) for bundle, index in self._bundles)
-        return bool(self._lanes or self._needed or bundled)
+        return bool(self._lanes or self._needed or bundled or self._pages.needed)
+
+    def keep_first(self, value: Any) -> None:
+        """Keep the value at time 0 for pages that come later, if later ones may lack something."""
+        self._pages.keep_first(0, value)
 
     def put(self, step: int, time_ns: int, value: Any) -> None:
         """Publish the value computed in `step`, valid at `time_ns`."""
@@ -88,6 +94,8 @@ class PortPublisher:
             lane.send(step, value)
         if self._bundles:
             self._bundle(time_ns, value)
+        if self._pages.needed:
+            self._pages.put(step, time_ns, value)
         if not self._needed:
             return
         if not self.codec.is_event:
@@ -119,3 +127,4 @@ class PortPublisher:
             lane.close()
         for publisher in self._publishers:
             publisher.close()
+        self._pages.close()

@@ -57,6 +57,8 @@ class Wire:
         self._cells: list[RemoteCell] = []
         self.changes = 0
         """How often somebody has begun or ceased to receive an output."""
+        self.noted = 0
+        """As much of `changes` as the host has noted before the step that it takes."""
 
     def _count_change(self) -> None:
         self.changes += 1

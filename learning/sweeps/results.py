@@ -12,9 +12,9 @@ from learning.sweeps.variation import Variation, number_and_unit
 __all__ = ["flat", "write_plots", "write_table"]
 
 _ABOUT_THE_RUN = {
-    "trial", "repetition", "attempts", "node", "recording", "state", "error", "ending", "steps", "sim_time_s",
-    "wall_time_s", "real_time_factor", "late_steps", "dropped_messages", "state_hash", "recording_complete",
-    "energy_residual_j",
+    "trial", "repetition", "scenario_hash", "attempts", "node", "recording", "state", "error", "ending",
+    "steps", "sim_time_s", "wall_time_s", "real_time_factor", "late_steps", "dropped_messages", "state_hash",
+    "recording_complete", "energy_residual_j",
 }  # fmt: skip
 """Columns that are not plotted: they say how a trial went, not what came out."""
 _MOST_PLOTS = 12

@@ -11,9 +11,11 @@ however it ended, goes on where it stopped.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -62,14 +64,30 @@ class Sweep:
                     self.scenario, set=self._fixed() | _texts(first | {variation.path: value})
                 )
 
+    @cached_property
+    def scenario_hash(self) -> str:
+        """SHA-256 of the scenario of the first trial as it is now; comments are not in it.
+
+        Raises ScenarioError if the scenario is not valid.
+        """
+        first = self._fixed() | _texts(self.trials[0].settings)
+        scenario = trocar.load_scenario(self.scenario, set=first).scenario
+        return hashlib.sha256(scenario.model_dump_json().encode()).hexdigest()
+
     def open(self) -> None:
         """Create the directory, or go on with the sweep in it.
 
-        Raises ScenarioError if it holds another sweep, or something else.
+        Raises ScenarioError if it holds another sweep or something else, or if the scenario has changed.
         """
-        file, text = self.directory / "sweep.json", json.dumps(self._described(), indent=2) + "\n"
+        file, described = self.directory / "sweep.json", self._described()
         if file.exists():
-            if file.read_text(encoding="utf-8") != text:
+            now, there = described.pop("scenario_hash"), json.loads(_read(file))
+            if there.pop("scenario_hash", now) != now and there == described:
+                raise ScenarioError(
+                    f"the scenario '{self.scenario}' has changed since the sweep in '{self.directory}' began,"
+                    " so its trials would not be comparable: name a new directory, or undo the change"
+                )
+            if there != described:
                 raise ScenarioError(
                     f"'{self.directory}' holds another sweep (see {file}): name a new directory, or repeat"
                     " the command that began it"
@@ -78,7 +96,7 @@ class Sweep:
         if self.directory.exists() and (not self.directory.is_dir() or any(self.directory.iterdir())):
             raise ScenarioError(f"'{self.directory}' holds something else than a sweep; name a new directory")
         (self.directory / "trials").mkdir(parents=True)
-        _write(file, text)
+        _write(file, json.dumps(described, indent=2) + "\n")
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the rows of all trials that are done, in order."""
@@ -100,7 +118,8 @@ class Sweep:
         """
         pending = self.pending()
         made = _on_ray(ray, self._calls(pending)) if ray else _here(jobs, self._calls(pending))
-        for number, row in made:
+        for number, found in made:
+            row = {"scenario_hash": self.scenario_hash} | found
             _write(self._row(pending[number]), json.dumps(row, indent=2) + "\n")
             yield row
 
@@ -120,12 +139,14 @@ class Sweep:
         return {path: value for path, _, value in (each.partition("=") for each in self.overrides)}
 
     def _described(self) -> dict[str, Any]:
+        """Return what the sweep is, as `sweep.json` keeps it."""
         return {
             "scenario": self.scenario,
-            "vary": {variation.path: variation.values for variation in self.variations},
+            "scenario_hash": self.scenario_hash,
+            "vary": {variation.path: list(variation.values) for variation in self.variations},
             "repeat": self.repeat,
             "seed": self.seed,
-            "set": self.overrides,
+            "set": list(self.overrides),
             "recorded": self.recorded,
         }
 

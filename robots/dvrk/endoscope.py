@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from robots.dvrk.ecm import Endoscope, tip
+from robots.dvrk.ecm import JOINTS, Endoscope, tip
+from robots.serial_chain import SerialChain
 from schemas.vectors import Vector
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "WIDTH",
     "Eye",
     "StereoCamera",
+    "left_camera",
     "optical_in_roll",
 ]
 
@@ -76,3 +78,13 @@ def optical_in_roll(endoscope: Endoscope) -> Vector:
     The left camera's frame is half the baseline along -x of it, the right one's half along x.
     """
     return tip(endoscope, "view") @ _OPTICAL_IN_VIEW
+
+
+def left_camera(endoscope: Endoscope, baseline: float) -> SerialChain:
+    """Return the kinematics from `ECM_base` to the left camera's optical frame (x right, y down, z ahead).
+
+    `baseline` is the distance of the two cameras, m.
+    """
+    aside = np.eye(4)
+    aside[0, 3] = -0.5 * baseline
+    return SerialChain(JOINTS, optical_in_roll(endoscope) @ aside)

@@ -1,4 +1,4 @@
-"""The fixed things of a training scene as a scenario states them: which board or dish, and where it is."""
+"""The fixed things of a training scene as a scenario states them: which one, and where it is."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from robots import rotation
 from robots.dvrk.parameters import UnitQuaternion
 from robots.training.boards import BOARDS, Board
+from robots.training.phantoms import PHANTOMS, Phantom, PhantomName
 from schemas.quantity import Length
 from schemas.vectors import Vector
 
-__all__ = ["BoardName", "BoardParams", "DishParams", "FixtureParams"]
+__all__ = ["BoardName", "BoardParams", "DiscBoxParams", "DishParams", "FixtureParams", "PhantomParams"]
 
 BoardName = Literal["icra2026", "surrol", "fls"]
 """A key of `BOARDS`."""
@@ -54,5 +55,29 @@ class DishParams(_Fixture):
     kind: Literal["dish"]
 
 
-FixtureParams = Annotated[BoardParams | DishParams, Field(discriminator="kind")]
+class PhantomParams(_Fixture):
+    """A pad to be sutured; its frame is in the middle of its skin, x to the surgeon's right, z up.
+
+    What stands in the scene is the base under the skin; the skin itself is a participant of kind
+    `suture-pad`.
+    """
+
+    kind: Literal["phantom"]
+    phantom: PhantomName
+
+    @property
+    def measures(self) -> Phantom:
+        """Its skin, base and holes."""
+        return PHANTOMS[self.phantom]
+
+
+class DiscBoxParams(_Fixture):
+    """A red box with four white discs (`robots.training.targets`); its frame is amid the discs, z up."""
+
+    kind: Literal["disc-box"]
+
+
+FixtureParams = Annotated[
+    BoardParams | DishParams | PhantomParams | DiscBoxParams, Field(discriminator="kind")
+]
 """One thing that stands fast."""

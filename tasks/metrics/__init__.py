@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tasks.instant import Watched
 from tasks.metrics.counts import Clutching, Counts, Time
-from tasks.metrics.errors import Collisions, Forces, View
+from tasks.metrics.errors import Collisions, FixtureCollisions, Forces, View
 from tasks.metrics.metric import AnyMetric
 from tasks.metrics.motion import Economy, Paths, Turning, WorkingVolume
 from tasks.metrics.smoothness import Smoothness
@@ -20,6 +20,7 @@ def make_metrics(params: TaskParams, watched: Watched) -> tuple[Time, tuple[AnyM
         time,
         Counts(len(watched.things)),
         Collisions(watched),
+        *([] if watched.fixtures is None else [FixtureCollisions(watched)]),
         Forces(watched, params.force_limit),
         View(watched),
         Clutching(watched),

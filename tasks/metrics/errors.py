@@ -9,8 +9,13 @@ from schemas.trocar_msgs import ScoreValue
 from tasks.events import Event
 from tasks.instant import Instant, Watched
 from tasks.metrics.metric import NO_CAMERA, Metric, missing
+from tasks.objects import CONTACT_GAP
 
-__all__ = ["Collisions", "Forces", "View"]
+__all__ = ["Collisions", "FixtureCollisions", "Forces", "View"]
+
+_UNKNOWN = (
+    "contact is not known: connect or record tools/impulse, which a MuJoCo robot has in a scene with fixtures"
+)
 
 
 class CollisionsState(Record):
@@ -26,7 +31,7 @@ class Collisions(Metric[CollisionsState]):
 
     def __init__(self, watched: Watched) -> None:
         self.state = CollisionsState()
-        self._reason = "" if watched.tools else "contact is not known: connect or record tools/impulse"
+        self._reason = "" if watched.tools else _UNKNOWN
 
     def take(self, now: Instant, events: Sequence[Event]) -> None:
         """Count contacts."""
@@ -41,6 +46,47 @@ class Collisions(Metric[CollisionsState]):
                 yield missing(name, unit, self._reason)
             else:
                 yield ScoreValue(name=name, value=value, unit=unit)
+
+
+class FixtureCollisionsState(Record):
+    """Between instruments and fixtures."""
+
+    count = integer()
+    impulse = number()
+    """N s."""
+    gap = number(CONTACT_GAP)
+    """Time since they touched, s."""
+
+
+class FixtureCollisions(Metric[FixtureCollisionsState]):
+    """How often instruments touch boards, posts, walls and dishes, and the impulse of it.
+
+    A contact is a new one if there was none for `CONTACT_GAP`.
+    """
+
+    def __init__(self, watched: Watched) -> None:
+        self.state = FixtureCollisionsState()
+        self._known = watched.fixtures
+
+    def take(self, now: Instant, events: Sequence[Event]) -> None:  # noqa: ARG002
+        """Count contacts."""
+        state = self.state
+        state.gap += now.period_s
+        if now.fixture_impulse > state.impulse:
+            state.count += state.gap >= CONTACT_GAP
+            state.gap, state.impulse = 0.0, now.fixture_impulse
+
+    def values(self) -> Iterator[ScoreValue]:
+        """Yield the count and the impulse, N s."""
+        rows = (
+            ("fixture_collisions", float(self.state.count), ""),
+            ("fixture_impulse", self.state.impulse, "N*s"),
+        )
+        for name, value, unit in rows:
+            if self._known:
+                yield ScoreValue(name=name, value=value, unit=unit)
+            else:
+                yield missing(name, unit, "contact is not known: connect or record fixtures/impulse")
 
 
 class ForcesState(Record):

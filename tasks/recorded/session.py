@@ -33,10 +33,30 @@ def score_session(recording: Recording, rules: Sequence[str], *, trust: bool = F
     for name, spec in scenario.participants.items():
         if _is_task(spec.kind, trust=trust):
             task = _make(spec.kind, name, spec.params, rules, recording)
+            _require(recording, plan, task)
             found[name] = score(
                 task, _inputs(recording, plan, name), plan.participants[name].period * plan.step_ns
             )
     return found or {"practice": _without_task(recording, rules)}
+
+
+def _require(recording: Recording, plan: Plan, task: Task) -> None:
+    """Raise RecordingError if what the task cannot do without was not recorded."""
+    needed = {
+        port.name
+        for port in task.ports
+        if port.causality == "input" and port.variability != "event" and port.start is None
+    }
+    sources = [
+        f"{one.source}.{one.source_port}"
+        for one in plan.connections
+        if one.target == task.name and one.target_port in needed
+    ]
+    if missing := [source for source in sources if source not in recording]:
+        raise RecordingError(
+            f"'{recording.file}' cannot be scored: it lacks {', '.join(missing)}, which '{task.name}' reads;"
+            " `trocar run --record` records every topic: take all of them when a recording is filtered"
+        )
 
 
 def _inputs(recording: Recording, plan: Plan, task: str) -> dict[str, Stream]:
@@ -84,7 +104,7 @@ def _without_task(recording: Recording, rules: Sequence[str]) -> Scored:
     boards = [name for name in fixtures if _table(fixtures, name).get("kind") == "board"]
     kind = "peg-board-task" if boards else "practice-task"
     params = {key: scene[key] for key in ("mounting", "setup_joints") if key in scene}
-    params |= {"arms": arms, "objects": objects} | ({"fixtures": fixtures} if boards else {})
+    params |= {"arms": arms, "objects": objects} | ({"fixtures": fixtures} if fixtures else {})
     task = _make(kind, "practice", params, rules, recording)
     streams = {
         port.name: _stream(recording, f"{robot}.{port.name}", _PERIOD_NS)

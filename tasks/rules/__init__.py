@@ -8,11 +8,18 @@ from types import MappingProxyType
 from tasks.rules.fls import Fls
 from tasks.rules.icra2026 import Icra2026, Icra2026Live
 from tasks.rules.mscore import MScore
-from tasks.rules.rules import AnyRules, Rules, Setting
+from tasks.rules.rules import AnyRules, Rules, Setting, Suture
+from tasks.rules.src import Src1, Src2Rules, Src2Script, Src3Rules, Src3Script
 from tasks.rules.surrol import Surrol
 
-__all__ = ["RULES", "Rules", "Setting"]
+__all__ = ["GENERAL", "RULES", "Rules", "Setting", "Suture"]
 
-_ALL: tuple[type[AnyRules], ...] = (Icra2026, Icra2026Live, Surrol, Fls, MScore)
-RULES: Mapping[str, type[AnyRules]] = MappingProxyType({rules.name: rules for rules in _ALL})
+_GENERAL: tuple[type[AnyRules], ...] = (Icra2026, Icra2026Live, Surrol, Fls, MScore)
+_SUTURES: tuple[type[AnyRules], ...] = (Src1, Src2Script, Src2Rules, Src3Script, Src3Rules)
+RULES: Mapping[str, type[AnyRules]] = MappingProxyType(
+    {rules.name: rules for rules in (*_GENERAL, *_SUTURES)}
+)
 """By name."""
+
+GENERAL = tuple(rules.name for rules in _GENERAL)
+"""Those that a task has unless it states its own."""

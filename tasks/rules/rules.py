@@ -8,12 +8,29 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
 from hub.participant import Record
+from robots.training.needles import NeedleShape
 from schemas.trocar_msgs import ScoreValue
+from schemas.vectors import Vector
 from tasks.events import Event
 from tasks.goals import Goals
 from tasks.instant import Instant
 
-__all__ = ["AnyRules", "Rules", "Setting", "missing_all"]
+__all__ = ["AnyRules", "Rules", "Setting", "Suture", "missing_all"]
+
+
+@dataclass(frozen=True)
+class Suture:
+    """What rules know of a task in which a needle is to go through a phantom."""
+
+    holes: Vector
+    """Frames of all holes in the world, entries before exits, shape (2 n, 4, 4), m; z out of the tissue."""
+    needle: NeedleShape
+    thing: int
+    """Index of the needle among the objects."""
+    estimated: bool
+    """Whether there is an estimate of its pose."""
+    asked: bool
+    """Whether a report is what ends a stitch."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +44,7 @@ class Setting:
     camera: bool
     """Whether the endoscope's view is known."""
     benchmarks: Mapping[str, float]
+    suture: Suture | None = None
 
 
 S = TypeVar("S", bound=Record)

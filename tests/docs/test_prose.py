@@ -50,7 +50,11 @@ def test_words_are_plain(page):
 
 
 @pytest.mark.parametrize(
-    "folder", ["hub", "schemas", "robots", "engines", "controllers", "devices", "tasks", "learning", "trocar"]
+    "folder",
+    [
+        *("hub", "schemas", "robots", "engines", "controllers", "devices", "tasks", "learning"),
+        *("webconsole", "trocar"),
+    ],
 )
 def test_words_of_what_ships_are_plain(folder):
     for file in sorted((ROOT / folder).rglob("*.py")):
@@ -61,7 +65,10 @@ def test_words_of_what_ships_are_plain(folder):
 @cache
 def source():
     """All code as one text, without the seams between the parts of a string."""
-    folders = ("hub", "schemas", "robots", "engines", "controllers", "devices", "tasks", "learning", "trocar")
+    folders = (
+        *("hub", "schemas", "robots", "engines", "controllers", "devices", "tasks", "learning"),
+        *("webconsole", "trocar"),
+    )
     files = [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
     text = "\n".join(file.read_text("utf-8") for file in files)
     return re.sub(r'"\s*\n\s*f?"', "", text)

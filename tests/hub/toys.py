@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from hub.participant import Device, ForceSide, MotionSide, Params, Sample, Stepped, state_hash
+from hub.participant import Controller, Device, ForceSide, MotionSide, Params, Sample, Stepped, state_hash
 from schemas.ports import BondSide, Port
 from schemas.ros import Float64MultiArray, Header, Joy, Point, Pose, PoseStamped, StringMessage, Time
 from schemas.trocar_msgs import SoftBodyState
@@ -192,6 +192,36 @@ class Follower(Chain):
         self.stale_steps[0] += inputs.stale("hand")
         self.fold(inputs["hand"], self.pressed, self.stale_steps)
         return {"pressed": self.pressed, "stale_steps": self.stale_steps}
+
+
+class SumParams(Params):
+    gain: float = 1.0
+    offset: float = 0.0
+
+
+class Sum(Controller):
+    """Adds up where a hand is while it is fresh; it can save its state."""
+
+    params_model = SumParams
+
+    @property
+    def ports(self):
+        return (
+            Port(name="hand", causality="input", type=POSE),
+            Port(name="offset", causality="input", start=(self.params.offset,)),
+            Port(name="total", causality="output", size=SIZE),
+        )
+
+    def configure(self, setup):
+        self.total = np.zeros(SIZE)  # sum, steps in which the hand was stale, steps
+        self.keep(self.total)
+        return {"total": self.total}
+
+    def step(self, t, h, inputs):
+        stale = inputs.stale("hand")
+        moved = 0.0 if stale else self.params.gain * inputs["hand"][0]
+        self.total += moved + inputs["offset"][0], stale, 1.0
+        return {"total": self.total}
 
 
 class Deaf(Bare):

@@ -1,4 +1,7 @@
 import re
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 from math import pi
 
 import numpy as np
@@ -175,3 +178,35 @@ def test_the_frames_of_several_chains_are_those_of_each_to_the_bit():
     q = np.random.default_rng(3).uniform(chains[0].lower, chains[0].upper, (2, 3, 6))
     each = np.array([[chain.frames(row) for row in rows] for chain, rows in zip(chains, q, strict=True)])
     assert SerialChains(chains).frames(q).tobytes() == each.tobytes()
+
+
+def test_a_copy_of_a_chain_computes_for_itself():
+    chain = CHAINS["PSM1"]
+    q = np.array([0.1, 0.2, 0.12, 0.1, 0.2, 0.3])
+    frames = chain.frames(q)
+    copied = deepcopy(chain)
+    assert np.array_equal(copied.frames(-q), chain.frames(-q))
+    assert np.array_equal(copied.frames(q), frames)
+
+
+def test_one_configuration_has_the_bits_of_many():
+    psm = CHAINS["PSM1"]
+    q = many(psm)
+    assert psm.frames(q).tobytes() == np.stack([psm.frames(one) for one in q]).tobytes()
+
+
+def test_threads_that_share_a_chain_do_not_disturb_one_another():
+    psm = CHAINS["PSM1"]
+    goals = many(psm)[:8]
+    expected = [psm.frames(q).tobytes() for q in goals]
+
+    def differs(i):
+        return any(psm.frames(goals[i]).tobytes() != expected[i] for _ in range(500))
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(len(goals)) as pool:
+            assert not any(pool.map(differs, range(len(goals))))
+    finally:
+        sys.setswitchinterval(before)

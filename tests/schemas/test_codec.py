@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from schemas.codec import (
@@ -21,6 +22,7 @@ from schemas.errors import MessageError
 from schemas.message import Message, msg_text
 from schemas.ros import BoolMessage, Float64Message, JointState, PoseStamped, StringMessage
 from schemas.trocar_msgs import GrantMessage
+from schemas.visualization import ColorRGBA, MarkerArray
 from tests.strategies import any_message
 
 # parts of services are not recorded
@@ -182,3 +184,16 @@ def test_crtk_types_are_those_that_crtk_publishes() -> None:
         "crtk_msgs/msg/StringStamped": "std_msgs/Header header\nstring string\n",
     }
     assert {name: msg_text(message_type(name)) for name in published} == published
+
+
+def test_a_first_sequence_that_is_too_long_is_refused_unread() -> None:
+    payload = b"\0\1\0\0" + (10_000).to_bytes(4, "little")
+    with pytest.raises(MessageError, match="10000 markers, allowed are at most 4000 in one message"):
+        decode(MarkerArray, payload)
+
+
+def test_a_single_precision_number_is_what_arrives_of_it() -> None:
+    assert ColorRGBA(r=0.1).r == float(np.float32(0.1))
+    assert ColorRGBA(r=0.1).r != 0.1
+    with pytest.raises(ValidationError, match="beyond the range of float32"):
+        ColorRGBA(r=1e300)

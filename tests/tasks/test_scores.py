@@ -63,10 +63,18 @@ def test_other_rules_may_be_asked_for_later(session):
         score_session(recording, ["flss"])
 
 
+def test_a_recording_without_what_the_task_reads_says_what_it_lacks(session, monkeypatch):
+    recorded = Recording.__contains__
+    lacks = "robot.needle/pose"
+    monkeypatch.setattr(Recording, "__contains__", lambda file, port: port != lacks and recorded(file, port))
+    with pytest.raises(RecordingError, match=r"it lacks robot.needle/pose, which 'task' reads.*--record"):
+        score_session(Recording(session[0]), [])
+
+
 def test_the_report_shows_card_events_and_paths(session, tmp_path):
     report(Recording(session[0]), tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()
-    for words in ("Task task", "task: events", "PSM1: path of the tip", 'class="bar"', "mscore passed"):
+    for words in ("Score: task", "task: events", "PSM1: path of the tip", 'class="bar"', "mscore passed"):
         assert words in text
 
 

@@ -73,7 +73,7 @@ class Board:
         self.values = {
             name: np.array(given[name], np.float64) for name in given if name not in self.events_in
         }
-        self.values["tools/impulse"] = np.zeros(1)
+        self.values["tools/impulse"] = self.values["fixtures/impulse"] = np.zeros(1)
         connected = frozenset(given) - frozenset(without)
         self.outputs = task.configure(Setup(PERIOD_NS, None, connected=connected))
         self.events = []
@@ -127,6 +127,34 @@ def test_metrics_end_with_the_task():
     before = board.card.metrics
     board.values["PSM1/measured_cp"][:3] += 0.1
     assert board.wait(1.0).card.metrics == before
+
+
+def test_rings_over_the_wall_and_back():
+    board = Board(peg_board(legs=2)).carry("one", 9).carry("two", 10)
+    assert (board.outputs["done"][0], board.outputs["progress"][0]) == (0.0, 0.5)
+    board.carry("one", 3).carry("two", 4)
+    assert (board.outputs["done"][0], board.card.goals) == (1.0, 4)
+    points = {rule.rules: rule.values[0].value for rule in board.card.rules}
+    assert points["icra2026"] == 4
+
+
+def test_without_an_end_there_is_no_share_of_the_goals():
+    board = Board(peg_board(legs=None)).carry("one", 9).carry("two", 10).carry("one", 3)
+    assert (board.outputs["done"][0], board.card.goals, board.card.reached) == (0.0, 0, 3)
+
+
+def test_instruments_that_touch_fixtures_again_after_a_pause_have_touched_twice():
+    board = Board(peg_board()).wait(0.5)
+    assert (board.metric("fixture_collisions"), board.metric("fixture_impulse")) == (0, 0.0)
+    for more, seconds in ((0.01, 0.05), (0.02, 0.3), (0.5, 0.1)):
+        board.values["fixtures/impulse"] = board.values["fixtures/impulse"] + more
+        board.wait(seconds)
+    assert (board.metric("fixture_collisions"), board.metric("fixture_impulse")) == (2, pytest.approx(0.53))
+    unknown = Board(peg_board(), without=("fixtures/impulse",)).wait(0.1)
+    assert "fixtures/impulse" in unknown.metric("fixture_collisions")
+    without = practice()
+    without.configure(Setup(PERIOD_NS, None))
+    assert "fixture_collisions" not in {metric.name for metric in without.card(0).metrics}
 
 
 def test_a_ring_beside_its_post_is_not_on_it():

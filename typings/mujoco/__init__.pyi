@@ -32,11 +32,16 @@ class mjtLightType(IntEnum):
     mjLIGHT_DIRECTIONAL = ...
 
 class mjtGeom(IntEnum):
+    mjGEOM_ARROW = ...
     mjGEOM_CYLINDER = ...
+    mjGEOM_ELLIPSOID = ...
+    mjGEOM_TRIANGLE = ...
     mjGEOM_MESH = ...
     mjGEOM_BOX = ...
     mjGEOM_CAPSULE = ...
     mjGEOM_SPHERE = ...
+    mjGEOM_PLANE = ...
+    mjGEOM_ELLIPSOID = ...
 
 class mjtCtrlInput(IntEnum):
     mjINPUT_POS = ...
@@ -164,6 +169,7 @@ class MjsBody(MjsElement):
 class MjsKey:
     name: str
     qpos: _Array
+    qvel: _Array
     ctrl: _Array
 
 class MjSpec:
@@ -208,6 +214,8 @@ class _Element:
     objid: NDArray[np.int32]
     dofadr: NDArray[np.int32]
     qposadr: NDArray[np.int32]
+    geomadr: NDArray[np.int32]
+    geomnum: NDArray[np.int32]
 
 class _Skin:
     vertadr: NDArray[np.int32]
@@ -216,6 +224,7 @@ class _Skin:
 class MjModel:
     @staticmethod
     def from_xml_string(xml: str) -> MjModel: ...
+    opt: MjOption
     nq: int
     ngeom: int
     stat: MjStatistic
@@ -238,8 +247,23 @@ class MjModel:
     body_gravcomp: _Array
     body_dofadr: NDArray[np.int32]
     body_parentid: NDArray[np.int32]
+    nsite: int
     geom_bodyid: NDArray[np.int32]
+    geom_dataid: NDArray[np.int32]
+    geom_group: NDArray[np.int32]
+    geom_matid: NDArray[np.int32]
+    geom_pos: _Array
+    geom_quat: _Array
+    geom_rgba: NDArray[np.float32]
+    geom_rbound: _Array
     geom_size: _Array
+    mat_rgba: NDArray[np.float32]
+    mesh_face: NDArray[np.int32]
+    mesh_faceadr: NDArray[np.int32]
+    mesh_facenum: NDArray[np.int32]
+    mesh_vert: NDArray[np.float32]
+    mesh_vertadr: NDArray[np.int32]
+    mesh_vertnum: NDArray[np.int32]
     geom_type: NDArray[np.int32]
     eq_active0: NDArray[np.uint8]
     eq_data: _Array
@@ -282,6 +306,7 @@ class MjData:
     xmat: _Array
     ctrl: _Array
     qpos: _Array
+    qvel: _Array
     sensordata: _Array
     site_xmat: _Array
     site_xpos: _Array
@@ -309,9 +334,7 @@ def mj_step1(m: MjModel, d: MjData) -> None: ...
 def mj_step2(m: MjModel, d: MjData) -> None: ...
 def mju_mulQuat(res: _Array, qa: _Array, qb: _Array) -> None: ...
 def mju_negQuat(res: _Array, quat: _Array) -> None: ...
-def mju_rayGeom(
-    pos: _Array, mat: _Array, size: _Array, pnt: _Array, vec: _Array, geomtype: int
-) -> float: ...
+def mju_rayGeom(pos: _Array, mat: _Array, size: _Array, pnt: _Array, vec: _Array, geomtype: int) -> float: ...
 def mju_rotVecQuat(res: _Array, vec: _Array, quat: _Array) -> None: ...
 def mju_quatZ2Vec(quat: _Array, vec: _Array) -> None: ...
 def mju_subQuat(res: _Array, qa: _Array, qb: _Array) -> None: ...
@@ -384,7 +407,15 @@ class MjvLight:
     dir: _Numbers
     headlight: int
 
+class MjvGeom:
+    size: _Array
+    emission: float
+    specular: float
+
 class MjvScene:
+    maxgeom: int
+    ngeom: int
+    geoms: tuple[MjvGeom, ...]
     lights: tuple[MjvLight, ...]
     stereo: int
     flags: NDArray[np.uint8]
@@ -403,6 +434,9 @@ def mjr_readPixels(
 ) -> None: ...
 def mjr_render(viewport: MjrRect, scn: MjvScene, con: MjrContext) -> None: ...
 def mjr_setBuffer(framebuffer: int, con: MjrContext) -> None: ...
+def mjv_initGeom(
+    geom: MjvGeom, type: int, size: _Array, pos: _Array, mat: _Array, rgba: NDArray[np.float32]
+) -> None: ...
 def mjv_defaultFreeCamera(m: MjModel, cam: MjvCamera) -> None: ...
 def mjv_updateScene(
     m: MjModel, d: MjData, opt: MjvOption, pert: None, cam: MjvCamera, catmask: int, scn: MjvScene

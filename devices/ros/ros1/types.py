@@ -2,7 +2,8 @@
 
 ROS 1 aligns nothing, ends no string with a zero, and has a counter in every header. rosbags converts, and
 has the definitions of Noetic, in which some fields have other names than in ROS 2 (`CameraInfo`); types that
-it lacks (CRTK, tf2) are the same in both and come from our models.
+it lacks (CRTK, tf2) are the same in both and come from our models. Where a type of ROS 2 has fields more than
+Noetic's (markers), they are left out on the way there, and empty on the way back.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ import struct
 from functools import cache
 from hashlib import md5
 
+from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from schemas.codec import message_types, typestore
+from schemas.codec import check_first_sequence, message_type, message_types, typestore
 from schemas.errors import MessageError
 from schemas.message import msg_text
 
@@ -78,10 +80,17 @@ class Wire:
         self._type, self._store = type_, typestore()
         fields = self._store.fielddefs[type_][1]
         self._counted = bool(fields) and fields[0][1][1] == _HEADER
+        self._is_same = is_same_wireformat(_noetic(), self._store, type_, type_)
+        self._defaults: dict[str, object] = {}
+        """By type: what rosbags puts in for fields that one side lacks."""
 
     def frame(self, cdr: bytes, count: int) -> bytearray:
         """Return the frame of a message; `count` is the sequence number of its header, if it has one."""
-        message = self._store.cdr_to_ros1(memoryview(cdr), self._type)
+        message = (
+            self._store.cdr_to_ros1(memoryview(cdr), self._type)
+            if self._is_same
+            else self._migrated(cdr, to_ros2=False)
+        )
         frame = bytearray(_LENGTH.size + len(message))
         frame[_LENGTH.size :] = message
         if self._counted:
@@ -96,8 +105,25 @@ class Wire:
         Raises MessageError if the bytes are no such message.
         """
         try:
+            if not self._is_same:
+                check_first_sequence(message_type(self._type), message[:4], "little")
+                return bytes(self._migrated(message, to_ros2=True))
             return bytes(self._store.ros1_to_cdr(message, self._type))
         except (SerdeError, AssertionError, IndexError, struct.error, ValueError) as error:
             raise MessageError(
                 f"{self._type}: {len(message)} bytes are no such message of ROS 1 ({error})"
             ) from error
+
+    def _migrated(self, message: bytes, *, to_ros2: bool) -> memoryview:
+        """Return a message in the layout of the other side, field by field: far slower than as bytes."""
+        source, target = (_noetic(), self._store) if to_ros2 else (self._store, _noetic())
+        return migrate_bytes(
+            source,
+            target,
+            self._type,
+            self._type,
+            self._defaults,
+            message,
+            src_is2=not to_ros2,
+            dst_is2=to_ros2,
+        )

@@ -5,7 +5,8 @@ and services from jhu-cisst/cisst-ros (commit 73aca61c, mts_ros_crtk_bridge_prov
 jhu-dvrk/sawIntuitiveResearchKit (commit 9e535e68, ros/dvrk_robot/src/system_ROS.cpp and
 core/components/code/mtsIntuitiveResearchKit{Arm,PSM,ECM,MTM,SUJ}.cpp); what programs in Python need in
 addition from jhu-dvrk/dvrk_python (a1b337b3) and crtk_python_client (33b4c387); cameras from
-jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst). All events are latched, as there.
+jhu-dvrk/dvrk-readthedocs (53699e4d, docs/pages/video/software/ros.rst); `markers` and `error` of a camera are
+ours. All events are latched, as there.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from schemas.ros import (
     StringMessage,
     TFMessage,
 )
+from schemas.visualization import MarkerArray
 
 __all__ = ["NOT_SERVED", "dvrk_table"]
 
@@ -177,6 +179,8 @@ def _camera(camera: str) -> Iterator[Row]:
             _event(camera, f"{eye}/{name}", type_, latched=False) for name, type_ in _PICTURES.items()
         )
         yield _event(camera, f"{eye}/camera_info", CameraInfo.ros_type, latched=False)
+    yield _command(camera, "markers", MarkerArray.ros_type)
+    yield _event(camera, "error", StringMessage.ros_type)
 
 
 def _real_state(owner: str, name: str, type_: str, **more: object) -> Row:

@@ -2,7 +2,8 @@
 
 Behind it is a participant of kind `paper`. Names and types as in the scripts of their scenes
 (unina-icaros/dvrk-vrep, 88fe5975, V-REP_scenes), with the topics that their Python client publishes in
-addition (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names there.
+addition (65ef3ccd, dvrk_python/src/dvrk_python/robot.py). Joint states have no names there. Ours are
+`/stereo/markers` and `/stereo/error`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,17 @@ from devices.ros.topics.row import Row
 from robots.dvrk.mounted import MountedEcm, MountedPsm
 from robots.dvrk.setup_joints import CartArm
 from schemas.ports import Port
-from schemas.ros import BoolMessage, CameraInfo, Image, JointState, Pose, StringMessage
+from schemas.ros import (
+    BoolMessage,
+    CameraInfo,
+    Float64MultiArray,
+    Image,
+    JointState,
+    Pose,
+    PoseStamped,
+    StringMessage,
+)
+from schemas.visualization import MarkerArray
 
 __all__ = ["vrep_table"]
 
@@ -30,7 +41,9 @@ _STITCHES = {
     "delete_stitches": _BOOL,
     "state_current": _STRING,
 }
-"""What their suture planner publishes: received and recorded, not drawn."""
+"""What their suture planner publishes; a participant of kind `vrep-sutures` makes markers of it."""
+_FILTER = {"kalmanOutput": PoseStamped.ros_type, "Tcn_hat": Float64MultiArray.ros_type}
+"""What their filter publishes: here a participant of kind `needle-tracker`."""
 
 
 def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
@@ -40,8 +53,11 @@ def vrep_table(params: GatewayParams) -> tuple[Row, ...]:
         _state("dvrk/setup_joint", "state_joint_current", size=_SETUP_JOINTS),
         _event("dvrk/setup_joint", "robot_state", _STRING),
         *(row for eye in ("left", "right") for row in _camera(eye)),
+        _command("stereo", "markers", MarkerArray.ros_type),
+        _event("stereo", "error", _STRING, latched=True),
         Row("/release_needle", _BOOL, "subscribe", _output("release_needle", _BOOL)),
         *(_command("suture_planner", name, type_) for name, type_ in _STITCHES.items()),
+        *(Row(f"/{name}", type_, "publish", _input(name, type_)) for name, type_ in _FILTER.items()),
         DIAGNOSTICS_ROW,
     )
 
@@ -77,12 +93,16 @@ def _state(owner: str, name: str, *, size: int = 1, fields: tuple[str, ...] = ("
 
 
 def _event(owner: str, name: str, type_: str, *, latched: bool = False) -> Row:
-    port = Port(name=f"{owner}/{name}", causality="input", type=type_, variability="event")
+    port = _input(f"{owner}/{name}", type_)
     return Row(f"/{owner}/{name}", type_, "publish", port, latched=latched, owner=owner)
 
 
 def _command(owner: str, name: str, type_: str) -> Row:
     return Row(f"/{owner}/{name}", type_, "subscribe", _output(f"{owner}/{name}", type_), owner=owner)
+
+
+def _input(name: str, type_: str) -> Port:
+    return Port(name=name, causality="input", type=type_, variability="event")
 
 
 def _output(name: str, type_: str) -> Port:

@@ -74,6 +74,7 @@ class Holding:
         self._model, self._data = model, data
         self._rays = Rays(model, data, things, _jaws(scene)) if scene.grasp == "proximity" else None
         self._settled = 1 if self._rays is not None else max(1, round(_SETTLED / period))
+        self._things, self._arms = {thing: i for i, thing in enumerate(things)}, arms
         self._numbers = [int(arm[-1]) for arm in arms]
         self._bodies = [model.body(thing).id for thing in things]
         # in what slip is measured: what a ray holds does not move with a finger
@@ -152,6 +153,11 @@ class Holding:
         for i, holder in enumerate(map(int, self._holder.tolist())):
             if holder >= 0:
                 self._values[i, :3] = self._numbers[holder], self._slip(i, holder), self._turn(i, holder)
+
+    def holder(self, thing: str) -> str | None:
+        """Return the arm that holds an object, the first of two; None while none does."""
+        holder = int(self._holder[self._things[thing]])
+        return self._arms[holder] if holder >= 0 else None
 
     def _choose_holder(self, i: int) -> None:
         """Keep the arm that holds object `i` as long as it does; then take the first that does."""

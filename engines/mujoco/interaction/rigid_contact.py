@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.interaction.collisions import Collisions
 from engines.mujoco.interaction.mechanics import moment
 from engines.mujoco.model import instrument_body
 from schemas.vectors import Vector
@@ -22,8 +23,16 @@ class RigidContact:
     an instrument with itself do not count.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arms: Iterable[str]) -> None:
-        """Watch the instruments of `arms`."""
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        arms: Iterable[str],
+        *,
+        fixtures: Iterable[str] = (),
+        substep: float = 0.0,
+    ) -> None:
+        """Watch the instruments of `arms`, and how they collide if there are `fixtures`; `substep` in s."""
         self._model, self._data, arms = model, data, list(arms)
         self._owner = _owners(model, arms)
         self._welds = [
@@ -34,12 +43,18 @@ class RigidContact:
         self._to_base: list[Vector] = [
             np.kron(np.eye(2), data.site_xmat[model.site(f"{arm}/base").id].reshape(3, 3).T) for arm in arms
         ]
+        self._index = {arm: i for i, arm in enumerate(arms)}
         self._arms = np.arange(len(arms))
         self._sums, self._means = np.zeros((len(arms), 6)), np.zeros((len(arms), 6))
         self._substeps, self._is_touched, self._was_touched = 0, False, False
-        self._geoms, self._found = b"", np.zeros(0, np.intp)
-        """Pairs of geoms in contact as they were last seen, and which of the contacts count."""
+        self._geoms, self._found, self._kinds = b"", np.zeros(0, np.intp), np.zeros(0, np.intp)
+        """Pairs of geoms in contact as they were last seen, which of them count, and as what collisions."""
+        self.collisions = Collisions(model, self._owner, fixtures, substep) if fixtures else None
+        self._sides = np.zeros((0, len(arms)))
+        """Of each of these whether its second geom (1), its first (-1) or none (0) is of an arm."""
         self.outputs = {f"{arm}/rigid_wrench": mean for arm, mean in zip(arms, self._means, strict=True)}
+        if self.collisions is not None:
+            self.outputs |= self.collisions.outputs
 
     def add(self) -> None:
         """Add the forces of one sub-step; call it between `mj_step2` and `mj_step1`.
@@ -66,12 +81,36 @@ class RigidContact:
         self._sums[:] = 0.0
         self._substeps, self._is_touched, self._was_touched = 0, False, True
 
+    def refresh(self) -> None:
+        """Update the outputs that are not those of the last step."""
+        if self.collisions is not None:
+            self.collisions.refresh()
+
+    def give(self, arm: str, wrench: Vector, to: Vector) -> None:
+        """Move the part of a mean that is `wrench` (N, N m about the world's origin) to another output.
+
+        Nothing moves in a step in which nothing rigid touches the arm.
+        """
+        i = self._index[arm]
+        if not self._means[i].any():
+            return
+        at_tip = wrench.copy()
+        at_tip[3:] -= moment(self._data.sensordata[self._tips[i]], wrench[:3])
+        part = self._to_base[i] @ at_tip
+        self._means[i] -= part
+        to += part
+
     def _add_contacts(self) -> None:
         geoms = self._data.contact.geom  # (contacts, 2)
         pairs = geoms.tobytes()
         if pairs != self._geoms:  # most contacts last: objects lie on the table for many sub-steps
             owners = self._owner[geoms]
-            self._geoms, self._found = pairs, (owners[:, 0] != owners[:, 1]).nonzero()[0]
+            self._geoms = pairs
+            self._found = (owners[:, 0] != owners[:, 1]).nonzero()[0]
+            if self.collisions is not None:
+                self._kinds = self.collisions.kinds(geoms[self._found])
+            owned = owners[self._found][:, :, None] == self._arms
+            self._sides = owned[:, 1] * 1.0 - owned[:, 0]
         if self._found.size:
             self._add_forces(self._found)
 
@@ -81,16 +120,12 @@ class RigidContact:
         loads = np.empty((len(found), 6))  # on the second geom: force and torque
         for load, i in zip(loads, found.tolist(), strict=True):
             mujoco.mj_contactForce(model, data, i, load)
+        if self.collisions is not None:
+            self.collisions.add(self._kinds, loads[:, :3])
         loads.reshape(-1, 2, 3)[:] = loads.reshape(-1, 2, 3) @ contact.frame[found].reshape(-1, 3, 3)
-        owners, at, tips = (
-            self._owner[contact.geom[found]][:, :, None] == self._arms,
-            contact.pos[found],
-            data.sensordata[self._tips],
-        )
-        sides = owners[:, 1] * 1.0 - owners[:, 0]  # (found, arms)
-        loads[:, 3:] += moment(at, loads[:, :3])
-        total = sides.T @ loads
-        total[:, 3:] -= moment(tips, total[:, :3])
+        loads[:, 3:] += moment(contact.pos[found], loads[:, :3])
+        total = self._sides.T @ loads
+        total[:, 3:] -= moment(data.sensordata[self._tips], total[:, :3])
         self._sums += total
 
     def _add_weld(self, weld: int, owner: int) -> None:

@@ -1,4 +1,4 @@
-"""Boards and dishes, as bodies of the MuJoCo model that stand still.
+"""Boards, dishes, phantoms and boxes with discs, as bodies of the MuJoCo model that stand still.
 
 Every post and dish is a body of its own: MuJoCo looks for contacts between bodies whose boxes overlap.
 """
@@ -14,12 +14,19 @@ import numpy as np
 from engines.mujoco.model.objects import LEVEL
 from engines.mujoco.model.poses import placed
 from robots.training.dishes import DISH
-from robots.training.fixtures import BoardParams, DishParams, FixtureParams
+from robots.training.fixtures import BoardParams, DiscBoxParams, DishParams, FixtureParams, PhantomParams
+from robots.training.targets import BOX, DISC_HEIGHT, DISC_RADIUS, DISCS
 
 __all__ = ["add"]
 
 _BOARD, _POST, _WALL = [0.16, 0.19, 0.24, 1.0], [0.82, 0.84, 0.86, 1.0], [0.55, 0.62, 0.68, 0.55]
 _DISH, _BOTTOM = [0.75, 0.8, 0.84, 1.0], [0.9, 0.92, 0.94, 1.0]
+_BASE = [0.55, 0.5, 0.42, 1.0]
+_IN, _OUT = [0.1, 0.2, 0.9, 1.0], [0.85, 0.1, 0.1, 1.0]
+"""Insertion blue, extraction red, as in the authors' scene."""
+_HOLE = 0.8e-3
+"""Radius of the dot that marks a hole, m."""
+_RED, _WHITE = [0.8, 0.05, 0.05, 1.0], [1.0, 1.0, 1.0, 1.0]
 _SEEN: dict[str, Any] = {"contype": 0, "conaffinity": 0}
 _SEGMENTS = 24
 """Boxes that make a rim: their inner faces are at most 0.25 mm off the circle."""
@@ -28,11 +35,16 @@ _FILM = 1e-4
 
 
 def add(spec: mujoco.MjSpec, name: str, params: FixtureParams) -> None:
-    """Add one board or dish to the world, as bodies `name` and `name/...`."""
-    if isinstance(params, BoardParams):
-        _add_board(spec, name, params)
-    else:
-        _add_dish(spec, name, params)
+    """Add one fixture to the world, as bodies `name` and `name/...`."""
+    match params:
+        case BoardParams():
+            _add_board(spec, name, params)
+        case DishParams():
+            _add_dish(spec, name, params)
+        case PhantomParams():
+            _add_phantom(spec, name, params)
+        case DiscBoxParams():
+            _add_disc_box(spec, name, params)
 
 
 def _add_board(spec: mujoco.MjSpec, name: str, params: BoardParams) -> None:
@@ -71,6 +83,38 @@ def _add_dish(spec: mujoco.MjSpec, name: str, params: DishParams) -> None:
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, pos=[0.0, 0.0, _FILM / 2.0], rgba=_BOTTOM, **_SEEN
     )
+
+
+def _add_phantom(spec: mujoco.MjSpec, name: str, params: PhantomParams) -> None:
+    """Add the base under the skin, which instruments and needles pass through: another engine has it."""
+    x, y, z = params.measures.skin
+    half = [x / 2.0, y / 2.0, params.measures.base / 2.0]
+    body = _at(spec, name, params.pose, (0.0, 0.0, -z - half[2]))
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=_BASE, **LEVEL)
+    skin = _at(spec, f"{name}/holes", params.pose, (0.0, 0.0, 0.0))
+    for hole, kind in zip(params.measures.holes, params.measures.names, strict=True):
+        skin.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            size=[_HOLE, _FILM, 0.0],
+            pos=[*hole[:2, 3], 0.0],
+            rgba=_IN if kind.startswith("entry") else _OUT,
+            **_SEEN,
+        )
+
+
+def _add_disc_box(spec: mujoco.MjSpec, name: str, params: DiscBoxParams) -> None:
+    body = _at(spec, name, params.pose, (0.0, 0.0, 0.0))
+    half = [extent / 2.0 for extent in BOX]
+    middle = [0.0, 0.0, -DISC_HEIGHT - half[2]]
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=half, pos=middle, rgba=_RED)
+    for x, y in DISCS:
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            size=[DISC_RADIUS, DISC_HEIGHT / 2.0, 0.0],
+            pos=[x, y, -DISC_HEIGHT / 2.0],
+            rgba=_WHITE,
+            **_SEEN,
+        )
 
 
 def _at(

@@ -51,6 +51,10 @@ at rest costs a few contacts and not two for each of its capsules.
 """
 LEVEL = {"contype": _THINGS, "conaffinity": _TABLE}
 """Collision bits of what things lie on."""
+_PAD = {"contype": 0, "conaffinity": _TABLE}
+"""Of a soft table, which touches things and not the instruments."""
+_SOLID = {"contype": _THINGS | _TABLE, "conaffinity": _THINGS}
+"""Of a thing that lies on its own faces."""
 _BALLS_APART = pi / 4.0
 """Greatest angle between two of those balls, rad."""
 _RGBA = {
@@ -59,6 +63,9 @@ _RGBA = {
     "block": [0.9, 0.75, 0.2, 1.0],
     "table": [0.32, 0.45, 0.4, 1.0],
 }
+_GREEN, _BLUE = [0.05, 0.8, 0.1, 1.0], [0.05, 0.1, 0.95, 1.0]
+_TIP_BALL = 0.45e-3
+"""Radius, m, of the ball at the tip of a marked needle (unina-icaros/dvrk-vrep, dVRK-needletracking.ttt)."""
 _COLOURS = (
     [0.9, 0.2, 0.15, 1.0],
     [0.95, 0.75, 0.1, 1.0],
@@ -81,8 +88,9 @@ def add_table(spec: mujoco.MjSpec, params: TableParams) -> None:
     """
     x, y, z = params.position
     half = [extent / 2.0 for extent in params.size]
+    bits = _PAD if params.soft else LEVEL
     body = spec.worldbody.add_body(name="table", pos=[x, y, z - half[2]])
-    body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=_RGBA["table"], **LEVEL)
+    body.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=_RGBA["table"], **bits)
 
 
 def start_pose(name: str, params: ObjectParams, seed: int | None) -> tuple[Vector, Vector]:
@@ -112,6 +120,7 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams, seed: int | None =
                 size=half,
                 density=params.density,
                 rgba=_RGBA[params.kind],
+                **_SOLID,
                 **CONTACT,
             )
         case RingParams() | NeedleParams():
@@ -123,6 +132,7 @@ def add(spec: mujoco.MjSpec, name: str, params: ObjectParams, seed: int | None =
                 size=half,
                 mass=PIECE.mass,
                 rgba=_colour(name),
+                **_SOLID,
                 **_rubbing(PIECE.friction),
             )
         case TriangleParams():
@@ -193,7 +203,8 @@ def _add_wire(body: mujoco.MjsBody, params: RingParams | NeedleParams) -> None:
     # the angle whose chord is that far from its arc
     most = 2.0 * acos(1.0 - min(1.0, _ROUNDNESS * thickness / radius))
     points = _on_arc(params, max(4, ceil(params.arc / most)))
-    rgba = _RGBA[params.kind]
+    is_marked = isinstance(params, NeedleParams) and params.marked
+    rgba = _GREEN if is_marked else _RGBA[params.kind]
     for start, end in pairwise(points):
         size, ends = [thickness, 0.0, 0.0], np.concatenate([start, end])
         bits = {"contype": _THINGS | _WIRES, "conaffinity": _WIRES}
@@ -204,6 +215,16 @@ def _add_wire(body: mujoco.MjsBody, params: RingParams | NeedleParams) -> None:
         size, bits = [thickness, 0.0, 0.0], {"contype": _TABLE, "conaffinity": 0}
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=point, mass=0.0, rgba=rgba, **bits, **CONTACT
+        )
+    if is_marked:
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[_TIP_BALL, 0.0, 0.0],
+            pos=points[-1],
+            mass=0.0,
+            rgba=_BLUE,
+            contype=0,
+            conaffinity=0,
         )
     mass, centre, inertia = wire_inertia(radius, thickness, params.arc, params.density)
     body.mass, body.ipos, body.inertia, body.explicitinertial = mass, [centre, 0.0, 0.0], inertia, True

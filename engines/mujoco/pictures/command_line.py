@@ -46,7 +46,7 @@ def render(
         typer.Option(metavar="NAME", help="Whose scene, where several participants are of kind mujoco."),
     ] = None,
 ) -> None:
-    """Draw the scene of a recording at one moment, with its soft bodies."""
+    """Draw the scene of a recording at one moment, with its soft bodies and markers."""
     if output.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"'{output}' is not a picture: .png or .jpg", param_hint="--output")
     for package in ("mujoco", "PIL"):

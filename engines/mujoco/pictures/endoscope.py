@@ -10,22 +10,24 @@ import logging
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from io import BytesIO
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.markers.store import shown_markers
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams
 from engines.mujoco.pictures.skins import SoftBody
 from engines.mujoco.ports import position_count
 from hub.participant import Inputs, Outputs, Params, Setup, Stepped, state_hash
 from robots.dvrk.endoscope import EYES, Eye, StereoCamera
-from schemas.errors import MissingExtraError, StateError
+from schemas.codec import decode, encode
+from schemas.errors import MessageError, MissingExtraError, StateError
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.ros import CameraInfo, CompressedImage, Header, Image, Time
-from schemas.trocar_msgs import SoftBodyState
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 
 if TYPE_CHECKING:
     from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
@@ -46,6 +48,7 @@ class Endoscope(Stepped):
         super().__init__(name, params)
         self._positions = np.zeros(position_count(params))
         self._bodies = {organ: SoftBody(f"{organ}/nodes") for organ in params.skins}
+        self._shown: ShownMarkers | None = None
         self._frame = f"{name}_left_optical"
         kinds: dict[str, type[Message]] = {} if params.images == "none" else {"camera_info": CameraInfo}
         if params.images in ("raw", "both"):
@@ -90,7 +93,14 @@ class Endoscope(Stepped):
             )
             for organ in self._bodies
         )
-        return (qpos, *bodies, *self._pictures)
+        markers = Port(
+            name="markers",
+            causality="input",
+            type=ShownMarkers.ros_type,
+            frame="world",
+            description="all markers to draw, as a participant of kind `markers` publishes them",
+        )
+        return (qpos, *bodies, *((markers,) if self.params.markers else ()), *self._pictures)
 
     def configure(self, setup: Setup) -> Outputs:  # noqa: ARG002
         """Build the scene, unless soft bodies are missing from it.
@@ -134,11 +144,14 @@ class Endoscope(Stepped):
         self._positions[:] = inputs["qpos"]
         for organ, body in self._bodies.items():
             body.take(inputs.message(f"{organ}/nodes"))
+        if self.params.markers:
+            self._shown = cast("ShownMarkers | None", inputs.message("markers"))
         if not self._gl:
             return self._outputs({})
         scene = self._scene or self._build()
         header = Header(stamp=Time.from_ns(t), frame_id=self._frame)
-        pictures = scene.draw(self._positions)
+        markers = () if self._shown is None else tuple(shown_markers(self._shown))
+        pictures = scene.draw(self._positions, markers)
         return self._outputs(
             {
                 f"{eye}/{name}": message
@@ -181,29 +194,43 @@ class Endoscope(Stepped):
         return np.frombuffer(file.getvalue(), np.uint8)
 
     def state_hash(self) -> int:
-        """Return the hash of the positions and nodes that were drawn last.
+        """Return the hash of the positions, nodes and markers that were drawn last.
 
         Pixels are left out, since two machines need not draw the same ones.
         """
         return state_hash(self.save())
 
     def save(self) -> bytes:
-        """Return the positions last drawn, and the state of the soft bodies."""
-        return self._positions.tobytes() + b"".join(body.save() for body in self._bodies.values())
+        """Return the positions last drawn, the state of the soft bodies, and the markers."""
+        bodies = b"".join(body.save() for body in self._bodies.values())
+        markers = b"" if self._shown is None else encode(self._shown)
+        return self._positions.tobytes() + bodies + markers
 
     def restore(self, state: bytes) -> None:
         """Return to a saved state. Raises StateError if it does not fit this scene."""
         size, rest = self._positions.nbytes, state[self._positions.nbytes :]
         for body in self._bodies.values():
             rest = body.restore(rest)
+        shown = None
+        if self.params.markers and rest:
+            shown, rest = self._restored_markers(rest), b""
         if len(state) < size or rest:
             raise StateError(
                 f"participant '{self.name}': a saved state of {len(state)} bytes does not fit; was it saved"
                 " by another scene?"
             )
         self._positions[:] = np.frombuffer(state, np.float64, self._positions.size)
+        self._shown = shown
         if self._bodies:
             self.close()  # their surfaces may be others
+
+    def _restored_markers(self, state: bytes) -> ShownMarkers:
+        try:
+            return decode(ShownMarkers, state)
+        except MessageError as error:
+            raise StateError(
+                f"participant '{self.name}': a saved state with markers that cannot be read: {error}"
+            ) from error
 
     def close(self) -> None:
         """Free the OpenGL context."""

@@ -65,6 +65,10 @@ class EndoscopeParams(SceneParams):
             "soft bodies of other engines to draw; the input `<name>/nodes` receives the nodes of each"
         ),
     )
+    markers: bool = Field(
+        default=False,
+        description="draw what the input `markers` receives from a participant of kind `markers`",
+    )
     images: Literal["raw", "compressed", "both", "none"] = Field(
         default="raw", description="what is published of each picture; none: the camera is off"
     )

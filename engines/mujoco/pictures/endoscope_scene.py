@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.mujoco.markers.frames import SceneFrames
+from engines.mujoco.markers.solids import Shape, extents, solids
+from engines.mujoco.markers.store import ShownMarker
 from engines.mujoco.model import spec
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.skins import Skins, SoftBody
 from engines.mujoco.pictures.stereo import StereoRenderer
+from robots import rotation
 from robots.dvrk.endoscope import FAR, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
 from schemas.vectors import Vector
@@ -39,6 +43,7 @@ class EndoscopeScene:
         self._skins = Skins(scene, bodies, params.skins)
         self._model = scene.compile()
         self._data = mujoco.MjData(self._model)
+        self._frames = SceneFrames(params, self._model)
         self._carrier = -1
         far = params.far
         if params.view is not None:
@@ -55,15 +60,37 @@ class EndoscopeScene:
             self._model, params.camera, (params.near, far), gl, shadows=params.shadows
         )
 
-    def draw(self, positions: Vector) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,)."""
+    def draw(
+        self, positions: Vector, markers: Sequence[ShownMarker] = ()
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Return both pictures, shape (height, width, 3), at `positions`, shape (nq,), with `markers`."""
         model, data = self._model, self._data
         self._skins.show(model)
         data.qpos[:] = positions
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
-        return self._renderer.render(data, self._pose())
+        pose = self._pose()
+        shapes = [
+            solid
+            for marker in markers
+            for solid in solids(marker, lambda frame: self._frames.pose(frame, data), pose, self._shapes)
+        ]
+        return self._renderer.render(data, pose, shapes)
+
+    def _shapes(self, thing: str) -> list[Shape]:
+        """Return the shapes of an object that can be seen and are no meshes, in its frame."""
+        model, body = self._model, self._model.body(thing)
+        return [
+            Shape(
+                int(model.geom_type[geom]),
+                extents(int(model.geom_type[geom]), model.geom_size[geom]),
+                model.geom_pos[geom],
+                rotation.matrix(np.roll(model.geom_quat[geom], -1)),
+            )
+            for geom in range(int(body.geomadr[0]), int(body.geomadr[0] + body.geomnum[0]))
+            if model.geom_rgba[geom, 3] > 0.0 and model.geom_dataid[geom] < 0
+        ]
 
     def close(self) -> None:
         """Free the OpenGL context."""

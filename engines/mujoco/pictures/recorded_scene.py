@@ -1,24 +1,27 @@
-"""A moment of a recorded session as a picture: the scene of its robot, with all soft bodies."""
+"""Moments of a recorded session as pictures: the scene of its robot, with all soft bodies and markers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
+from engines.mujoco.markers.store import ShownMarker, shown_markers
 from engines.mujoco.params import MujocoParams, SceneParams
 from engines.mujoco.pictures import opengl
 from engines.mujoco.pictures.endoscope_params import EndoscopeParams, ViewParams
 from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
 from engines.mujoco.pictures.skins import SoftBody
-from hub.recording.bag import output_port
+from hub.recording.bag import BagMessage, output_port
 from hub.recording.recording import Recording
 from schemas.codec import decode
 from schemas.errors import MessageError, RecordingError, TrocarError
+from schemas.message import Message
 from schemas.scenario import ParticipantSpec
-from schemas.trocar_msgs import SoftBodyState
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import Vector, VectorCodec
 
 __all__ = ["Camera", "RecordedScene"]
@@ -26,6 +29,8 @@ __all__ = ["Camera", "RecordedScene"]
 Camera = Literal["overview", "left", "right"]
 
 Point = tuple[float, float, float]
+
+M = TypeVar("M", bound=Message)
 
 _ASIDE = np.array([0.5, -0.72, 0.48])
 """Direction from which the overview looks: between the axes and from above, so that three sides of a box are
@@ -44,7 +49,7 @@ class RecordedScene:
     def __init__(self, recording: Recording, robot: str | None = None) -> None:
         """Find the participant `robot`, by default the first of kind mujoco.
 
-        Raises RecordingError if there is none.
+        Raises RecordingError if there is none, or if no scene can be built of its parameters.
         """
         self._recording = recording
         participants = recording.scenario().participants
@@ -56,12 +61,20 @@ class RecordedScene:
                 f" {', '.join(robots) or 'none'}"
             )
         name = robot or robots[0]
-        self._params = MujocoParams.model_validate(participants[name].params)
+        try:
+            self._params = MujocoParams.model_validate(participants[name].params)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise RecordingError(
+                f"'{recording.file}': no scene of '{name}' can be built: {where}: {first['msg']}"
+            ) from error
         self._qpos = f"/engine/{name}/out/qpos"
         self._looks, self._lens = _looks(participants), _lens(participants)
         self._nodes = _by_body(
             [topic for topic, kind in recording.topics.items() if kind == SoftBodyState.ros_type]
         )
+        self._markers = [topic for topic, kind in recording.topics.items() if kind == ShownMarkers.ros_type]
 
     def picture(
         self,
@@ -83,67 +96,103 @@ class RecordedScene:
         Raises RecordingError if the recording does not contain what is asked for, TrocarError if nothing can
         be drawn on this machine.
         """
-        gl = opengl.find()
-        if not gl.name:
-            raise TrocarError(
-                f"no OpenGL works here ({gl.detail}), so there are no pictures. To fix it: {opengl.REMEDY}"
-            )
-        positions, bodies = self._positions(time_ns), self._bodies(time_ns)
+        bodies = self._bodies_at(time_ns)
         width, height = size
-        shown: dict[str, Any] = {
-            "width": _OVERSAMPLING * width,
-            "height": _OVERSAMPLING * height,
-            "looks": True,
-        }
-        shown["skins"] = {name: self._looks.get(name, {}) for name in bodies}
+        shown: dict[str, Any] = {"width": _OVERSAMPLING * width, "height": _OVERSAMPLING * height}
         if camera == "overview":
             shown |= {"view": self._overview(bodies, position, target), "baseline": 0.0}
-        elif "ECM" not in self._params.arms:
+        elif not self._has_endoscope:
             raise RecordingError(
                 f"'{self._recording.file}': no ECM in the scene, so there is no '{camera}' picture of an"
                 " endoscope; take the overview"
             )
         else:
             shown |= self._lens
-        # a default that is stated may be refused
-        stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)
-        scene = EndoscopeScene(EndoscopeParams.model_validate(stated | shown), gl.name, bodies)
-        try:
-            left, right = scene.draw(positions)
-        finally:
-            scene.close()
+        ((left, right),) = self._draw([time_ns], shown, bodies)
         return _reduced(right if camera == "right" else left)
 
-    def _positions(self, time_ns: int) -> Vector:
-        newest = None
-        for message in self._recording.messages(self._qpos):
-            if message.time_ns <= time_ns:
-                newest = message
+    def stereo(
+        self, times_ns: Iterable[int], size: tuple[int, int]
+    ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
+        """Yield the pictures of both eyes at each of `times_ns`, shape (height, width, 3), RGB.
+
+        They are what the endoscope of the session would publish at this size, always with the looks of arms.
+        In a scene without ECM two cameras, as far apart as its eyes, look at the soft bodies and objects, or
+        at the whole scene.
+
+        Args:
+            times_ns: simulated times, ascending; a picture shows the newest state published by then.
+            size: width and height, pixels.
+
+        Raises what `picture` raises.
+        """
+        bodies = self._bodies_at(0)
+        shown: dict[str, Any] = {"width": size[0], "height": size[1]}
+        if self._has_endoscope:
+            shown |= self._lens
+        elif bodies or self._params.objects:
+            shown["view"] = self._overview(bodies, None, None)
+        yield from self._draw(times_ns, shown, bodies)
+
+    @property
+    def _has_endoscope(self) -> bool:
+        return "ECM" in self._params.arms
+
+    def _draw(
+        self, times_ns: Iterable[int], shown: Mapping[str, Any], bodies: Mapping[str, SoftBody]
+    ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
+        """Yield both pictures at each time with the cameras `shown`; `bodies` are moved."""
+        gl = opengl.find()
+        if not gl.name:
+            raise TrocarError(
+                f"no OpenGL works here ({gl.detail}), so there are no pictures. To fix it: {opengl.REMEDY}"
+            )
+        # a default that is stated may be refused
+        stated = self._params.model_dump(include=set(SceneParams.model_fields), exclude_unset=True)
+        looks = {"looks": True, "skins": {name: self._looks.get(name, {}) for name in bodies}}
+        params = EndoscopeParams.model_validate(stated | looks | dict(shown))
+        positions = _Newest(self._recording, self._qpos)
+        nodes = {name: _Newest(self._recording, self._nodes[name]) for name in bodies}
+        markers = [_Newest(self._recording, topic) for topic in self._markers]
+        scene = EndoscopeScene(params, gl.name, bodies)
+        try:
+            for time_ns in times_ns:
+                for name, newest in nodes.items():
+                    if (message := newest.at(time_ns)) is not None:
+                        bodies[name].take(self._decoded(SoftBodyState, message))
+                yield scene.draw(
+                    self._positions(positions.at(time_ns), time_ns), self._shown(markers, time_ns)
+                )
+        finally:
+            scene.close()
+
+    def _shown(self, markers: Iterable[_Newest], time_ns: int) -> list[ShownMarker]:
+        """Return the markers that are shown at `time_ns`, of all participants that keep some."""
+        messages = (message for newest in markers if (message := newest.at(time_ns)) is not None)
+        return [one for message in messages for one in shown_markers(self._decoded(ShownMarkers, message))]
+
+    def _positions(self, newest: BagMessage | None, time_ns: int) -> Vector:
         if newest is None:
             raise RecordingError(
                 f"'{self._recording.file}': nothing on '{self._qpos}' up to {time_ns * 1e-9:g} s"
             )
         return VectorCodec(output_port(newest.topic, newest.type, newest.payload)).decode(newest.payload)
 
-    def _bodies(self, time_ns: int) -> Mapping[str, SoftBody]:
+    def _bodies_at(self, time_ns: int) -> dict[str, SoftBody]:
+        """Return the soft bodies that are known at a time, as their first messages describe them."""
         bodies: dict[str, SoftBody] = {}
         for name, topic in self._nodes.items():
-            body, newest = SoftBody(topic), None
-            for message in self._recording.messages(topic):
-                if not len(body.rest):
-                    body.take(self._decoded(topic, message.payload))
-                if message.time_ns <= time_ns:
-                    newest = message
-            if newest is not None:
-                body.take(self._decoded(topic, newest.payload))
-                bodies[name] = body
+            first = next(self._recording.messages(topic), None)
+            if first is not None and first.time_ns <= time_ns:
+                bodies[name] = SoftBody(topic)
+                bodies[name].take(self._decoded(SoftBodyState, first))
         return bodies
 
-    def _decoded(self, topic: str, payload: bytes) -> SoftBodyState:
+    def _decoded(self, model: type[M], message: BagMessage) -> M:
         try:
-            return decode(SoftBodyState, payload)
+            return decode(model, message.payload)
         except MessageError as error:
-            raise RecordingError(f"'{self._recording.file}': topic '{topic}': {error}") from error
+            raise RecordingError(f"'{self._recording.file}': topic '{message.topic}': {error}") from error
 
     def _overview(
         self, bodies: Mapping[str, SoftBody], position: Point | None, target: Point | None
@@ -162,6 +211,21 @@ class RecordedScene:
         centre = 0.5 * (low + high) if target is None else np.array(target)
         away = _DISTANCE * max(float(np.linalg.norm(high - low)), _LEAST) * _ASIDE
         return ViewParams(position=position or tuple(centre + away), target=tuple(centre))
+
+
+class _Newest:
+    """The newest message of a topic at times that ascend."""
+
+    def __init__(self, recording: Recording, topic: str) -> None:
+        self._messages = recording.messages(topic)
+        self._next = next(self._messages, None)
+        self._newest: BagMessage | None = None
+
+    def at(self, time_ns: int) -> BagMessage | None:
+        """Return the newest message up to `time_ns`; None if there is none."""
+        while self._next is not None and self._next.time_ns <= time_ns:
+            self._newest, self._next = self._next, next(self._messages, None)
+        return self._newest
 
 
 def _by_body(topics: list[str]) -> dict[str, str]:

@@ -22,20 +22,20 @@ PERIOD = 10_000_000
 class World:
     """Two hands and the things of an installed scenario."""
 
-    def __init__(self, name, **params):
+    def __init__(self, name, *, poses=None, **params):
         given = load(name, []).params["lead"]
         self.expert = Expert("lead", ExpertParams.model_validate(given.model_dump() | params))
         self.outputs = self.expert.configure(Setup(PERIOD, ".")) or {}
-        self.things = {thing: framed(np.array(pose)) for thing, pose in starts(name).items()}
+        self.things = {thing: framed(np.array(pose)) for thing, pose in starts(name).items()} | (poses or {})
         self.held, self.jaws, self.tips, self.grips, self.t = {}, {}, {}, {}, 0
-        for each in self.expert._transfers:
+        for each in self.expert._team.hands:
             hand = each.hand
             self.tips[hand.arm] = hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
             self.jaws[hand.arm] = 0.5
 
     def step(self, **events):
         values = {}
-        for each in self.expert._transfers:
+        for each in self.expert._team.hands:
             arm = each.hand.arm
             values[f"{arm}/local/measured_cp"] = pose_of(np.linalg.inv(each.hand.base) @ self.tips[arm])
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
@@ -46,7 +46,7 @@ class World:
             values[f"objects/{thing}/held_by"] = np.array([min(holders, default=0.0)])
         out = self.expert.step(self.t, PERIOD, Inputs(values, events=events))
         self.t += PERIOD
-        for each in self.expert._transfers:
+        for each in self.expert._team.hands:
             self._follow(each.hand, out)
         return out
 
@@ -98,13 +98,88 @@ def test_everything_is_carried_where_it_belongs_at_the_first_attempt(name):
 
 def test_what_is_lost_on_its_way_is_taken_up_again():
     world = World("peg-board-surrol")
-    carrying = world.expert._transfers[0]
+    carrying = world.expert._team.hands[0]
     world.run(20, until=lambda _: carrying.state.phase is Phase.CARRY)
     thing, _ = world.grips.pop("PSM1")
     world.things[thing] = framed(np.array(starts("peg-board-surrol")[thing]))
     world.run(120)
     assert world.outputs["dropped"][0] == 1
     assert world.outputs["placed"][0] == len(world.things)
+
+
+def one_ring(name, pose=None, **params):
+    """A world with the first ring only, at `pose`, or where it starts."""
+    objects = {"ring1": load(name, []).params["lead"].objects["ring1"].model_dump()}
+    world = World(name, objects=objects, **params)
+    world.things = {"ring1": world.things["ring1"] if pose is None else pose}
+    return world
+
+
+def fallen(x, y, z, turn=0.0):
+    """The pose (m) of a ring that lies on its side."""
+    c, s = np.cos(turn), np.sin(turn)
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    pose[:3, 3] = x, y, z
+    return pose
+
+
+@pytest.mark.parametrize(
+    ("name", "pose", "attempts"),
+    [
+        ("peg-board-surrol", fallen(0.105, 1.120, 0.8099), 2),
+        ("peg-board", fallen(0.100, 1.135, 0.7849, 1.0), 3),
+        ("peg-board", fallen(0.055, 1.140, 0.7849), 5),  # beyond the wall: over, and over again
+    ],
+)
+def test_a_ring_that_lies_on_its_side_is_put_upright_first(name, pose, attempts):
+    world = one_ring(name, pose).run(90)
+    assert world.expert.ended == "the task is done"
+    assert world.outputs["attempts"][0] == attempts
+    assert abs(world.things["ring1"][2, 2]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_rings_go_there_and_back():
+    world = one_ring("peg-board", legs=2).run(90)
+    assert world.expert.ended == "the task is done"
+    assert world.things["ring1"][0, 3] > 0.078  # on the surgeon's left again
+    assert world.outputs["attempts"][0] == 4
+
+
+@pytest.mark.parametrize(
+    ("pose", "why", "count"),
+    [
+        (fallen(0.105, 0.5, 0.810), "is not reachable", "not_reachable"),
+        (fallen(0.105, 1.12, 0.5), "has fallen off the table", "lost"),
+    ],
+)
+def test_what_cannot_be_taken_is_said_and_left(pose, why, count):
+    world, said = one_ring("peg-board-surrol", pose), []
+    while not world.expert.ended and world.t < 5e9:
+        said += world.step()["status"]
+    assert [message.data for message in said] == [f"ring1 {why}, at {position(pose)} mm"]
+    assert world.expert.ended == f"nothing more can be done: {said[0].data}"
+    assert (world.outputs[count][0], world.outputs["done"][0]) == (1, 0)
+
+
+def position(pose):
+    return f"({', '.join(f'{1e3 * x:.0f}' for x in pose[:3, 3])})"
+
+
+def test_a_ring_that_slips_out_of_every_grasp_is_left_after_some():
+    world = one_ring("peg-board-surrol")
+    for _ in range(6000):
+        world.grips.clear()
+        if world.step() and world.expert.ended:
+            break
+    assert "ring1 is blocked" in world.expert.ended
+    assert world.outputs["attempts"][0] == 8
+
+
+def test_pieces_do_not_go_back():
+    stated = load("pick-and-place", []).params["lead"].model_dump()
+    with pytest.raises(ValidationError, match="only rings of a board go back"):
+        ExpertParams.model_validate(stated | {"legs": 2})
 
 
 def test_one_hand_alone_does_what_two_do():
@@ -124,10 +199,19 @@ def test_a_saved_expert_goes_on_with_the_same_bits():
     assert world.tips["PSM2"] == pytest.approx(other.tips["PSM2"], abs=0)
 
 
-def test_a_refused_command_ends_the_session_and_says_what_the_hand_did():
-    world = World("peg-board")
-    with pytest.raises(SessionError, match="PSM2 in phase 'rise': too far"):
-        world.run(0.05).step(**{"PSM2/error": (StringMessage(data="too far"),)})
+def test_a_hand_leaves_a_thing_after_a_command_on_the_way_to_it_was_refused():
+    world = one_ring("peg-board-surrol").run(0.5)
+    refused = {"PSM1/error": (StringMessage(data="too far"),)}
+    world.step(**refused), world.step(**refused)
+    assert "ring1 is not reachable" in world.run(10).expert.ended
+
+
+def test_a_refused_command_to_a_hand_that_carries_ends_the_session():
+    world = one_ring("peg-board-surrol")
+    carrying = world.expert._team.hands[0]
+    world.run(20, until=lambda _: carrying.state.phase is Phase.CARRY)
+    with pytest.raises(SessionError, match="PSM1 in phase 'carry': too far"):
+        world.step(**{"PSM1/error": (StringMessage(data="too far"),)})
 
 
 @pytest.mark.parametrize(

@@ -65,5 +65,16 @@ def test_the_wall_of_a_ring_lies_in_the_plane_between_the_fingers(angle):
         assert across == pytest.approx(ring.inradius + ring.thickness / 2)
 
 
-def test_a_ring_on_its_side_cannot_be_taken_from_above():
+def test_a_ring_on_its_side_is_not_taken_from_above():
     assert not len(of_ring(BOARDS["icra2026"].ring, turned(np.pi / 2, axis=0), DRIVER, None).poses)
+
+
+@given(ANGLES, st.floats(0.4, 1.1))
+def test_a_leaning_piece_is_taken_along_its_own_axes(angle, lean):
+    pose = turned(angle) @ turned(lean, axis=0, position=(0, 0, 0))
+    found = of_piece(pose, CADIERE)
+    assert len(found.poses)
+    for tip, up in zip(found.poses, found.ups, strict=True):
+        assert tip[:3, 2] == pytest.approx(-up)
+        assert up[2] >= 0.5
+        assert np.abs(pose[:3, :3].T @ up).max() == pytest.approx(1.0)

@@ -58,3 +58,25 @@ def test_the_wrench_is_that_of_the_pseudo_inverse_also_where_the_jacobian_is_sin
     inverse = np.linalg.pinv(jacobian.T, rcond=1e-6)
     wrench = rig.outputs[f"{arm}/{kind}/measured_cf"]
     assert np.allclose(wrench, inverse @ measured[2 * n :], rtol=1e-12, atol=0.0)
+
+
+def test_wrenches_that_nobody_uses_wait_until_somebody_does():
+    always, seldom = Rig(CART, publish_period="1 ms"), Rig(CART, publish_period="1 ms")
+    wrenches = frozenset(
+        f"{arm}/{state}"
+        for arm in CART
+        for kind in ("body", "spatial")
+        for state in (f"{kind}/jacobian", f"{kind}/measured_cf", "gravity_compensation/setpoint_js")
+    )
+    waits, differs = (frozenset[str](), wrenches, wrenches, frozenset({"ECM/body/jacobian"})), []
+    for seed, unread in enumerate(waits):
+        seldom.motion.unread = unread
+        for rig in (always, seldom):
+            put(rig, "PSM2", seed)
+            rig.step()
+        differs.append(
+            {n for n, value in always.outputs.items() if not np.array_equal(value, seldom.outputs[n])}
+        )
+        assert always.motion.state_hash() == seldom.motion.state_hash()
+    assert [not names for names in differs] == [True, False, False, True]
+    assert set.union(*differs) <= wrenches

@@ -140,12 +140,12 @@ def check_published(gateway: Gateway, peer: Peer, rows: Sequence[Row], *, timeou
     for row in rows:
         if row.topic not in told:
             continue
-        message = peer.heard(row, timeout_s)
+        message = _heard(gateway, row, peer, timeout_s)
         assert encode(without_stamp(message)) == encode(without_stamp(told[row.topic])), (
             f"{row.topic}: {message} was told as {told[row.topic]}"
         )
         stamp = _stamp(message)
-        assert stamp is None or abs(stamp - begun_ns) < 60 * 10**9, (
+        assert stamp is None or abs(stamp - begun_ns) < 600 * 10**9, (
             f"{row.topic}: stamp {stamp} is no wall time"
         )
         if row.periodic and stamp is not None:
@@ -176,6 +176,20 @@ def _tell_states(gateway: Gateway) -> None:
         if row.periodic and row.port is not None:
             codec = VectorCodec(row.port)
             gateway.write(row.port.name, _value(codec))
+
+
+def _heard(gateway: Gateway, row: Row, peer: Peer, timeout_s: float) -> Message:
+    """Return what was told on a row.
+
+    Hundreds of messages at once are more than a busy machine may keep: an event that was lost is told again.
+    """
+    if row.periodic or row.latched:
+        return peer.heard(row, timeout_s)
+    try:
+        return peer.heard(row, timeout_s / 4.0)
+    except TimeoutError:
+        _tell(gateway, row)
+        return peer.heard(row, timeout_s)
 
 
 def _refreshed(gateway: Gateway, row: Row, peer: Peer, timeout_s: float) -> Message:
@@ -293,7 +307,22 @@ _TURN = Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5)
 _POSE = Pose.model_validate(
     {"position": {"x": 0.01, "y": -0.02, "z": 0.12}, "orientation": _TURN.model_dump()}
 )
+_MARKER = {
+    "header": {"stamp": {"sec": 3, "nanosec": 4}, "frame_id": "PSM1_base"},
+    "ns": "points",
+    "id": -7,
+    "type": 8,
+    "pose": _POSE.model_dump(),
+    "scale": {"x": 0.001, "y": 0.001, "z": 0.0},
+    "color": {"r": 0.25, "g": 0.5, "b": 0.75, "a": 1.0},
+    "lifetime": {"sec": 2, "nanosec": 500_000_000},
+    "frame_locked": True,
+    "points": [{"x": 0.01, "y": 0.02, "z": 0.03}, {"x": -0.01, "y": 0.0, "z": 0.0}],
+    "colors": [{"r": 1.0, "a": 1.0}, {"b": 1.0, "a": 0.5}],
+    "text": "a word",
+}
 _CONTENT: dict[str, Any] = {
+    "markers": [_MARKER, {"action": 3}],
     "pose": _POSE,
     "quaternion": _TURN,
     "twist": {"linear": {"x": 0.1, "y": 0.2, "z": 0.3}, "angular": {"x": -0.1, "y": -0.2, "z": -0.3}},

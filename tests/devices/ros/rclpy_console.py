@@ -115,8 +115,15 @@ def found(type_):
 
 def filled(message, content):
     """Fill a message from nested dictionaries."""
+    kinds = message.get_fields_and_field_types()
     for name, value in content.items():
-        setattr(message, name, filled(getattr(message, name), value) if isinstance(value, dict) else value)
+        if isinstance(value, dict):
+            filled(getattr(message, name), value)
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            kind = found(kinds[name].removeprefix("sequence<").removesuffix(">").replace("/", "/msg/"))
+            setattr(message, name, [filled(kind(), each) for each in value])
+        else:
+            setattr(message, name, value)
     return message
 
 

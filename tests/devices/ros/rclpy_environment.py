@@ -1,5 +1,5 @@
 """An environment with real rclpy, from PyPI's wheels of ROS 2 Jazzy, and with messages that have no wheels
-(crtk_msgs, diagnostic_msgs, tf2_msgs), generated from our models.
+(crtk_msgs, diagnostic_msgs, tf2_msgs, visualization_msgs), generated from ROS 2's definitions or our models.
 
 It is made once, in XDG's cache folder, by `python -m tests.devices.ros.rclpy_environment`, which prints its
 Python, or by the first test that asks for the fixture `rclpy_python`. A program by hand:
@@ -19,6 +19,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from rosbags.typesys import Stores, get_typestore
 
 from schemas.codec import message_types
 from schemas.message import msg_text
@@ -35,7 +36,7 @@ WHEELS += [
     f"ros-jazzy-rosidl-typesupport-{name}"
     for name in ("c", "cpp", "fastrtps-c", "fastrtps-cpp", "introspection-c")
 ]
-GENERATED = ("crtk_msgs", "diagnostic_msgs", "tf2_msgs")
+GENERATED = ("crtk_msgs", "diagnostic_msgs", "tf2_msgs", "visualization_msgs")
 BUILDER = Path(__file__).parent / "rclpy_messages.py"
 
 
@@ -86,12 +87,20 @@ def make(directory, executable, texts):
 def interfaces(package):
     """Return the .msg and .srv files of a package, by path."""
     models = {name: model for name, model in message_types().items() if name.startswith(f"{package}/")}
-    files = {f"{name}.msg": msg_text(model) for name, model in models.items() if "/msg/" in name}
+    files = {f"{name}.msg": text_of(name, model) for name, model in models.items() if "/msg/" in name}
     for name, model in models.items():
         if name.endswith("_Request"):
             service = name.removesuffix("_Request")
             files[f"{service}.srv"] = f"{msg_text(model)}\n---\n{msg_text(models[f'{service}_Response'])}"
     return files
+
+
+def text_of(name, model):
+    """Return the definition of a message: with its constants where it is one of ROS 2's own."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    if name not in store.types:
+        return msg_text(model)
+    return store.generate_msgdef(name, ros_version=2)[0].partition("=" * 80)[0]
 
 
 @pytest.fixture(scope="session")

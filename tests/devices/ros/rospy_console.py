@@ -45,6 +45,18 @@ TEXTS = {
     ),
     "diagnostic_msgs/DiagnosticArray": "Header header\nDiagnosticStatus[] status",
     "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
+    # docs.ros.org/en/noetic/api/visualization_msgs: constants are part of the checksum
+    "visualization_msgs/Marker": (
+        "uint8 ARROW=0\nuint8 CUBE=1\nuint8 SPHERE=2\nuint8 CYLINDER=3\nuint8 LINE_STRIP=4\n"
+        "uint8 LINE_LIST=5\nuint8 CUBE_LIST=6\nuint8 SPHERE_LIST=7\nuint8 POINTS=8\n"
+        "uint8 TEXT_VIEW_FACING=9\nuint8 MESH_RESOURCE=10\nuint8 TRIANGLE_LIST=11\nuint8 ADD=0\n"
+        "uint8 MODIFY=0\nuint8 DELETE=2\nuint8 DELETEALL=3\n"
+        "Header header\nstring ns\nint32 id\nint32 type\nint32 action\n"
+        "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\nduration lifetime\n"
+        "bool frame_locked\ngeometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] colors\nstring text\n"
+        "string mesh_resource\nbool mesh_use_embedded_materials"
+    ),
+    "visualization_msgs/MarkerArray": "Marker[] markers",
     "crtk_msgs/QueryForwardKinematics": (
         "float64[] jp\ngeometry_msgs/Pose cp\n---\ngeometry_msgs/Pose cp\nbool result\nstring message"
     ),
@@ -132,7 +144,7 @@ def flat(value):
 
 def filled(message, fields):
     """Fill a message from what `flat` returns."""
-    for name in message.__slots__:
+    for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         if name == "seq":
             continue
         given, now = fields[name.lower() if len(name) == 1 else name], getattr(message, name)
@@ -140,6 +152,8 @@ def filled(message, fields):
             now.secs, now.nsecs = given["sec"], given["nanosec"]
         elif isinstance(now, genpy.Message):
             filled(now, given)
+        elif isinstance(given, list) and given and isinstance(given[0], dict):
+            setattr(message, name, [filled(message_class(kind[:-2])(), each) for each in given])
         else:
             setattr(message, name, bytes(given) if isinstance(now, bytes) else given)
     return message

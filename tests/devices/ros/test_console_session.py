@@ -52,7 +52,7 @@ def play(
 
 
 def until(heard: Callable[[], list[Any]], holds: Callable[[Any], bool]) -> None:
-    end = monotonic() + 10.0
+    end = monotonic() + 40.0
     while not any(holds(message) for message in heard()):
         assert monotonic() < end, heard()[-3:]
         sleep(0.003)

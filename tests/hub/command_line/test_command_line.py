@@ -92,6 +92,9 @@ def test_check_shows_the_wiring_of_a_good_scenario(trocar, pendulum, tmp_path):
     code, out, err = trocar("check", file, "--set", "step=2 ms")
     assert (code, out) == (0, "")
     assert "valid" in err
+    assert " 1 input, 1 of them from one" in err
+    assert "<- goal" not in err
+    assert "<- goal" in trocar("check", file, "--ports")[2]
 
 
 @pytest.mark.parametrize("name", sorted(installed_scenarios()))

@@ -1,6 +1,7 @@
 import os
 import signal
 from queue import Queue
+from time import monotonic
 
 from hub.hosting import host_processes as fleet_module
 from hub.hosting import watchdog as watchdog_module
@@ -45,7 +46,10 @@ def test_the_end_of_a_process_is_noticed_without_waiting_for_the_next_look(monke
     watchdog = Watchdog(plan, processes, 10**12, lambda: None, lambda *failure: failures.put(failure))
     processes.start("one", endpoint, "session")
     try:
-        (number,) = hosts(endpoint)
+        end = monotonic() + 20.0
+        while not (found := hosts(endpoint)):  # a process has its command line only a moment after its start
+            assert monotonic() < end
+        (number,) = found
         os.kill(number, signal.SIGKILL)
         assert failures.get(timeout=60.0) == ("source", "its process was killed by SIGKILL")
         assert "participant 'source': its process was killed by SIGKILL" in caplog.text

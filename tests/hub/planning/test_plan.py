@@ -210,10 +210,14 @@ def test_without_a_cycle_the_order_follows_the_connections_and_oneself_is_never_
     assert [link.fresh for link in plan.connections] == [True, False]
 
 
-def test_an_order_names_stepped_participants():
-    with pytest.raises(ScenarioError, match=r"unknown stepped participant 'stylus'. .*Known: a") as raised:
-        plan_of(Part("a", out()), Stylus("stylus", out()), order=["a", "stylus"])
+def test_an_order_names_participants():
+    with pytest.raises(ScenarioError, match=r"unknown stepped participant 'b'\. .*Known: a") as raised:
+        plan_of(Part("a", out()), Stylus("stylus", out()), order=["a", "b"])
     assert raised.value.path == ("order", 1)
+
+
+def test_a_device_in_the_order_does_not_step():
+    assert plan_of(Part("a", out()), Stylus("stylus", out()), order=["stylus", "a"]).order == ("a",)
 
 
 def test_devices():

@@ -23,9 +23,7 @@ def test_a_plugin_is_loaded_by_name(pendulum):
 
 
 def test_an_unknown_kind_gets_a_suggestion():
-    with pytest.raises(
-        ScenarioError, match=r"unknown kind 'mujocco'. Did you mean 'mujoco'\? Known: bullet, .*mujoco"
-    ):
+    with pytest.raises(ScenarioError, match=r"unknown kind 'mujocco'. Did you mean 'mujoco'\?"):
         registry.load("mujocco")
 
 

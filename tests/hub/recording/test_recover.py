@@ -17,8 +17,11 @@ from tests.hub.sample_session import ATTACHMENTS, write_session
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session of many chunks, though it is short."""
     directory = tmp_path_factory.mktemp("session") / "run"
-    write_session(directory)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hub.recording.recorder.CHUNK_BYTES", 2**16)
+        write_session(directory)
     return directory
 
 

@@ -167,7 +167,7 @@ def told(caplog):
     caplog.set_level(logging.INFO)
 
     def wait(*words):
-        until = monotonic() + 5
+        until = monotonic() + 20
         while monotonic() < until:
             if any(all(word in line for word in words) for line in caplog.messages):
                 return
@@ -177,7 +177,7 @@ def told(caplog):
     return wait
 
 
-def wait_for(true, limit_s=5):
+def wait_for(true, limit_s=20):
     until = monotonic() + limit_s
     while not true():
         assert monotonic() < until

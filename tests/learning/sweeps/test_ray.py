@@ -20,7 +20,7 @@ sys.exit(done.returncode)
 """
 
 
-@pytest.mark.xdist_group("ray")
+@pytest.mark.xdist_group("all cores")
 def test_trials_on_two_nodes(scenario, tmp_path):
     output = tmp_path / "results"
     sweep = [sys.executable, "-m", "trocar", "sweep", scenario, "--vary", "part.value=0,0.5", "-o", output]

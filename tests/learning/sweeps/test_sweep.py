@@ -101,3 +101,21 @@ def test_another_directory_is_left_alone(scenario, tmp_path):
     assert json.loads((tmp_path / "results" / "sweep.json").read_text())["vary"] == {"part.value": [0, 1]}
     with pytest.raises(ScenarioError, match="holds another sweep"):
         Sweep(str(scenario), (parse("part.value=0,2"),), tmp_path / "results").open()
+
+
+def test_an_edited_scenario_is_noticed(scenario, tmp_path):
+    def sweep():
+        return Sweep(str(scenario), (parse("part.value=0,0.5"),), tmp_path / "results", recorded=False)
+
+    first = sweep()
+    first.open()
+    trials = first.run(1)
+    next(trials)
+    trials.close()
+    assert first.rows()[0]["scenario_hash"] == first.scenario_hash
+    text = scenario.read_text()
+    scenario.write_text(f"# a comment changes nothing\n{text}")
+    sweep().open()
+    scenario.write_text(text.replace("3 ms", "4 ms"))
+    with pytest.raises(ScenarioError, match="has changed since the sweep in"):
+        sweep().open()

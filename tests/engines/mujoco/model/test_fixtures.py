@@ -14,6 +14,8 @@ from engines.mujoco.params import SceneParams
 from robots import rotation
 from robots.training.boards import BOARDS
 from robots.training.dishes import DISH, PIECE
+from robots.training.needles import NEEDLES
+from robots.training.targets import DISC_HEIGHT, DISC_RADIUS, DISCS
 
 ARM = {"PSM1": {"instrument": "400006", "position": [0, 0, 0.5]}}
 TURNED = [0, 0, 1, 0]
@@ -107,3 +109,35 @@ def test_seeds_and_names_differ_and_without_a_seed_nothing_moves():
     spread = np.array(drawn)[:, :2].std(axis=0)
     assert spread == pytest.approx(1e-3 / np.sqrt(3), rel=0.25)  # of a uniform distribution
     assert start_pose("ring1", params, None)[0] == pytest.approx([0, 0, 0])
+
+
+def test_a_box_has_four_discs_on_its_top():
+    model, data = settled(0.0, fixtures={"box": {"kind": "disc-box", "position": [0.1, 0, 0.2]}})
+    mujoco.mj_forward(model, data)
+    discs = [i for i in range(model.ngeom) if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_CYLINDER]
+    middles = data.geom_xpos[discs] - [0.1, 0, 0.2]
+    assert np.allclose(middles[:, :2], DISCS)
+    assert np.allclose(middles[:, 2] + model.geom_size[discs, 1], 0.0)
+    assert np.allclose(model.geom_size[discs, 0], DISC_RADIUS)
+    assert data.geom("box").xpos[2] + model.geom("box").size[2] == pytest.approx(0.2 - DISC_HEIGHT)
+
+
+def test_a_marked_needle_is_seen_and_not_felt():
+    plain, marked = (
+        build(
+            SceneParams.model_validate(
+                {
+                    "arms": ARM,
+                    "looks": False,
+                    "objects": {"needle": {"kind": "needle", "position": [0, 0, 0], "marked": marked}},
+                }
+            )
+        )
+        for marked in (False, True)
+    )
+    assert marked.ngeom == plain.ngeom + 1
+    own = [i for i in range(marked.ngeom) if marked.geom_bodyid[i] == marked.body("needle").id]
+    (ball,) = [i for i in own if marked.geom_rgba[i, 2] > 0.9]
+    assert (marked.geom_contype[ball], marked.geom_conaffinity[ball]) == (0, 0)
+    assert np.allclose(marked.geom_pos[ball], NEEDLES["sh-plus"].marks[2])
+    assert np.allclose(marked.body("needle").inertia, plain.body("needle").inertia)

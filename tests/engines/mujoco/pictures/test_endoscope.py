@@ -262,3 +262,32 @@ def test_a_state_of_another_scene_is_refused() -> None:
 def test_cameras_that_cannot_be_are_refused(params: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make(**params)
+
+
+@pytest.mark.parametrize("view", [None, {"position": [0.1, 1.3, 1.0], "target": [0.05, 1.1, 0.9]}])
+def test_leaving_out_what_no_camera_sees_changes_no_pixel(
+    gl: str, view: dict[str, Any] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from engines.mujoco.pictures.endoscope_scene import EndoscopeScene
+    from engines.mujoco.pictures.stereo import StereoRenderer
+
+    params: dict[str, Any] = {
+        "mounting": "cart",
+        "arms": {"PSM1": {"instrument": "LARGE_NEEDLE_DRIVER_400006"}, "ECM": {"start": [0, 0, "0.1 m", 0]}},
+        "table": {"position": [0.05, 1.1, 0.85], "size": [0.2, 0.15, 0.01]},
+        "objects": {"ring": {"kind": "ring", "position": [0.065, 1.115, 0.851]}},
+        "width": 64,
+        "height": 48,
+        "view": view,
+    }
+    scene = EndoscopeScene(EndoscopeParams.model_validate(params), gl)
+    random, start = np.random.default_rng(5), np.zeros(position_count(EndoscopeParams.model_validate(params)))
+    start[-4] = 1.0  # of the ring's quaternion
+    states = [start + random.normal(0.0, 0.3, start.size) for _ in range(12)]
+    some = [np.stack(scene.draw(positions)) for positions in states]
+    monkeypatch.setattr(StereoRenderer, "_in_sight", lambda *_: np.True_)
+    everything = [np.stack(scene.draw(positions)) for positions in states]
+    scene.close()
+    assert any(picture.any() for picture in everything)
+    for fewer, more in zip(some, everything, strict=True):
+        np.testing.assert_array_equal(fewer, more)

@@ -1,0 +1,209 @@
+"""Stitches without a hub and pictures: force over depth, energy, accuracy, and success over seeds.
+
+Lead, motion controller, engine, pad and task of the scenario `suturing` are stepped in one process, in the
+order of its plan. `force` turns a needle through the pad alone, by hand. Results:
+docs/decisions/0062-needle-in-tissue.md and 0063-stitches.md.
+
+    python -m bench.suturing stitches --seeds 10 --set participants.lead.stitches=1
+    python -m bench.suturing force --picture force.png
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from math import asin, pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers.stitching.geometry import stitch_between
+from engines.suture_pad.channel import Channel
+from engines.suture_pad.tissue import TissueParams
+from hub.participant import Inputs, Setup
+from hub.planning import registry
+from hub.planning.scenario_file import load
+from hub.planning.wiring import make_plan
+from hub.session.launch import in_one_host
+from robots.training.needles import NEEDLES
+
+LEFT_OUT = ("endoscope",)
+
+
+def _make(kind: str, name: str, params: Any) -> Any:
+    return registry.load(kind)(name, params)
+
+
+class Trial:
+    """The participants of a scenario, stepped one after the other in this process."""
+
+    def __init__(self, name: str, overrides: Sequence[str]) -> None:
+        file = load(name, overrides)
+        kept = {n: spec for n, spec in file.scenario.participants.items() if n not in LEFT_OUT}
+        scenario = in_one_host(
+            file.scenario.model_copy(
+                update={
+                    "participants": kept,
+                    "order": tuple(n for n in file.scenario.order or () if n in kept) or None,
+                    "connections": [c for c in file.scenario.connections if c.target.participant in kept],
+                }
+            )
+        )
+        self.parts = {n: _make(spec.kind, n, file.params[n]) for n, spec in kept.items()}
+        self.plan = make_plan(scenario, self.parts, dict.fromkeys(kept, "engine"))
+        self.limit_ns = scenario.duration or 0
+        self.out: dict[str, dict[str, Any]] = {}
+        self.time_ns = 0
+        self._wire()
+
+    def _wire(self) -> None:
+        plan, step = self.plan, self.plan.step_ns
+        self._events = {
+            (n, port.name)
+            for n, part in self.parts.items()
+            for port in part.ports
+            if port.variability == "event"
+        }
+        self._ways = [(c.source, c.source_port, c.target, c.target_port) for c in plan.connections]
+        for planned in plan.bonds:
+            motion, force = planned.bond.motion, planned.bond.force
+            for what in ("position", "velocity"):
+                there = (force.participant, f"{force.port}/{what}")
+                self._ways.append((motion.participant, f"{motion.port}/{what}", *there))
+            there = (motion.participant, f"{motion.port}/force")
+            self._ways.append((force.participant, f"{force.port}/force", *there))
+        self._values: dict[str, dict[str, Any]] = {n: {} for n in self.parts}
+        self._waiting: dict[str, dict[str, list[Any]]] = {n: {} for n in self.parts}
+        for n, part in self.parts.items():
+            period = plan.participants[n].period * step
+            connected = frozenset(c.target_port for c in plan.connections if c.target == n)
+            setup = Setup(period, Path(), plan.participants[n].bond_plans, connected)
+            self.out[n] = dict(part.configure(setup))
+            for port in part.ports:
+                if port.causality == "input" and port.start is not None and port.variability == "signal":
+                    self._values[n][port.name] = np.array(port.start)
+
+    def step(self) -> None:
+        for n in self.plan.order:
+            period = self.plan.participants[n].period * self.plan.step_ns
+            if self.time_ns % period:
+                continue
+            values, waiting = self._values[n], self._waiting[n]
+            self._waiting[n] = {}
+            for source, port, target, into in self._ways:
+                if target == n and (n, into) not in self._events and port in self.out[source]:
+                    values[into] = self.out[source][port]
+            events = {into: tuple(messages) for into, messages in waiting.items()}
+            outputs = self.parts[n].step(self.time_ns, period, Inputs(values, events=events))
+            self.out[n].update(outputs)
+            for source, port, target, into in self._ways:
+                if source == n and (target, into) in self._events and outputs.get(port):
+                    self._waiting[target].setdefault(into, []).extend(outputs[port])
+        self.time_ns += self.plan.step_ns
+
+    def run(self) -> dict[str, Any]:
+        """Step until the lead ends, and return the row of the table."""
+        began = time.process_time()
+        said: list[str] = []
+        while self.time_ns < self.limit_ns and not self.parts["lead"].ended:
+            self.step()
+            if not self.time_ns % 10_000_000:
+                said += [message.data for message in self.out["lead"]["status"]]
+        card = self.parts["task"].card(self.time_ns)
+        values = {value.name: value for value in card.metrics}
+        rules = {rule.rules: {value.name: value for value in rule.values} for rule in card.rules}
+        needle, pad = self.out["robot"], self.out["pad"]
+        bond = self.plan.bonds[0].bond
+        motion_j = float(needle[f"{bond.motion.port}/work"][0])
+        force_j = float(pad[f"{bond.force.port}/work"][0])
+        names = ("entry_error_mean", "exit_error_mean", "depth", "force", "trauma", "made")
+        return {
+            "simulated_s": self.time_ns * 1e-9,
+            "cpu_s": time.process_time() - began,
+            **{n: _number(values[f"stitches/{n}"]) for n in names},
+            "exchanged_j": motion_j,
+            "made_by_coupling_j": force_j - motion_j,
+            "script": _number(rules["src2-script"]["success"]),
+            "rules": _number(rules["src2-rules"]["success"]),
+            "four_script": _number(rules["src3-script"]["success"]),
+            "four_rules": _number(rules["src3-rules"]["success"]),
+            "failed": said[-1] if self.out["lead"]["failed"][0] else "",
+        }
+
+
+def _number(value: Any) -> float | None:
+    return None if value.reason else value.value
+
+
+def stitches(args: argparse.Namespace) -> None:
+    rows = []
+    for seed in range(args.first, args.first + args.seeds):
+        row = Trial("suturing", [*args.set, f"scene.seed={seed}"]).run()
+        rows.append(row)
+        print(json.dumps({"seed": seed, **row}), flush=True)
+    for name in ("entry_error_mean", "exit_error_mean", "force", "trauma", "simulated_s", "cpu_s"):
+        found = [row[name] for row in rows if row[name] is not None]
+        if found:
+            print(f"{name}: median {np.median(found):.4g}, 90th {np.percentile(found, 90):.4g}")
+    share = max(abs(row["made_by_coupling_j"] / row["exchanged_j"]) for row in rows if row["exchanged_j"])
+    print(f"energy made by the coupling: at most {100 * share:.3f} % of what was exchanged")
+    for name in ("script", "rules", "four_script", "four_rules"):
+        print(f"{name}: {sum(row[name] or 0.0 for row in rows):.0f} of {len(rows)}")
+
+
+def force(args: argparse.Namespace) -> None:
+    """Turn a needle through the pad alone, and compare what it feels along the arc with the model's sum."""
+    needle, tissue = NEEDLES["sh-plus"], TissueParams()
+    entry, leave = np.array([8e-3, 0.0, 0.0]), np.array([-8e-3, 0.0, 0.0])
+    stitch = stitch_between(entry, leave, np.array([0.0, 0.0, 1.0]), needle)
+    channel, rows = Channel(needle, tissue), []
+    for angle in np.arange(stitch.entry - 0.1, stitch.exit + 0.6, 0.004):
+        pose = stitch.pose(float(angle))
+        load, moment = channel.advance(pose[:3, :3], pose[:3, 3], over_pad=True)
+        about = (moment - np.cross(pose[:3, 3], load)) @ pose[:3, 2]
+        way = needle.radius * (angle - stitch.entry)
+        rows.append((way, -about / needle.radius, channel.state.tip, float(channel.state.phase)))
+    table = np.array(rows)
+    bite = 2.0 * needle.radius * (pi / 2.0 - asin(sqrt(1.0 - (8e-3 / needle.radius) ** 2)))
+    model = np.where(
+        (table[:, 0] > 0) & (table[:, 3] == 2),
+        tissue.cutting + tissue.friction * np.minimum(table[:, 0], bite),
+        np.where(table[:, 3] == 3, tissue.friction * bite, 0.0),
+    )
+    entered, through = table[table[:, 3] < 2, 1].max(), table[table[:, 3] == 2, 1].max()
+    print(f"largest at entry {entered:.3f} N, at exit {through:.3f} N")
+    inside = (table[:, 3] == 2) & (table[:, 0] > 2e-3) & (table[:, 0] < bite - 1.5e-3)
+    print(f"cutting and friction: RMS {np.sqrt(np.mean((table[inside, 1] - model[inside]) ** 2)):.4f} N off")
+    if args.picture:
+        import matplotlib.pyplot as plt
+
+        plt.figure(figsize=(7, 3.5))
+        plt.plot(table[:, 0] * 1e3, table[:, 1], label="felt along the arc")
+        plt.plot(table[:, 0] * 1e3, model, "--", label="cutting + friction along the embedded arc")
+        plt.xlabel("way of the tip since the skin, mm")
+        plt.ylabel("force, N")
+        plt.legend()
+        plt.tight_layout()
+        plt.savefig(args.picture, dpi=110)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    commands = parser.add_subparsers(required=True)
+    one = commands.add_parser("stitches")
+    one.add_argument("--seeds", type=int, default=10)
+    one.add_argument("--first", type=int, default=0)
+    one.add_argument("--set", action="append", default=[])
+    one.set_defaults(run=stitches)
+    two = commands.add_parser("force")
+    two.add_argument("--picture")
+    two.set_defaults(run=force)
+    args = parser.parse_args()
+    args.run(args)
+
+
+if __name__ == "__main__":
+    main()

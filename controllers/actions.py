@@ -1,0 +1,213 @@
+"""Actions of a learning environment: so much of a tip's displacement, turn and jaw at a time.
+
+An action has five numbers of -1 to 1 for each hand: displacement of the tip along x, y and z of the world, a
+turn, and the jaw, which closes below 0 and opens from 0 on, as in SurRoL (med-air/SurRoL at a903fa6,
+surrol/tasks/psm_env.py: 10 mm, 30 degrees of yaw or 15 of pitch, jaw 40 degrees or shut in a step of 0.2 s).
+What is out of range is clipped. The tip's goal moves by the action and stays inside the workspace; the joints
+go there evenly within the step. A goal that the arm cannot reach is not taken, and counted.
+"""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from controllers.motion.frames import base_in_world, pose
+from controllers.motion.params import Arms, MotionParams, PsmParams, SetupJoints
+from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array, integer, number
+from robots import rotation
+from robots.dvrk.cart import inverse_pose
+from robots.dvrk.crtk import Mounting
+from robots.dvrk.inverse import inverse
+from robots.dvrk.parameters import ArmName
+from schemas.errors import MotionError, ScenarioError
+from schemas.ports import Port
+from schemas.quantity import Angle, Duration, Length
+from schemas.ros import Float64Message, JointState, PoseStamped
+from schemas.vectors import Vector
+
+__all__ = ["Actions", "ActionsParams"]
+
+_NUMBERS = 5
+"""Of an action of one hand."""
+_Point = tuple[Length, Length, Length]
+_Angle = Annotated[Angle, Field(gt=0.0)]
+
+
+class ActionsParams(Params):
+    """Which hands act, how far an action goes, and where the tips may be."""
+
+    arms: Arms
+    mounting: Mounting = "free"
+    setup_joints: SetupJoints = SetupJoints()
+    hands: tuple[ArmName, ...] = Field(default=("PSM1",), min_length=1, description="in the action's order")
+    action_step: Duration = Field(
+        default=200_000_000, gt=0, description="time between two actions; a multiple of the period"
+    )
+    displacement: Annotated[Length, Field(gt=0.0)] = Field(
+        default=10e-3, description="of a tip by an action of 1, along each axis of the world"
+    )
+    turn: _Angle = Field(default=radians(30.0), description="by an action of 1; of pitch, the half of it")
+    turn_about: Literal["yaw", "pitch"] = Field(
+        default="yaw", description="the world's z axis, or the tip's own x axis"
+    )
+    opening: _Angle = Field(default=radians(40.0), description="of a jaw that is open")
+    closing: Annotated[Angle, Field(le=0.0)] = Field(
+        default=0.0,
+        description=(
+            "of a jaw that is shut: at 0 a wire of 0.8 mm is pressed with a fraction of the jaw's largest"
+            " torque, which is what sub-steps of 2 ms can hold"
+        ),
+    )
+    workspace: tuple[_Point, _Point] = Field(
+        description="two opposite corners, in the world, between which the goals of the tips stay"
+    )
+
+    @model_validator(mode="after")
+    def _has_its_hands(self) -> Self:
+        if missing := [arm for arm in self.hands if arm not in self.arms.driven]:
+            raise ValueError(f"hands: {', '.join(missing)} is no arm of the scene")
+        return self
+
+
+class _HandState(Record):
+    goal = array(7)
+    """Pose of the tip in the world that the joints go to: m, quaternion (x, y, z, w)."""
+    start = array("joints")
+    end = array("joints")
+    """Positions between which the joints go, rad and m."""
+    command = array("joints")
+    jaw_start = number()
+    jaw_end = number()
+    """Openings between which the jaw goes, rad."""
+    jaw = array(1)
+    refused = array(1)
+    """Goals that could not be reached."""
+
+
+class _Hand:
+    """One arm."""
+
+    def __init__(self, arm: ArmName, params: ActionsParams, held: PsmParams) -> None:
+        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
+        self.base = base_in_world(arm, stands)
+        self.arm, self.chain, self.params = arm, held.chain, params
+        corners = np.array(params.workspace)
+        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+        self._into_base = inverse_pose(self.base)
+        self.state = now = _HandState(joints=len(held.chain.joints))
+        now.start[:] = now.end[:] = now.command[:] = held.start
+        now.goal[:] = pose(self.base @ self.chain.frames(now.start)[-1])
+        now.jaw[0] = now.jaw_start = now.jaw_end = held.jaw
+
+    def act(self, action: Vector) -> None:
+        """Begin to go where an action, shape (5,), of -1 to 1, leads."""
+        now, params = self.state, self.params
+        position = np.clip(now.goal[:3] + params.displacement * action[:3], self.low, self.high)
+        if params.turn_about == "yaw":
+            about = np.array([0.0, 0.0, params.turn * float(action[3])])
+            orientation = rotation.product(rotation.exp(about), now.goal[3:])
+        else:
+            about = np.array([0.5 * params.turn * float(action[3]), 0.0, 0.0])
+            orientation = rotation.product(now.goal[3:], rotation.exp(about))
+        now.jaw_start = float(now.jaw[0])
+        now.jaw_end = params.opening if action[4] >= 0.0 else params.closing
+        tip = np.eye(4)
+        tip[:3, :3], tip[:3, 3] = rotation.matrix(orientation), position
+        now.start[:] = now.command
+        try:
+            now.end[:] = inverse(self.chain, self._into_base @ tip, now.command)
+        except MotionError:
+            now.refused[0] += 1.0
+            return
+        now.goal[:3], now.goal[3:] = position, orientation / np.linalg.norm(orientation)
+
+    def go(self, share: float) -> None:
+        """Command what is due after this share of the step's time."""
+        now = self.state
+        now.jaw[0] = now.jaw_start + share * (now.jaw_end - now.jaw_start)
+        share = share**3 * (10.0 + share * (6.0 * share - 15.0))
+        now.command[:] = now.start + share * (now.end - now.start)
+
+
+class _Progress(Record):
+    periods = integer()
+    """Since time 0."""
+
+
+class Actions(Controller):
+    """Leads arms and jaws by actions."""
+
+    params_model: ClassVar[type[Params]] = ActionsParams
+    params: ActionsParams
+
+    def __init__(self, name: str, params: ActionsParams) -> None:
+        super().__init__(name, params)
+        self._hands: list[_Hand] = []
+        for arm in params.hands:
+            held = params.arms.driven[arm]
+            if not isinstance(held, PsmParams) or held.tool.jaw is None:
+                raise ScenarioError(f"{arm} holds no instrument with a jaw", path=("participants", name))
+            self._hands.append(_Hand(arm, params, held))
+        self._progress = _Progress()
+        self.keep(self._progress, *(hand.state for hand in self._hands))
+        self._outputs: dict[str, Any] = {}
+        for hand in self._hands:
+            self._outputs[f"{hand.arm}/servo_jp"] = hand.state.command
+            self._outputs[f"{hand.arm}/jaw/servo_jp"] = hand.state.jaw
+            self._outputs[f"{hand.arm}/goal_cp"] = hand.state.goal
+            self._outputs[f"{hand.arm}/refused"] = hand.state.refused
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """The action in; goals of joints, jaw and tip, and the number of goals out of reach, out."""
+        count = _NUMBERS * len(self._hands)
+        action = Port(
+            name="action",
+            causality="input",
+            size=count,
+            start=(0.0,) * count,
+            description="of each hand x, y, z, turn and jaw, from -1 to 1",
+        )
+        return (action, *(port for hand in self._hands for port in _ports(hand)))
+
+    def configure(self, setup: Setup) -> Outputs:
+        """Stay where the arms start. Raises ScenarioError if the period does not divide an action's step."""
+        self._count, rest = divmod(self.params.action_step, setup.period_ns)
+        if rest:
+            raise ScenarioError(
+                f"action_step {self.params.action_step} ns is no multiple of the period {setup.period_ns} ns",
+                path=("participants", self.name, "action_step"),
+            )
+        return self._outputs
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
+        """Take the action when one is due, and go a part of the way."""
+        part = self._progress.periods % self._count
+        if part == 0:
+            action = np.clip(inputs["action"], -1.0, 1.0).reshape(-1, _NUMBERS)
+            for hand, own in zip(self._hands, action, strict=True):
+                hand.act(own)
+        for hand in self._hands:
+            hand.go((part + 1) / self._count)
+        self._progress.periods += 1
+        return self._outputs
+
+
+def _ports(hand: _Hand) -> tuple[Port, ...]:
+    names = tuple(joint.name for joint in hand.chain.joints)
+    joints, goal, refused = f"{hand.arm}/servo_jp", f"{hand.arm}/goal_cp", f"{hand.arm}/refused"
+    return (
+        Port(name=joints, causality="output", type=JointState.ros_type, names=names),
+        Port(name=f"{hand.arm}/jaw/servo_jp", causality="output", type=JointState.ros_type, names=("jaw",)),
+        Port(name=goal, causality="output", type=PoseStamped.ros_type, frame="world"),
+        Port(
+            name=refused,
+            causality="output",
+            type=Float64Message.ros_type,
+            description="goals out of reach, which were not taken",
+        ),
+    )

@@ -1,0 +1,1 @@
+"""Needle tracking: where the needle is in the gripper, from both eyes' pictures and the arms' kinematics."""

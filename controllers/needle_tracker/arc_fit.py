@@ -1,0 +1,205 @@
+"""How far what is seen of a needle is from where a pose puts it: residuals of its arc and of its tip.
+
+The wire's centre line is projected at many angles. What is seen belongs to the nearest of these, and counts
+by its distance along the normal of the projected line: along the line an arc says nothing. The distances of a
+piece of the line are averaged, so that pixels across the wire count once. The tip counts in both directions;
+it alone fixes the rotation about the arc's axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from robots.training.needles import NeedleShape
+from schemas.vectors import Vector
+
+__all__ = ["Arc", "Detection", "Fit", "Noise", "fit"]
+
+_PIECE = 4
+"""Samples of the centre line in a piece whose distances are averaged."""
+_PIECES = 24
+_LEAST_COVER = 0.5
+"""Share of a piece that must be seen: of one whose wire is covered in part, the middle is elsewhere."""
+_BEYOND = 1.5
+"""Samples beyond an end of the line up to which something seen belongs to that end."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of what is seen, px."""
+
+    arc: float = 0.3
+    """Of the centre line, along its normal, at each pixel of its length."""
+    tip: float = 0.5
+    shading: float = 0.0
+    """Of the middle of what is seen of a lit wire, as a share of its width; added to both."""
+
+    def at(self, width: float) -> Noise:
+        """Return the noise where the wire is seen `width` px wide, with shading in the other two."""
+        added = self.shading * width
+        return Noise(float(np.hypot(self.arc, added)), float(np.hypot(self.tip, added)))
+
+
+@dataclass(frozen=True)
+class Detection:
+    """What one eye sees of the needle's colours, px."""
+
+    points: Vector
+    """On the wire, shape (n, 2)."""
+    lengths: Vector
+    """Of the wire that each point stands for, px, shape (n,)."""
+    tips: Vector
+    """What may be its tip, shape (k, 2)."""
+
+
+class Arc:
+    """The centre line of a needle, at angles from its base to its tip, and where its tip is seen."""
+
+    def __init__(self, needle: NeedleShape, tip_ahead: float = 0.0) -> None:
+        """Take the needle, and how far beyond its end the middle of what marks the tip is seen, m."""
+        self.needle = needle
+        half = needle.arc / 2.0
+        angles = np.linspace(-half, half, _PIECE * _PIECES + 1)
+        angles[-1] += tip_ahead / needle.radius
+        self.points = needle.points(angles)  # (m, 3)
+        """m, in the needle's frame; the last one is the tip."""
+        m = len(self.points)
+        self._errors = np.zeros((m, 3, 6))
+        self._errors[:, :, :3] = np.eye(3)
+        x, y, z = self.points.T
+        self._errors[:, 0, 4], self._errors[:, 0, 5] = z, -y
+        self._errors[:, 1, 3], self._errors[:, 1, 5] = -z, x
+        self._errors[:, 2, 3], self._errors[:, 2, 4] = y, -x
+
+    def width(self, projection: Vector, depth: float) -> float:
+        """Return how wide the wire is seen at a depth (m) along the axis, px."""
+        # the rows of a projection are the focal length times unit vectors, and the principal point times z
+        focal = float(np.linalg.norm(np.cross(projection[0, :3], projection[2, :3])))
+        return 2.0 * focal * self.needle.wire_radius / depth
+
+    def seen(self, projection: Vector, pose: Vector) -> tuple[Vector, Vector, float]:
+        """Return the line's image (m, 2), its derivative by an error of `pose` (m, 2, 6), and its mean depth.
+
+        `projection`, shape (3, 4), is from the frame in which the needle has `pose`, shape (4, 4), to pixels.
+        """
+        turn = pose[:3, :3]
+        points = self.points @ turn.T + pose[:3, 3]
+        rays = points @ projection[:, :3].T + projection[:, 3]  # (m, 3)
+        depth = np.maximum(rays[:, 2:], 1e-3)
+        image = rays[:, :2] / depth
+        by_point = (projection[None, :2, :3] - image[:, :, None] * projection[None, 2:, :3]) / depth[
+            :, :, None
+        ]
+        return image, (by_point @ turn) @ self._errors, float(depth.mean())
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Residuals (n,), what they change by with an error (n, 6), and their variances (n,): px, px^2."""
+
+    residuals: Vector
+    slopes: Vector
+    variances: Vector
+    explained: float
+    """Length of the seen wire that belongs to the needle, px."""
+    unexplained: float
+    """Length of what has the wire's colour and does not belong to it, px."""
+    expected: float
+    """Length of the whole wire in this picture, px."""
+    tip: bool
+    """Whether the tip is among the residuals."""
+    tip_refused: bool
+    """Whether something of the tip's colour is seen, but too far away."""
+
+    @property
+    def tip_only(self) -> Fit:
+        """The same without the arc."""
+        rows = slice(len(self.residuals) - 2 * self.tip, None)
+        return replace(
+            self, residuals=self.residuals[rows], slopes=self.slopes[rows], variances=self.variances[rows]
+        )
+
+
+def fit(
+    arc: Arc, projection: Vector, pose: Vector, seen: Detection, noise: Noise, covariance: Vector, gate: float
+) -> Fit:
+    """Return how far `seen` is from the needle at `pose`, shape (4, 4), through `projection`, shape (3, 4).
+
+    Args:
+        arc: the needle.
+        projection: from the frame of the pose to pixels.
+        pose: of the needle.
+        seen: by this eye.
+        noise: of what is seen.
+        covariance: of the pose's error, shape (6, 6).
+        gate: standard deviations up to which something seen is taken for the needle.
+    """
+    image, slopes, depth = arc.seen(projection, pose)
+    width = arc.width(projection, depth)
+    noise = noise.at(width)
+    along = cast("Vector", np.gradient(image, axis=0))
+    spacing = np.hypot(along[:, 0], along[:, 1])  # (m,)
+    tangents = along / np.maximum(spacing, 1e-9)[:, None]
+    normals = tangents[:, ::-1] * (-1.0, 1.0)
+    rows = np.einsum("mi,mij->mj", normals, slopes)  # (m, 6)
+    reach = gate * np.sqrt(np.einsum("mi,ij,mj->m", rows, covariance, rows) + noise.arc**2)
+    reach += 1.0 + 0.5 * width
+    residuals, lengths = _by_piece(image, tangents, normals, spacing, reach, seen)
+    expected = spacing[:-1].reshape(_PIECES, _PIECE).sum(axis=1)
+    used = lengths > _LEAST_COVER * expected
+    tip, refused = _tip(image[-1], slopes[-1], seen.tips, noise, covariance, gate)
+    # each piece has the slope of its middle sample
+    found = Fit(
+        residuals[used],
+        rows[_PIECE // 2 :: _PIECE][used],
+        noise.arc**2 / np.maximum(lengths[used], 1e-9),
+        float(lengths[used].sum()),
+        float(seen.lengths.sum() - lengths.sum()),
+        float(expected.sum()),
+        tip is not None,
+        refused,
+    )
+    if tip is None:
+        return found
+    return replace(
+        found,
+        residuals=np.concatenate([found.residuals, tip]),
+        slopes=np.vstack([found.slopes, slopes[-1]]),
+        variances=np.concatenate([found.variances, np.full(2, noise.tip**2)]),
+    )
+
+
+def _by_piece(
+    image: Vector, tangents: Vector, normals: Vector, spacing: Vector, reach: Vector, seen: Detection
+) -> tuple[Vector, Vector]:
+    """Return the mean distance of each piece of the line from what is seen, and its seen length, px."""
+    if not len(seen.points):
+        return np.zeros(_PIECES), np.zeros(_PIECES)
+    # |a - b|^2 less |a|^2, which does not matter for what is nearest
+    far = (image**2).sum(axis=1) - 2.0 * (seen.points @ image.T)  # (n, m)
+    nearest = far.argmin(axis=1)
+    off = seen.points - image[nearest]
+    across = (off * normals[nearest]).sum(axis=1)
+    along = (off * tangents[nearest]).sum(axis=1)
+    belongs = (abs(across) <= reach[nearest]) & (abs(along) <= _BEYOND * spacing[nearest] + 1.0)
+    piece = np.minimum(nearest[belongs] // _PIECE, _PIECES - 1)
+    weights = seen.lengths[belongs]
+    lengths = np.bincount(piece, weights, _PIECES).astype(np.float64)
+    sums = np.bincount(piece, weights * across[belongs], _PIECES)
+    return sums / np.maximum(lengths, 1e-9), lengths
+
+
+def _tip(
+    image: Vector, slopes: Vector, tips: Vector, noise: Noise, covariance: Vector, gate: float
+) -> tuple[Vector | None, bool]:
+    """Return the distance (2,) of the likeliest of `tips` from the image of the tip, if it is near enough."""
+    if not len(tips):
+        return None, False
+    spread = slopes @ covariance @ slopes.T + noise.tip**2 * np.eye(2)
+    off = tips - image  # (k, 2)
+    squares = np.einsum("ki,ij,kj->k", off, np.linalg.inv(spread), off)
+    best = int(squares.argmin())
+    return (off[best], False) if squares[best] <= gate**2 else (None, True)

@@ -1,0 +1,161 @@
+"""An error-state extended Kalman filter of the needle's pose in the gripper; numpy alone.
+
+A needle that is held moves with the gripper, so what is estimated is its pose in the gripper's frame. The
+prediction of its pose in the camera's frame then is the kinematics of both arms, without integrating anything
+(the gripper's twist moves the mean exactly), and what is left to be estimated hardly changes: it drifts by
+what the kinematics do not know, and jumps when the needle slips.
+
+The mean is a pose, the error six numbers in the needle's own frame (`pose`). The update is iterated to the
+maximum a posteriori (Bell and Cathey, The iterated Kalman filter update as a Gauss-Newton method, IEEE
+Transactions on Automatic Control 38(2), 1993).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from controllers.needle_tracker.arc_fit import Arc, Detection, Fit, Noise, fit
+from controllers.needle_tracker.pose import difference, moved
+from schemas.vectors import Vector
+
+__all__ = ["Estimate", "Update", "View", "predicted", "updated"]
+
+_ITERATIONS = 6
+_DONE = 1e-6
+"""m and rad: a smaller step ends the iteration."""
+_SEARCHING, _NARROWING = 8, 0.35
+"""Iterations of a search, and by how much each narrows the covariance that its gate is made of."""
+_HUBER = 3.0
+"""Residuals above as many standard deviations count less (Huber, Robust Statistics, 1981)."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The needle's pose in the gripper's frame, (4, 4), and the covariance of its error, (6, 6): m, rad."""
+
+    pose: Vector
+    covariance: Vector
+
+
+@dataclass(frozen=True)
+class View:
+    """What one eye sees, and from where."""
+
+    projection: Vector
+    """From the gripper's frame to pixels, shape (3, 4)."""
+    seen: Detection
+
+
+@dataclass(frozen=True)
+class Update:
+    """The estimate after a picture, and how well the picture fits."""
+
+    estimate: Estimate
+    misfit: float
+    """Mean squared residual after the update, in variances."""
+    departure: float
+    """Squared distance of the estimate from the prior, in the prior's covariance."""
+    innovation: float
+    """Mean squared innovation before the update, in variances: 1 where all is as the filter believes."""
+    explained: float
+    """Share of the wire that is seen where it should be, the mean of the eyes that see any."""
+    unexplained: float
+    """Length of what has the wire's colour elsewhere, as a share of the wire's."""
+    tip: bool
+    """Whether an eye saw the tip where it should be."""
+    tip_refused: bool
+    """Whether eyes saw a tip elsewhere only."""
+
+
+def predicted(estimate: Estimate, seconds: float, drift: tuple[float, float]) -> Estimate:
+    """Return the estimate after a time in which the needle may have drifted in the gripper.
+
+    `drift`: standard deviations after a second, m and rad; they grow with the square root of the time.
+    """
+    grown = np.repeat(np.square(drift), 3) * seconds
+    return Estimate(estimate.pose, estimate.covariance + np.diag(grown))
+
+
+def updated(
+    arc: Arc,
+    prior: Estimate,
+    views: Sequence[View],
+    noise: Noise,
+    gate: float,
+    start: Vector | None = None,
+) -> Update:
+    """Return the estimate that is likeliest after what `views` show.
+
+    Args:
+        arc: the needle.
+        prior: what is known before.
+        views: of one or two eyes.
+        noise: of what they see.
+        gate: standard deviations of the prior up to which something seen is taken for the needle.
+        start: the pose from which to search, shape (4, 4): the gate then narrows from iteration to iteration;
+            default: the prior's, with a gate that stays.
+    """
+    information = np.linalg.inv(prior.covariance)
+    pose, spread = prior.pose if start is None else start, prior.covariance
+    first: list[Fit] = []
+    fits: list[Fit] = []
+    posterior = spread
+    tip_first = start is not None
+    for _ in range(_ITERATIONS if start is None else _SEARCHING):
+        fits = [fit(arc, view.projection, pose, view.seen, noise, spread, gate) for view in views]
+        first = first or fits
+        tip_first = tip_first and any(each.tip for each in fits)
+        residuals, slopes, variances = _stacked([each.tip_only for each in fits] if tip_first else fits)
+        weights = _robust(residuals, variances) / variances
+        off = difference(prior.pose, pose)
+        normal = information + slopes.T @ (weights[:, None] * slopes)
+        step = np.linalg.solve(normal, slopes.T @ (weights * residuals) - information @ off)
+        pose = moved(pose, cast("Vector", step))
+        posterior = cast("Vector", np.linalg.inv(normal))
+        if tip_first:
+            # no other thing has a tip, so it says first whereabouts the wire is to be looked for
+            spread, tip_first = posterior, False
+        elif start is not None:
+            spread = _NARROWING * spread
+        elif abs(step).max() < _DONE:
+            break
+    return _judged(Estimate(pose, 0.5 * (posterior + posterior.T)), prior, first, fits)
+
+
+def _stacked(fits: Sequence[Fit]) -> tuple[Vector, Vector, Vector]:
+    return (
+        np.concatenate([each.residuals for each in fits]),
+        np.vstack([each.slopes for each in fits]),
+        np.concatenate([each.variances for each in fits]),
+    )
+
+
+def _robust(residuals: Vector, variances: Vector) -> Vector:
+    size = np.abs(residuals) / np.sqrt(variances)
+    return np.minimum(1.0, _HUBER / np.maximum(size, 1e-12))
+
+
+def _judged(estimate: Estimate, prior: Estimate, first: Sequence[Fit], last: Sequence[Fit]) -> Update:
+    residuals, _, variances = _stacked(last)
+    misfit = float((residuals**2 / variances).mean()) if residuals.size else 0.0
+    off = difference(prior.pose, estimate.pose)
+    residuals, slopes, variances = _stacked(first)
+    innovation = 1.0
+    if residuals.size:
+        spread = slopes @ prior.covariance @ slopes.T + np.diag(variances)
+        innovation = float(residuals @ np.linalg.solve(spread, residuals)) / residuals.size
+    seeing = [each for each in last if each.explained > 0.0]
+    return Update(
+        estimate,
+        misfit,
+        float(off @ np.linalg.solve(prior.covariance, off)),
+        innovation,
+        float(np.mean([each.explained / each.expected for each in seeing])) if seeing else 0.0,
+        float(np.mean([each.unexplained / each.expected for each in last])) if last else 0.0,
+        any(each.tip for each in last),
+        any(each.tip_refused for each in last) and not any(each.tip for each in last),
+    )

@@ -1,0 +1,64 @@
+"""Whether an arm can hold a needle along a way, and how far its joints stay from their ends. SI units."""
+
+from __future__ import annotations
+
+from math import degrees, pi
+
+import numpy as np
+
+from robots.dvrk.cart import inverse_pose
+from robots.dvrk.inverse import branches
+from robots.serial_chain import SerialChain
+from schemas.vectors import Vector
+
+__all__ = ["Reach", "reach"]
+
+_JUMP = 0.7
+"""Most that a joint may turn between two poses of a way, rad: beyond, the arm would change its branch."""
+
+
+class Reach:
+    """What one arm makes of a way: its best branch."""
+
+    def __init__(self, chain: SerialChain, q: Vector) -> None:
+        """Take the joint positions, shape (poses, 6)."""
+        self._chain, self._q = chain, q
+        self._free = 2.0 * np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)
+        turns = np.abs(np.diff(q, axis=0))
+        self._jump = float(np.delete(turns, chain.prismatic, axis=1).max(initial=0.0))
+        self.margin = float(self._free.min()) if self._jump <= _JUMP else -1.0 - self._jump
+        """Least share of half a joint's range that is left; below 0 the way is not feasible."""
+
+    @property
+    def problem(self) -> str:
+        """Why the way is not feasible: the number that fails; empty: it is."""
+        if self.margin >= 0.0:
+            return ""
+        if self._jump > _JUMP:
+            return f"a joint would have to jump by {degrees(self._jump):.0f} degrees"
+        pose, joint = np.unravel_index(int(self._free.argmin()), self._free.shape)
+        there, chain = self._chain.joints[int(joint)], self._chain
+        value, low, high = (
+            float(each) for each in (self._q[pose, joint], chain.lower[joint], chain.upper[joint])
+        )
+        if there.kind == "prismatic":
+            return f"{there.name} would be {value * 1e3:.1f} mm, allowed {low * 1e3:.0f} to {high * 1e3:.0f}"
+        return (
+            f"{there.name} would be {degrees(value):.1f} degrees, allowed {degrees(low):.0f} to"
+            f" {degrees(high):.0f}"
+        )
+
+
+def reach(chain: SerialChain, base: Vector, tips: Vector) -> Reach:
+    """Return the best of all ways of the joints along `tips`, shape (poses, 4, 4), in the world.
+
+    `base`: of the arm in the world, shape (4, 4). The shaft's roll may begin a turn on or back.
+    """
+    roll, found = 3, list[Reach]()
+    for q in branches(chain, inverse_pose(base) @ tips):  # (poses, 6)
+        q[:, roll] = np.unwrap(q[:, roll])
+        for turn in (-2.0 * pi, 0.0, 2.0 * pi):
+            wound = q.copy()
+            wound[:, roll] += turn
+            found.append(Reach(chain, wound))
+    return max(found, key=lambda each: each.margin)

@@ -1,0 +1,113 @@
+"""The way of a curved needle through two holes, and how a jaw holds it. Metres, radians.
+
+The needle turns about the middle of a circle through both holes, in the plane that they span with the normal
+of the skin: constant curvature is what guidelines ask for, since the needle then follows itself. Its angle is
+that of the tip: 0 towards the side it comes from, a quarter of a turn where it points straight down.
+
+A jaw holds the wire across: its fingers point along the needle's axis z, so that a turn of the jaw about its
+own axis drives the needle on, and close along the radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import asin, cos, hypot, pi, sin, sqrt
+
+import numpy as np
+
+from robots.training.needles import NeedleShape
+from schemas.errors import MotionError
+from schemas.vectors import Vector
+
+__all__ = ["Grip", "Stitch", "grip_pose", "stitch_between"]
+
+
+@dataclass(frozen=True)
+class Stitch:
+    """One way through the tissue, in the frame that the holes were given in."""
+
+    centre: Vector
+    """Of the circle, shape (3,), m."""
+    axes: Vector
+    """Columns: against the way on the skin, down into the tissue, about which the needle turns; (3, 3)."""
+    entry: float
+    """Angle of the tip where it goes in, rad."""
+    exit: float
+    """Where it comes out."""
+    needle: NeedleShape
+
+    def pose(self, tip: float, lift: float = 0.0) -> Vector:
+        """Return the needle's pose, shape (4, 4), with its tip at an angle (rad), raised by `lift` (m)."""
+        turn = tip - self.needle.arc / 2.0
+        pose = np.eye(4)
+        pose[:3, 0] = self.axes[:, :2] @ [cos(turn), sin(turn)]
+        pose[:3, 1] = self.axes[:, :2] @ [-sin(turn), cos(turn)]
+        pose[:3, 2] = self.axes[:, 2]
+        pose[:3, 3] = self.centre - lift * self.axes[:, 1]
+        return pose
+
+    def angle(self, pose: Vector) -> float:
+        """Return the tip's angle (rad), from 0 to a whole turn, of a needle whose pose is on this way."""
+        x = self.axes.T @ pose[:3, 0]
+        return float(np.mod(np.arctan2(x[1], x[0]) + self.needle.arc / 2.0, 2.0 * pi))
+
+    @property
+    def out(self) -> float:
+        """Angle of the tip at which the base has left the tissue, rad."""
+        return self.exit + self.needle.arc
+
+    @property
+    def depth(self) -> float:
+        """Of the deepest point under the line between the holes, m."""
+        return self.needle.radius * (1.0 - sin(self.entry))
+
+
+def stitch_between(entry: Vector, leave: Vector, up: Vector, needle: NeedleShape) -> Stitch:
+    """Return the way from one hole to another, both shape (3,), m; `up`: out of the tissue, shape (3,).
+
+    Raises MotionError if the needle is too small.
+    """
+    chord = leave - entry
+    bite = float(np.sqrt(chord @ chord))
+    if bite >= 2.0 * needle.radius:
+        raise MotionError(
+            f"the holes are {bite * 1e3:.1f} mm apart, and the needle is {2e3 * needle.radius:.1f} mm across"
+        )
+    along = chord / bite
+    axis = np.cross(along, up)
+    axis /= hypot(*axis.tolist())
+    height = sqrt(needle.radius**2 - bite**2 / 4.0)
+    down = np.cross(along, axis)
+    angle = asin(height / needle.radius)
+    return Stitch(
+        centre=(entry + leave) / 2.0 - height * down,
+        axes=np.stack([-along, down, axis], axis=1),
+        entry=angle,
+        exit=pi - angle,
+        needle=needle,
+    )
+
+
+@dataclass(frozen=True)
+class Grip:
+    """How a jaw holds the wire."""
+
+    behind: float
+    """How far behind the tip, rad of the arc."""
+    left_outside: bool
+    """Whether the left finger is on the outer side of the arc."""
+
+
+def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
+    """Return the pose of the tip frame in the needle's frame, shape (4, 4).
+
+    `reach`: from the wrist yaw axis, where the tip frame is, to the wire along the fingers, m.
+    """
+    angle = needle.arc / 2.0 - grip.behind
+    outwards = np.array([cos(angle), sin(angle), 0.0])
+    pose = np.eye(4)
+    pose[:3, 2] = 0.0, 0.0, 1.0
+    pose[:3, 1] = outwards if grip.left_outside else -outwards
+    pose[:3, 0] = np.cross(pose[:3, 1], pose[:3, 2])
+    pose[:3, 3] = needle.radius * outwards - reach * pose[:3, 2]
+    return pose

@@ -1,0 +1,138 @@
+"""Keys, pointer and gamepad of a page in place of a stylus or a headset (kind `browser`).
+
+The server of the page hosts the device (`host: remote`), so its samples go the way of every other device's.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from devices.browser.page_hand import PageInput, hand_of
+from devices.diagnosis import Diagnosis, Level
+from devices.keyboard.hand_ports import StandsFor, hand_ports
+from devices.keyboard.virtual_stylus import VirtualStylus, Wish
+from devices.samples import SampleTimer, button_sample, pose_sample, twist_sample
+from hub.participant import Device, Params, Sample
+from schemas.ports import Port
+from schemas.quantity import Duration, Speed
+from schemas.ros import Float64Message
+
+__all__ = ["Browser", "BrowserParams"]
+
+_LONGEST_NS = 50_000_000
+"""After a longer pause between reads the stylus moves for this time only: it must not leap."""
+
+
+class BrowserParams(Params):
+    """What a page moves, how fast it moves, and when a silent page is no longer obeyed."""
+
+    stands_for: Annotated[
+        StandsFor,
+        Field(
+            description="whose axes the moved frame has: a stylus', z out of its point, or a head's, x ahead"
+        ),
+    ] = "stylus"
+    speed: Annotated[Speed, Field(gt=0.0, le=1.0, description="of the stylus' tip, at most")] = 0.1
+    turn_speed: Annotated[float, Field(gt=0.0, le=10.0, description="of the stylus, at most, rad/s")] = 1.0
+    rate: Annotated[float, Field(gt=0.0, le=1000.0, description="samples per second at most")] = 250.0
+    silence: Annotated[
+        Duration,
+        Field(gt=0, le=1_000_000_000, description="a page that sends nothing for this long lets go of all"),
+    ] = 100_000_000
+    max_age: Annotated[Duration, Field(gt=0, description="a pose or twist that is older is marked stale")] = (
+        100_000_000
+    )
+
+
+class Browser(Device):
+    """Publishes `pose`, `twist`, `buttons`, `gripper` and `diagnostics` like one stylus, led from a page.
+
+    While no page leads, or the one that leads is silent, only the last: the arm holds. The moved frame starts
+    at the origin of `<participant>_base`, pointing level away from the user.
+    """
+
+    params_model: ClassVar[type[Params]] = BrowserParams
+    params: BrowserParams
+
+    def __init__(self, name: str, params: BrowserParams) -> None:
+        super().__init__(name, params)
+        self._diagnosis = Diagnosis(name)
+        self._pose, self._twist, self._buttons, self._gripper = hand_ports(
+            name, params.stands_for, params.max_age
+        )
+        self._reset()
+
+    def _reset(self) -> None:
+        self._hand = hand_of(self.name)
+        self._stylus = VirtualStylus(self.params.speed, self.params.turn_speed, self.params.stands_for)
+        self._pressed = (False, False)
+        self._timer, self._last_ns = SampleTimer(self.params.rate), 0
+        self._lead, self._dragged = -1, np.zeros(3)
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """`pose`, `twist`, `buttons`, `gripper` and `diagnostics`."""
+        return self._pose, self._twist, self._buttons, self._gripper, self._diagnosis.port
+
+    def open(self, directory: Path) -> None:  # noqa: ARG002
+        """Wait for a page."""
+        self._diagnosis = Diagnosis(self.name)
+        self._reset()
+
+    def read(self, t: int) -> list[Sample]:
+        """Return the present pose and twist, the buttons and the diagnosis if they have changed."""
+        if not self._timer.due(t):
+            return []
+        elapsed_ns, self._last_ns = min(t - self._last_ns, _LONGEST_NS), t
+        newest = self._hand.newest()
+        if newest is None:
+            return self._press(t, Wish()) + self._diagnosis.report(Level.WARN, self._unled())
+        asked, age_ns, lead = newest
+        if age_ns > self.params.silence:
+            return self._press(t, Wish()) + self._diagnosis.report(
+                Level.WARN,
+                "the page that leads is silent or not in front: the arm holds; click into it",
+            )
+        samples = self._press(t, asked.wish) + self._diagnosis.report(Level.OK, "a page leads")
+        self._stylus.advance(self._with_drag(asked, lead, elapsed_ns * 1e-9), elapsed_ns * 1e-9)
+        return [
+            *samples,
+            pose_sample(self._pose, t, *self._stylus.pose),
+            twist_sample(self._twist, t, *self._stylus.twist),
+            Sample(self._gripper.name, Float64Message(data=self._stylus.gripper)),
+        ]
+
+    def _unled(self) -> str:
+        if self._hand.served:
+            return f"no page leads: choose 'Lead {self.name}' on the page of `trocar view`"
+        return (
+            "no page can lead: the page's server hosts this device; set `host: remote` in the scenario, and"
+            " run it with --open"
+        )
+
+    def _press(self, t: int, wish: Wish) -> list[Sample]:
+        pressed = wish.dead_man, wish.jaw
+        if pressed == self._pressed:
+            return []
+        self._pressed = pressed
+        return [button_sample(self._buttons, t, pressed)]
+
+    def _with_drag(self, asked: PageInput, lead: int, seconds: float) -> Wish:
+        """Return the command with what is left of the pointer's way, as fast as the stylus may move."""
+        if lead != self._lead:
+            self._lead, self._dragged = lead, np.array(asked.drag)
+        left = np.array(asked.drag) - self._dragged
+        most = self.params.speed * seconds
+        if not most or not left.any():
+            return asked.wish
+        share = left / max(most, float(np.linalg.norm(left)))
+        self._dragged = self._dragged + share * most
+        ahead, sideways, up = share.tolist()
+        return asked.wish + Wish(linear=(ahead, sideways, up))
+
+    def close(self) -> None:
+        """Obey no page any more."""

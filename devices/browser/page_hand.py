@@ -1,0 +1,61 @@
+"""What the page that leads a device asks of it, from the page's server to the device, in one process."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import monotonic_ns
+
+from devices.keyboard.virtual_stylus import Wish
+from devices.vendor_axes import Vector3
+
+__all__ = ["PageHand", "PageInput", "hand_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class PageInput:
+    """What keys, sticks and pointer of a page ask."""
+
+    wish: Wish
+    drag: Vector3 = (0.0, 0.0, 0.0)
+    """Way of the pointer since the page leads, m: ahead, left, up; a message that is lost is in the next."""
+
+
+class PageHand:
+    """The newest input of the page that leads; the page's server writes it, the device reads it."""
+
+    def __init__(self, clock: Callable[[], int] = monotonic_ns) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._newest: tuple[PageInput, int] | None = None
+        self._leads = 0
+        self.served = False
+        """Whether a server of pages is in this process."""
+
+    def give(self, asked: PageInput) -> None:
+        """Replace the input."""
+        with self._lock:
+            self._newest = asked, self._clock()
+
+    def release(self) -> None:
+        """Forget it: no page leads any more."""
+        with self._lock:
+            self._newest = None
+            self._leads += 1
+
+    def newest(self) -> tuple[PageInput, int, int] | None:
+        """Return the input, its age (ns) and which lead it is of; None if no page leads."""
+        with self._lock:
+            if self._newest is None:
+                return None
+            asked, at_ns = self._newest
+            return asked, self._clock() - at_ns, self._leads
+
+
+_hands: dict[str, PageHand] = {}
+
+
+def hand_of(device: str) -> PageHand:
+    """Return the hand of a device of this process, by the device's name."""
+    return _hands.setdefault(device, PageHand())

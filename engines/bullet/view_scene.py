@@ -1,0 +1,47 @@
+"""The scene of a page: the soft surfaces of a participant of kind bullet, and their colours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.bullet.params import BulletParams
+from hub.participant.view import Camera, Frame, Part, Rgb
+from schemas.vectors import Vector
+
+__all__ = ["ViewScene"]
+
+_COLOURS: dict[str, Rgb] = {
+    "adrenal": (0.83, 0.60, 0.28),
+    "colon": (0.86, 0.55, 0.48),
+    "fat": (0.90, 0.76, 0.42),
+    "kidney": (0.60, 0.24, 0.20),
+    "liver": (0.52, 0.20, 0.15),
+}
+"""By the end of an organ's name: those of the endoscope's skins."""
+_TISSUE: Rgb = (0.80, 0.38, 0.33)
+
+
+class ViewScene:
+    """The organs; nothing else of the tissue engine is published."""
+
+    bodies: tuple[str, ...] = ()
+    parts: tuple[Part, ...] = ()
+    frames: tuple[Frame, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    inputs: tuple[str, ...] = ()
+
+    def __init__(self, params: Mapping[str, Any]) -> None:
+        """Find the organs; raises pydantic's ValidationError if the parameters are not valid."""
+        organs = BulletParams.model_validate(params).organs
+        self.surfaces: dict[str, Rgb] = {
+            f"{name}/nodes": _COLOURS.get(next(filter(name.endswith, _COLOURS), ""), _TISSUE)
+            for name in organs
+        }
+
+    def poses(self, values: Mapping[str, Vector]) -> NDArray[np.float32]:  # noqa: ARG002
+        """Return no poses, shape (0, 7): there are no rigid bodies to show."""
+        return np.zeros((0, 7), np.float32)

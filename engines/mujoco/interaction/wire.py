@@ -1,0 +1,116 @@
+"""The bond at a needle: three points of its wire, which another engine pushes on.
+
+A needle weighs a tenth of a gram. Where a jaw lets go of it in tissue, nothing but the tissue holds it, and
+its force, which is a step old, would throw it about. What tissue also has is viscosity: it acts here, in
+MuJoCo's implicit step, for as long as a force comes through the bond (docs/decisions/0062).
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from engines.mujoco.interaction.mechanics import moment
+from engines.mujoco.object_params import NeedleParams
+from engines.mujoco.ports import WIRE
+from hub.participant import Inputs, MotionSide
+from robots.training.needles import NeedleShape
+from schemas.vectors import Vector
+
+__all__ = ["Wire"]
+
+
+class Wire:
+    """Views of the model's data that belong to one needle."""
+
+    acts_off_centre = True
+    """So its moment is renewed in every sub-step."""
+
+    def __init__(
+        self,
+        thing: str,
+        params: NeedleParams,
+        motion: MotionSide,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+    ) -> None:
+        """Let `motion` act on the needle `thing`."""
+        self.thing, self.motion, self.bond = thing, motion, f"{thing}/{WIRE}"
+        body = model.body(thing).id
+        self._marks = _marks(params)
+        self._dofs = slice(first := int(model.joint(thing).dofadr[0]), first + 6)
+        self._speed, self._damping = data.qvel[self._dofs], model.dof_damping[self._dofs]
+        self._drag = _drag(params)
+        self._place, self._axes = data.xpos[body], data.xmat[body].reshape(3, 3)
+        self._centre, self._load = data.xipos[body], data.xfrc_applied[body]
+        self._position, self._velocity, self._last = np.zeros(9), np.zeros(9), np.zeros(9)
+        self._force = np.zeros(9)
+        self.wrench = np.zeros(6)
+        """Mean force (N) through the bond in the last step and its moment (N m) about the world's origin."""
+        self.outputs = motion.result(self._position, self._velocity)
+        self.refresh()
+
+    def begin(self, inputs: Inputs) -> None:
+        """Apply the reaction of the step that begins, and the drag while there is one."""
+        self.motion.begin(inputs, self._position, self._velocity)
+        self._push(0.0)
+        self._damping[:] = self._drag if self._force.any() else 0.0
+        self.wrench[:] = 0.0
+        self._substeps = 0
+
+    def renew(self, tau: float) -> None:
+        """Record the work done, and renew the load `tau` seconds into the step."""
+        self._move()
+        self._push(tau)
+
+    def end(self) -> None:
+        """Record the work done, and set the mean wrench."""
+        self._move()
+        self.wrench /= self._substeps
+
+    def refresh(self) -> None:
+        """Take the points of the model's present state as those from which work counts."""
+        arms = self._marks @ self._axes.T
+        self._position.reshape(3, 3)[:] = self._place + arms
+        spin = self._axes @ self._speed[3:]
+        self._velocity.reshape(3, 3)[:] = self._speed[:3] + moment(np.broadcast_to(spin, (3, 3)), arms)
+        self._last[:] = self._position
+
+    @staticmethod
+    def least_mass(thing: str, params: NeedleParams, model: mujoco.MjModel, data: mujoco.MjData) -> float:
+        """Return the least mass (kg) that forces on the points meet in a sub-step, drag included."""
+        first, arms = int(model.joint(thing).dofadr[0]), _marks(params)
+        inertia = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, inertia)
+        inertia = inertia[first : first + 6, first : first + 6] + model.opt.timestep * np.diag(_drag(params))
+        turning = np.zeros((3, 3, 3))  # velocity of each point by the three turns, axes of the needle
+        for point, (x, y, z) in zip(turning, arms.tolist(), strict=True):
+            point[:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+        axes = data.xmat[model.body(thing).id].reshape(3, 3)
+        jacobian = np.concatenate([np.tile(np.eye(3), (3, 1, 1)), axes @ turning], axis=2).reshape(9, 6)
+        return float(1.0 / np.linalg.eigvalsh(jacobian @ np.linalg.solve(inertia, jacobian.T))[-1])
+
+    def _push(self, tau: float) -> None:
+        self._force = self.motion.force(tau, self._position, self._velocity)
+        forces, points = self._force.reshape(3, 3), self._position.reshape(3, 3)
+        self._load[:3] = forces.sum(axis=0)
+        self._load[3:] = moment(points - self._centre, forces).sum(axis=0)
+
+    def _move(self) -> None:
+        """Record the work and the wrench of a sub-step."""
+        self.wrench[:3] += self._load[:3]
+        self.wrench[3:] += self._load[3:] + moment(self._centre, self._load[:3])
+        self._substeps += 1
+        before = self._last.copy()
+        self.refresh()
+        self.motion.add(self._force, self._position - before)
+
+
+def _marks(params: NeedleParams) -> Vector:
+    """Return the bonded points in the needle's frame, m, shape (3, 3)."""
+    return NeedleShape(params.radius, params.arc, params.wire_radius).bonded
+
+
+def _drag(params: NeedleParams) -> Vector:
+    """Return the damping of the needle's six degrees of freedom, N s/m and N m s/rad."""
+    return params.drag * np.repeat([1.0, params.radius**2], 3)

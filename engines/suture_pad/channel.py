@@ -1,0 +1,278 @@
+"""The mechanics of a needle in tissue: skin, channel, tip. No ports, no bonds. SI units.
+
+Frame `pad`: z = 0 is the skin at rest, tissue is where z < 0. The frame of a needle is that of
+`robots.training.needles`: origin in the arc's centre, z normal to its plane; the angle of the tip is arc/2.
+
+A needle that has broken through the skin leaves a channel, a row of points fixed in the tissue at rest. In
+the needle's frame a point of it has the angle a, the distance p from the axis and the height z. On the wire
+it would have p = r and z = 0; what is missing is the way the tissue is pushed aside there, and
+
+    compression: K ds [(p - r) e_p + z e_z]  on the needle at each point it covers: K times the area swept
+    friction:    c ds                        against the way along the arc, once it has slipped
+    cutting:     up to F_cut at the tip      against going on, where there is no channel yet
+
+Compression is the gradient of K/2 times the sum of squares, so it gives back what it has taken; friction and
+cutting are springs that slip at their largest force (Prandtl), so they never give more than they took. A
+needle can leave its channel only along the arc: nothing else makes what is missing vanish.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from math import ceil, hypot, pi
+
+import numpy as np
+
+from engines.suture_pad.three_points import cross
+from engines.suture_pad.tissue import TissueParams
+from hub.participant import Record, array, choice, flag, integer, number
+from robots.training.needles import NeedleShape
+from schemas.vectors import Vector
+
+__all__ = ["SPACING", "Channel", "ChannelState", "Phase"]
+
+SPACING = 0.5e-3
+"""Between the points of a channel, m."""
+
+
+class Phase(IntEnum):
+    """Where the tip is."""
+
+    OUT = 0
+    PRESSING = 1
+    """On the skin, which has not broken."""
+    IN = 2
+    THROUGH = 3
+    """Out again, at the other end of the channel."""
+
+
+class ChannelState(Record):
+    """All that a needle has done to the tissue it is in."""
+
+    phase = choice(Phase.OUT)
+    count = integer()
+    """Of points of the channel."""
+    points = array("most", 3)
+    """m, frame `pad`."""
+    cut = number()
+    """Length of the channel, m."""
+    slid = number()
+    """Where along the arc the wire would have to be for no friction, m."""
+    length = number()
+    """Way of the tip along the arc since the skin, m."""
+    came_out = array(3)
+    """Where the wire passed the skin when the tip broke out, m, frame `pad`."""
+    touched = array(3)
+    """Where the tip meets the skin, m, frame `pad`."""
+    swept = number()
+    """Area between needle and channel now, m^2."""
+    tip = number()
+    """Force against the tip's way, N."""
+    pulled_out = flag()
+    """Whether the last needle in has left by the other end than it came in by."""
+    covered = number()
+    """Length of the channel that the needle fills, m."""
+
+
+class Channel:
+    """One needle and the tissue under one skin."""
+
+    def __init__(self, needle: NeedleShape, tissue: TissueParams) -> None:
+        self._needle, self._tissue = needle, tissue
+        self._most = ceil(2.0 * needle.length / SPACING)
+        self.state = ChannelState(most=self._most)
+        self._arclengths = SPACING * np.arange(self._most)
+        stations = np.linspace(-needle.arc / 2.0, needle.arc / 2.0, ceil(needle.length / 1e-3) + 1)
+        self._stations = needle.points(stations)
+        self._share = needle.length / len(stations)
+        self._tip = self._stations[-1]
+        self._forward = np.array([-np.sin(needle.arc / 2.0), np.cos(needle.arc / 2.0), 0.0])
+        self._missing = np.zeros((0, 3))
+        self._stretch = np.zeros(3)
+
+    def advance(self, rotation: Vector, origin: Vector, *, over_pad: bool) -> tuple[Vector, Vector]:
+        """Follow the needle to a pose, and return force (N) and moment (N m, about 0) on it, frame `pad`.
+
+        Args:
+            rotation: of the needle in `pad`, shape (3, 3).
+            origin: of its frame in `pad`, m, shape (3,).
+            over_pad: whether there is tissue under its tip.
+        """
+        state = self.state
+        lowest = float(origin[2]) - self._needle.radius * hypot(rotation[2, 0], rotation[2, 1])
+        if lowest > self._needle.wire_radius and state.phase in (Phase.OUT, Phase.PRESSING):
+            state.phase, state.tip = Phase.OUT, 0.0
+            return np.zeros(3), np.zeros(3)
+        tip: Vector = rotation @ self._tip + origin
+        if state.phase in (Phase.OUT, Phase.PRESSING):
+            force = self._press(rotation, tip, origin, over_pad=over_pad)
+            if not state.count:
+                lying, moment = self._lie(rotation, origin, 0, len(self._stations) - 1)
+                return force + lying, moment + cross(tip, force)
+        return self._follow(rotation, origin, tip)
+
+    def displaced(self) -> tuple[Vector, Vector]:
+        """Return places in the tissue at rest and their displacements, both m, shape (n, 3), frame `pad`.
+
+        They are of the last pose: the covered points of the channel, and the skin or tissue at the tip.
+        """
+        state = self.state
+        if state.phase is Phase.OUT:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        if state.phase is Phase.PRESSING:
+            return state.touched[None], self._stretch[None]
+        displacements = self._missing.copy()
+        displacements[-1] += self._stretch
+        return state.points[: len(displacements)], displacements
+
+    def _press(self, rotation: Vector, tip: Vector, origin: Vector, *, over_pad: bool) -> Vector:
+        """Return the force of the unbroken skin on the tip, N; break the skin if it is too large."""
+        state = self.state
+        if tip[2] >= 0.0 or not over_pad:
+            state.phase, state.tip = Phase.OUT, 0.0
+            return np.zeros(3)
+        if state.phase is Phase.OUT:
+            state.phase, state.touched[:] = Phase.PRESSING, (tip[0], tip[1], 0.0)
+        self._stretch = tip - state.touched
+        force = -self._tissue.skin_stiffness * self._stretch
+        state.tip = float(np.sqrt(force @ force))
+        forward = rotation @ self._forward
+        if -(force @ forward) > self._tissue.entry_puncture and forward[2] < 0.0:
+            self._break_in(rotation, origin)
+        return force
+
+    def _break_in(self, rotation: Vector, origin: Vector) -> None:
+        """Begin a channel where the wire now passes the skin."""
+        state = self.state
+        angle = self._skin_angle(rotation, origin, entering=True)
+        state.phase, state.count, state.points[:] = Phase.IN, 1, 0.0
+        state.points[0] = rotation @ self._needle.points(np.array([angle]))[0] + origin
+        state.length = self._needle.radius * (self._needle.arc / 2.0 - angle)
+        state.cut = max(0.0, state.length - self._tissue.give)
+        state.slid = state.length
+        self._dig(rotation, origin)
+
+    def _skin_angle(self, rotation: Vector, origin: Vector, *, entering: bool) -> float:
+        """Return the angle on the wire, nearest to the tip, at which it passes the skin in or out.
+
+        The height of the wire is A cos(angle - b) + origin_z; near the tip it falls when entering.
+        """
+        lift = self._needle.radius * np.hypot(rotation[2, 0], rotation[2, 1])
+        peak = np.arctan2(rotation[2, 1], rotation[2, 0])
+        half = float(np.arccos(np.clip(-origin[2] / max(lift, 1e-12), -1.0, 1.0)))
+        end = self._needle.arc / 2.0
+        angle = float(peak) + (half if entering else -half)
+        # of the turns of this angle that which is at most half a turn from the tip's
+        return angle - 2.0 * pi * round((angle - end) / (2.0 * pi))
+
+    def _dig(self, rotation: Vector, origin: Vector) -> None:
+        """Add points to the channel up to where it has been cut: where the wire is now."""
+        state = self.state
+        while state.count < self._most and state.count * SPACING <= state.cut:
+            behind = state.length - state.count * SPACING
+            angle = np.array([self._needle.angle(behind)])
+            state.points[state.count] = rotation @ self._needle.points(angle)[0] + origin
+            state.count += 1
+
+    def _follow(self, rotation: Vector, origin: Vector, tip: Vector) -> tuple[Vector, Vector]:
+        """Return force and moment of channel and tip, with the tip `length` along the channel."""
+        state, needle, tissue = self.state, self._needle, self._tissue
+        points = state.points[: state.count]
+        local = (points - origin) @ rotation
+        away = np.hypot(local[:, 0], local[:, 1])
+        angles = np.arctan2(local[:, 1], local[:, 0])
+        # how far behind the tip, by whole turns nearest to what it was before
+        before = (state.length - self._arclengths[: state.count]) / needle.radius
+        behind = needle.arc / 2.0 - angles
+        on_wire = needle.radius * (behind + 2.0 * pi * np.rint((before - behind) / (2.0 * pi)))
+        weights = np.clip((needle.length - on_wire) / SPACING + 0.5, 0.0, 1.0)
+        weights *= np.clip(on_wire / SPACING + 0.5, 0.0, 1.0)
+        covered = float(weights.sum())
+        if covered > 0.0:
+            state.length = float(weights @ (on_wire + self._arclengths[: state.count])) / covered
+        else:  # only the end of the wire, or only the tip, is near the channel
+            nearest = int(np.argmin(np.abs(on_wire)))
+            state.length = float(on_wire[nearest] + self._arclengths[nearest])
+        state.covered = covered * SPACING
+        if self._has_left(on_wire):
+            return np.zeros(3), np.zeros(3)
+        radial = np.zeros_like(local)
+        radial[:, :2] = local[:, :2] / np.maximum(away, 1e-9)[:, None]
+        missing = (away - needle.radius)[:, None] * radial
+        missing[:, 2] = local[:, 2]
+        state.swept = float(weights @ np.sqrt((missing * missing).sum(axis=1))) * SPACING
+        self._missing = -(weights[:, None] * missing) @ rotation.T
+        along = np.stack([-radial[:, 1], radial[:, 0], np.zeros(state.count)], axis=1)
+        loads = tissue.compression * SPACING * missing - self._rub(covered) * along
+        loads *= weights[:, None]
+        forces = loads @ rotation.T
+        force, moment = forces.sum(axis=0), cross(points, forces).sum(axis=0)
+        forward = rotation @ self._forward
+        at_tip = -self._resist(rotation, origin) * forward
+        self._stretch = (max(0.0, state.length - state.cut) if state.tip else 0.0) * forward
+        lying, turning = self._lie(rotation, origin, *self._outside())
+        return force + at_tip + lying, moment + cross(tip, at_tip) + turning
+
+    def _rub(self, covered: float) -> float:
+        """Return the friction (N) at each covered point; let the wire slip where it is too large."""
+        state, largest = self.state, self._tissue.friction * SPACING
+        stiffness = largest / self._tissue.give
+        pull = stiffness * (state.length - state.slid)
+        if abs(pull) > largest:
+            pull = largest if pull > 0.0 else -largest
+            state.slid = state.length - pull / stiffness
+        return pull if covered > 0.0 else 0.0
+
+    def _resist(self, rotation: Vector, origin: Vector) -> float:
+        """Return the force (N) against the tip: it cuts, or stretches the skin until that breaks."""
+        state, tissue, needle = self.state, self._tissue, self._needle
+        ahead = state.length - state.cut
+        if state.phase is Phase.THROUGH or ahead <= 0.0:
+            state.tip = 0.0
+            return 0.0
+        stiffness = tissue.cutting / tissue.give
+        to_skin = self._way_to_skin(rotation, origin)
+        if ahead > tissue.give and to_skin > tissue.give:
+            state.cut = state.length - min(ahead, tissue.give)
+            self._dig(rotation, origin)
+            ahead = state.length - state.cut
+        stretch = max(0.0, ahead - tissue.give)
+        state.tip = stiffness * min(ahead, tissue.give) + tissue.skin_stiffness * stretch
+        if stretch > 0.0 and state.tip > tissue.exit_puncture:
+            state.phase, state.cut, state.tip = Phase.THROUGH, state.length + min(0.0, to_skin), 0.0
+            self._dig(rotation, origin)
+            angle = np.array([needle.arc / 2.0 + to_skin / needle.radius])
+            state.came_out[:] = rotation @ needle.points(angle)[0] + origin
+        return state.tip
+
+    def _way_to_skin(self, rotation: Vector, origin: Vector) -> float:
+        """Return the way along the arc from the tip to where it comes out, m; negative beyond."""
+        angle = self._skin_angle(rotation, origin, entering=False)
+        return self._needle.radius * (angle - self._needle.arc / 2.0)
+
+    def _has_left(self, on_wire: Vector) -> bool:
+        """Say whether the needle is out of its channel, at either end; it is then forgotten."""
+        state = self.state
+        back, out = state.length <= 0.0, bool((on_wire > self._needle.length + SPACING).all())
+        if back or out:
+            state.pulled_out = out
+            state.phase, state.count, state.covered, state.swept, state.tip = Phase.OUT, 0, 0.0, 0.0, 0.0
+            state.length = state.cut = state.slid = 0.0
+            self._missing = np.zeros((0, 3))
+        return back or out
+
+    def _outside(self) -> tuple[int, int]:
+        """Return which stations of the wire are behind the channel: from the base, how many."""
+        behind = self._needle.length - self.state.length
+        return 0, max(0, int(behind / self._share) - 1)
+
+    def _lie(self, rotation: Vector, origin: Vector, first: int, last: int) -> tuple[Vector, Vector]:
+        """Return force and moment of the skin on those stations of the wire that press on it from above."""
+        places = self._stations[first:last] @ rotation.T + origin
+        depth = np.maximum(self._needle.wire_radius - places[:, 2], 0.0)
+        force, moment = np.zeros(3), np.zeros(3)
+        if last > first and float(depth.max()) > 0.0:
+            loads = self._tissue.compression * self._share * depth
+            force[2] = float(loads.sum())
+            moment[0], moment[1] = float(places[:, 1] @ loads), -float(places[:, 0] @ loads)
+        return force, moment

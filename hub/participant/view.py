@@ -1,0 +1,94 @@
+"""What a page draws of a participant: bodies with meshes, moved by its outputs, and soft surfaces.
+
+A kind offers it by an entry point of the group `trocar.scenes`, which names a function or class that takes
+the participant's parameters (a mapping, as the scenario states them) and returns a `Scene`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.vectors import Vector
+
+__all__ = ["Camera", "Frame", "Part", "Rgb", "Scene"]
+
+Rgb = tuple[float, float, float]
+"""Red, green and blue, each from 0 to 1."""
+
+
+class Part(NamedTuple):
+    """A mesh of one colour on one body."""
+
+    body: int
+    """Index of the body."""
+    colour: tuple[float, float, float, float]
+    """Red, green, blue and opacity, each from 0 to 1."""
+    vertices: NDArray[np.float32]
+    """Shape (n, 3), m, in the frame of the body."""
+    faces: NDArray[np.uint32]
+    """Vertex indices, shape (f, 3), counter-clockwise from outside."""
+
+
+class Frame(NamedTuple):
+    """A frame worth showing, such as that of a tip."""
+
+    name: str
+    body: int
+    pose: Sequence[float]
+    """In the body: position (m) and quaternion (x, y, z, w)."""
+
+
+class Camera(NamedTuple):
+    """A camera that a body carries, which looks along its own z with y down."""
+
+    name: str
+    body: int
+    pose: Sequence[float]
+    """Of the optical frame in the body: position (m) and quaternion (x, y, z, w)."""
+    field_of_view: float
+    """Horizontal, rad."""
+
+
+class Scene(Protocol):
+    """The bodies of one participant and where they are."""
+
+    @property
+    def bodies(self) -> Sequence[str]:
+        """Names of the bodies."""
+        ...
+
+    @property
+    def parts(self) -> Sequence[Part]:
+        """The meshes; bodies do not change theirs."""
+        ...
+
+    @property
+    def frames(self) -> Sequence[Frame]:
+        """The frames that are worth showing."""
+        ...
+
+    @property
+    def cameras(self) -> Sequence[Camera]:
+        """The cameras of the participant itself."""
+        ...
+
+    @property
+    def surfaces(self) -> Mapping[str, Rgb]:
+        """The colour of each output of type `trocar_msgs/msg/SoftBodyState`."""
+        ...
+
+    @property
+    def inputs(self) -> Sequence[str]:
+        """The outputs of the participant that `poses` needs; empty if nothing moves."""
+        ...
+
+    def poses(self, values: Mapping[str, Vector]) -> NDArray[np.float32]:
+        """Return the pose of each body in the world, shape (bodies, 7): m and quaternion (x, y, z, w).
+
+        `values`: the newest value of each of `inputs`. Raises MessageError if one has another shape.
+        """
+        ...

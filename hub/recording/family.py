@@ -1,0 +1,68 @@
+"""Recordings and their forks: which one comes from which."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hub.recording.fork_origin import ForkOrigin, fork_origin
+from hub.recording.recording import Recording
+from schemas.errors import RecordingError
+
+__all__ = ["Member", "family"]
+
+
+@dataclass(frozen=True)
+class Member:
+    """One recording, and how far it is from a recording that is no fork."""
+
+    file: Path
+    depth: int
+    session: str
+    duration_ns: int
+    origin: ForkOrigin | None
+
+
+def family(places: Iterable[Path]) -> Iterator[Member]:
+    """Yield the recordings in and below `places`, each followed by its forks, the earliest fork first.
+
+    What is no recording of a session is passed over. A fork whose parent is not there stands by itself.
+    """
+    found: dict[str, tuple[Recording, ForkOrigin | None]] = {}
+    for file in sorted({file for place in places for file in _files(place)}):
+        try:
+            recording = Recording(file)
+            first = next(recording.grants(), None)
+            if first is not None:
+                found[f"{first.run:x}"] = recording, fork_origin(recording)
+        except RecordingError:
+            continue
+    children: dict[str, list[str]] = {}
+    for run, (_, origin) in found.items():
+        parent = origin.parent_run if origin is not None and origin.parent_run in found else ""
+        children.setdefault(parent, []).append(run)
+    yield from _members(found, children, children.get("", []), 0)
+
+
+def _members(
+    found: dict[str, tuple[Recording, ForkOrigin | None]],
+    children: dict[str, list[str]],
+    runs: Sequence[str],
+    depth: int,
+) -> Iterator[Member]:
+    for run in sorted(runs, key=lambda run: (_forked_at(found[run][1]), str(found[run][0].file))):
+        recording, origin = found[run]
+        yield Member(recording.file, depth, recording.scenario().name, recording.duration_ns, origin)
+        yield from _members(found, children, children.pop(run, []), depth + 1)
+
+
+def _forked_at(origin: ForkOrigin | None) -> int:
+    return 0 if origin is None else origin.time_ns
+
+
+def _files(place: Path) -> Iterator[Path]:
+    if place.is_file():
+        yield place
+    else:
+        yield from (file for file in place.rglob("*.mcap") if file.is_file())

@@ -1,0 +1,266 @@
+"""A session that its caller steps: all participants in this process, no hub beside them, no wire, no clock.
+
+It is what learning environments and optimisers need: the same plan, host, grants and state hashes as in any
+other session, so that a recording of it verifies; but the caller says how far to go, and begins again at time
+0 as often as it likes, from the participants' saved states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from hub.hosting.host import Host
+from hub.observation.measures import Measures
+from hub.observation.monitor import Monitor
+from hub.participant import Inputs, Outputs, Setup, Stepped, Value
+from hub.planning.plan import Plan, PlannedParticipant
+from hub.planning.scenario_file import ScenarioFile
+from hub.recording.recorder import Recorder
+from hub.session.clock import most_steps
+from hub.session.launch import attachments_of, in_one_host, plan_of
+from hub.session.state_digests import StateDigests
+from hub.transport.port_codec import PortCodec
+from schemas.errors import ScenarioError, SessionError, StateError, did_you_mean
+from schemas.keys import Keys
+from schemas.lockstep import Ack, Entering, Grant, pack_grant
+from schemas.trocar_msgs import SessionStatus
+
+__all__ = ["SteppedSession"]
+
+_RUN = 1
+"""Its number: nothing arrives here that could be of another run."""
+
+
+class SteppedSession:
+    """The participants of a scenario, stepped by the caller. Scenarios with devices are refused.
+
+        with trocar.SteppedSession(trocar.load_scenario("pick.yaml")) as session:
+            session.advance(100)                            # steps
+            session["robot.needle/pose"]                    # (7,), m
+
+    It stands at time 0 when it is made. Participants that only look, in pace `realtime`, are not stepped with
+    the others; `look` steps one.
+
+    Raises:
+        ScenarioError: The scenario has devices, or is invalid.
+        ParticipantError: A participant cannot be configured.
+    """
+
+    def __init__(self, loaded: ScenarioFile) -> None:
+        self._loaded = loaded
+        # it ends where its caller ends it, in a re-simulation too
+        self._scenario = in_one_host(loaded.scenario).model_copy(update={"duration": None})
+        self.plan: Plan
+        self.plan, self._stepped = self._made()
+        self._window = most_steps(self.plan, self._scenario.window)
+        self._codecs = self._inlets()
+        self._recorder: Recorder | None = None
+        self._looking: set[str] = set()
+        self._host = Host("hub", self.plan, self._stepped)
+        self._configure()
+
+    def _made(self) -> tuple[Plan, dict[str, Stepped]]:
+        plan, made = plan_of(self._scenario, self._loaded.params)
+        stepped = {name: one for name, one in made.items() if isinstance(one, Stepped)}
+        if devices := sorted(made.keys() - stepped.keys()):
+            raise ScenarioError(
+                f"a stepped session has no devices, and the scenario has {', '.join(devices)}: leave them"
+                " out, and give their values to `advance`, as inputs of the participants that they led"
+            )
+        return plan, stepped
+
+    def _inlets(self) -> dict[str, PortCodec]:
+        """Return the inputs that nothing is connected to, as `participant.port`."""
+        return {
+            f"{name}.{port.name}": PortCodec(port)
+            for name in self.plan.order
+            for port in self.plan.participants[name].ports
+            if port.causality == "input" and port.name not in self.plan.connected(name)
+        }
+
+    def _configure(self) -> None:
+        """Configure all participants, and keep what `restart` goes back to."""
+        self._host.configure(self._loaded.source.directory)
+        self._first = {name: _copied(self._host.newest(name)) for name in self.plan.order}
+        try:
+            self._saved = {name: self._stepped[name].save() for name in self.plan.order}
+        except StateError:
+            self._saved = {}
+        self._begin(None)
+
+    def restart(self, record: Path | None = None) -> None:
+        """Go back to time 0, from saved states or, if a participant cannot save its own, all made anew.
+
+        `record`: a new directory for the recording of what follows; it ends with the next `restart` or
+        `close`. Raises RecordingError if it is not empty, or cannot be written.
+        """
+        self._end_recording()
+        if self._saved:
+            for name, state in self._saved.items():
+                self._stepped[name].restore(state)
+            self._begin(record)
+            return
+        self.close()
+        self.plan, self._stepped = self._made()
+        self._host = Host("hub", self.plan, self._stepped)
+        self._configure()
+        if record is not None:
+            self._begin(record)
+
+    def _begin(self, record: Path | None) -> None:
+        """Connect the participants anew, and begin with their outputs at time 0."""
+        self.step = 0
+        """The number of communication steps taken."""
+        self._digests = StateDigests(self.plan.order)
+        self._monitor: Monitor | None = None
+        if record is not None:
+            attachments = attachments_of(self._scenario, self.plan, self._loaded)
+            self._recorder = Recorder(record, attachments=attachments)
+            measures = Measures(self._scenario, self.plan)
+            keys = Keys(self._scenario.name)
+            self._monitor = Monitor(self.plan, keys, _RUN, measures, self._recorder)
+        self._host = Host("hub", self.plan, self._stepped, listeners=self._monitor)
+        self._host.begin(self._first)
+
+    def advance(self, steps: int, inputs: Mapping[str, Value] | None = None) -> None:
+        """Take `steps` communication steps.
+
+        `inputs` enter before the first of them, by `participant.port`: of a signal its value, of an event
+        port a tuple of messages. Only inputs without a connection can be given; they keep their values.
+
+        Raises ParticipantError if a participant fails, SessionError for an input that cannot be given, and
+        MessageError for a value that does not fit its port. After an error only `restart` goes on.
+        """
+        entering = tuple(
+            sample for port, value in (inputs or {}).items() for sample in self._samples(port, value)
+        )
+        while steps:
+            count = min(steps, self._window)
+            self._grant(count, entering)
+            steps, entering = steps - count, ()
+
+    def _samples(self, port: str, value: Value) -> list[Entering]:
+        codec = self._codecs.get(port)
+        if codec is None:
+            raise SessionError(
+                f"'{port}' is no input without a connection.{did_you_mean(port, self._codecs)}"
+            )
+        name, _, input_port = port.partition(".")
+        values = value if isinstance(value, tuple) else (value,)
+        payloads = (codec.encode(one, self.time_ns) for one in values)
+        return [
+            Entering(name, input_port, False, np.frombuffer(payload, np.uint8), 0) for payload in payloads
+        ]
+
+    def _grant(self, count: int, entering: tuple[Entering, ...]) -> None:
+        step_ns = self.plan.step_ns
+        grant = Grant(_RUN, 0, self.step, self.time_ns, (self.step + count) * step_ns, entering)
+        if self._monitor is not None:
+            self._monitor.grant(grant, pack_grant(grant))
+        self._host.run(grant, self._book)
+        self.step += count
+        if self._monitor is not None:
+            self._monitor.flush()
+            self._monitor.books(self.time_ns)
+
+    def _book(self, planned: PlannedParticipant, ack: Ack) -> None:
+        self._digests.take(planned.name, ack.state_hash)
+        if self._monitor is not None:
+            first = ack.step + -ack.step % planned.period
+            end = first + len(ack.state_hash) * planned.period
+            self._monitor.ack(planned, ack, end * self.plan.step_ns, None)
+
+    @property
+    def restores(self) -> bool:
+        """Whether `restart` restores saved states; otherwise it makes all participants anew."""
+        return bool(self._saved)
+
+    def participant(self, name: str) -> Stepped:
+        """Return a participant: a task, say, that knows its goals. It is not to be stepped."""
+        return self._stepped[name]
+
+    @property
+    def time_ns(self) -> int:
+        """Simulated time."""
+        return self.step * self.plan.step_ns
+
+    @property
+    def state_hash(self) -> str:
+        """Hash of all state hashes since time 0, as in the summary of a session."""
+        return self._digests.whole
+
+    def __getitem__(self, port: str) -> Any:
+        """Return the newest value of the output `participant.port`, an array that may be kept."""
+        name, _, output = port.partition(".")
+        if name not in self._stepped or output not in (newest := self._host.newest(name)):
+            known = [f"{one}.{it}" for one in self.plan.order for it in self._host.newest(one)]
+            raise SessionError(f"no output '{port}'.{did_you_mean(port, known)}")
+        value = newest[output]
+        return value.copy() if isinstance(value, np.ndarray) else value
+
+    def look(self, observer: str) -> Outputs:
+        """Step a participant that only looks, such as a camera, at the present state; return its outputs.
+
+        Nothing of it is in the state hash or in a recording. Raises SessionError if there is none.
+        """
+        planned = self.plan.participants.get(observer)
+        if planned is None or not planned.observer:
+            observers = [one.name for one in self.plan.observers()]
+            raise SessionError(
+                f"'{observer}' is no participant that only looks; there is {', '.join(observers) or 'none'}"
+            )
+        participant, h = self._stepped[observer], planned.period * self.plan.step_ns
+        if observer not in self._looking:
+            directory, connected = self._loaded.source.directory, self.plan.connected(observer)
+            participant.configure(Setup(h, directory, planned.bond_plans, connected))
+            self._looking.add(observer)
+            if self.step:  # what is sent once is sent at time 0
+                participant.step(0, h, self._seen(observer, self._first))
+        newest = {name: self._host.newest(name) for name in self.plan.order}
+        return participant.step(self.time_ns, h, self._seen(observer, newest))
+
+    def _seen(self, observer: str, outputs: Mapping[str, Outputs]) -> Inputs:
+        feeding = (one for one in self.plan.to_devices if one.target == observer)  # as observers are fed
+        return Inputs({one.target_port: outputs[one.source][one.source_port] for one in feeding})
+
+    def _end_recording(self) -> None:
+        recorder, self._recorder = self._recorder, None
+        if recorder is None or self._monitor is None:
+            return
+        status = SessionStatus(
+            session=self._scenario.name,
+            run=_RUN,
+            state="done",
+            step=self.step,
+            sim_time_ns=self.time_ns,
+            real_time_factor=0.0,
+            late_steps=0,
+            dropped_messages=0,
+        )
+        self._monitor.status(status)
+        recorder.close()
+
+    def close(self) -> None:
+        """End the recording and close all participants. May be called twice."""
+        self._end_recording()
+        self._host.close()
+        for name in self._looking:
+            self._stepped[name].close()
+        self._looking.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _copied(outputs: Outputs) -> dict[str, Value]:
+    return {name: v.copy() if isinstance(v, np.ndarray) else v for name, v in outputs.items()}

@@ -1,0 +1,80 @@
+"""What pages see of an output: of a signal some values a second of wall time, of events each message.
+
+A page is no reader of the simulation: nothing waits for it, what cannot be sent is dropped, and no value is
+encoded that a page would not show. While none looks, an output costs what it did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import monotonic_ns
+from typing import Any
+
+import zenoh
+
+from hub.transport.cells import INITIAL
+from hub.transport.envelope import Tag
+from hub.transport.port_codec import PortCodec
+from hub.transport.publisher import Publisher
+from schemas.codec import encode
+
+__all__ = ["PageFeed"]
+
+PERIOD_NS = 16_000_000
+"""Least wall time between two values of a signal: what a display of 60 Hz can show."""
+_FIRST_NS = 1_000_000_000
+"""Wall time after which the state at time 0 is repeated: pages come late, and messages may be dropped."""
+
+
+class PageFeed:
+    """Publishes an output for pages, while any subscribes.
+
+    Args:
+        session: The Zenoh session.
+        key: Under which it is published.
+        codec: Of the port.
+        run: The number of the run.
+        changed: Is called whenever `needed` may have changed.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, key: str, codec: PortCodec, run: int, changed: Callable[[], None]
+    ) -> None:
+        self._codec, self._run, self._changed = codec, run, changed
+        self._first: tuple[bytes, bytes] | None = None
+        """The state at time 0 of a message, which may hold what later ones lack: the surface of an organ."""
+        self._due_ns = self._first_due_ns = 0
+        self._publisher = Publisher(session, key, zenoh.CongestionControl.DROP, self._matched, always=False)
+
+    @property
+    def needed(self) -> bool:
+        """Whether a page subscribes."""
+        return self._publisher.needed
+
+    def _matched(self) -> None:
+        self._first_due_ns = 0
+        self._changed()
+
+    def keep_first(self, time_ns: int, value: Any) -> None:
+        """Keep the value at time 0 of a signal without a vector form, for pages that come later."""
+        if self._codec.vector is None and not self._codec.is_event:
+            self._first = encode(value), Tag.pack(self._run, 0, INITIAL, time_ns)
+
+    def put(self, step: int, time_ns: int, value: Any) -> None:
+        """Publish the value computed in `step`, valid at `time_ns`; of a signal only if it is due."""
+        if self._codec.is_event:
+            for message in value:
+                self._publisher.put(encode(message), Tag.pack(self._run, 0, step, time_ns))
+            return
+        now_ns = monotonic_ns()
+        if now_ns < self._due_ns and step != INITIAL:
+            return
+        self._due_ns = now_ns + PERIOD_NS
+        if self._first is not None and now_ns >= self._first_due_ns:
+            self._first_due_ns = now_ns + _FIRST_NS
+            self._publisher.put(*self._first)
+        self._publisher.put(self._codec.encode(value, time_ns), Tag.pack(self._run, 0, step, time_ns))
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._publisher.close()

@@ -1,0 +1,1 @@
+"""`trocar dataset`: recordings as a data set to learn from."""

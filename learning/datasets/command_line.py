@@ -1,0 +1,107 @@
+"""The command `trocar dataset`."""
+
+from __future__ import annotations
+
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from schemas.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from learning.datasets.episode import Wanted
+
+__all__ = ["app"]
+
+app = typer.Typer()
+
+_PACKAGES = ("av", "mujoco", "pandas", "PIL", "pyarrow")
+_LEAST, _MOST = 64, 2048
+"""Of a side of a picture: the encoder takes no smaller ones, the endoscope draws no larger ones."""
+
+
+@app.command()
+def dataset(
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings; each becomes an episode.")
+    ],
+    *,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="A new directory.")],
+    fps: Annotated[int, typer.Option(min=1, max=1000, help="Frames in a second of simulated time.")] = 25,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WxH",
+            help="Pixels of the pictures; default: as recorded, else 640x480.",
+            show_default=False,
+        ),
+    ] = None,
+    task: Annotated[
+        str,
+        typer.Option(help="What is done, in words; default: the scenario's description.", show_default=False),
+    ] = "",
+    state: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PORT",
+            help="A port, or PORT.FIELD, in observation.state; default: measured joints of all arms. May be"
+            " repeated.",
+        ),
+    ] = None,
+    action: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PORT",
+            help="The same for action; default: commanded joints of all arms. May be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Write recordings as a LeRobotDataset: states, actions, stereo video, task text.
+
+    Pictures that a session has not recorded are drawn from its states. A recording that cannot be used is
+    left out, and the exit code is then 1.
+    """
+    if output.exists() and (not output.is_dir() or any(output.iterdir())):
+        raise typer.BadParameter(f"'{output}' exists already; name a new directory.", param_hint="--output")
+    pixels = None if size is None else _pixels(size)
+    for package in _PACKAGES:
+        if find_spec(package) is None:
+            raise MissingExtraError("'trocar dataset'", "dataset", "pillow" if package == "PIL" else package)
+    from learning.datasets.episode import Wanted
+
+    wanted = Wanted(fps, pixels, " ".join(task.split()), tuple(state or ()), tuple(action or ()))
+    _run(recordings, output, wanted)
+
+
+def _pixels(size: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size.strip().lower())
+    width, height = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not all(_LEAST <= side <= _MOST and side % 2 == 0 for side in (width, height)):
+        raise typer.BadParameter(
+            f"'{size}' is not a size: expected WIDTHxHEIGHT, such as 640x480, each an even number from"
+            f" {_LEAST} to {_MOST}",
+            param_hint="--size",
+        )
+    return width, height
+
+
+def _run(recordings: list[Path], output: Path, wanted: Wanted) -> None:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from learning.datasets.conversion import Conversion
+
+    console = Console(stderr=True, highlight=False)
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Conversion(output, wanted) as made, Progress(*columns, console=console) as bar:
+        counted = bar.add_task("recordings", total=len(recordings))
+        for path in recordings:
+            if note := made.add(path):
+                bar.console.print(note, markup=False, soft_wrap=True)
+            bar.update(counted, advance=1)
+    console.print(made.summary(), markup=False, soft_wrap=True)
+    if made.left_out:
+        raise typer.Exit(1)

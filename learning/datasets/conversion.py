@@ -1,0 +1,81 @@
+"""Makes a data set of recordings, one after the other; what cannot be used is left out with a reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, Self
+
+from learning.datasets.episode import Episode, Wanted, opened
+from learning.datasets.pictures import DEFAULT_SIZE, recorded_size, stereo
+from learning.datasets.writer import Writer
+from schemas.errors import RecordingError, SessionError
+from trocar import Recording
+
+__all__ = ["Conversion"]
+
+
+class Conversion:
+    """A data set in the making."""
+
+    def __init__(self, directory: Path, wanted: Wanted) -> None:
+        """Begin with what is `wanted` of each recording; `directory` is new, or empty."""
+        self._directory, self._wanted = directory, wanted
+        self._writer: Writer | None = None
+        self._size = wanted.size
+        self.left_out = 0
+        """Recordings that could not be used."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish the files, whatever ended the conversion: the episodes so far are a whole data set."""
+        if self._writer is not None:
+            self._writer.close()
+
+    def add(self, path: Path) -> str:
+        """Append the recording at `path`; return what is to be said about it, or nothing.
+
+        Raises TrocarError without OpenGL.
+        """
+        try:
+            with TemporaryDirectory() as scratch:
+                recording, cut_short = opened(path, Path(scratch))
+                seconds = self._add(path, recording)
+        except (RecordingError, SessionError) as error:  # the latter of soft bodies that do not fit
+            self.left_out += 1
+            return f"left out: {error}"
+        return f"'{path}' was cut short: its first {seconds:g} s are taken" if cut_short else ""
+
+    def _add(self, path: Path, recording: Recording) -> float:
+        """Append a recording; return how long its episode is, s."""
+        wanted = self._wanted
+        episode = Episode.of(recording, wanted)
+        size = self._size or recorded_size(recording) or DEFAULT_SIZE
+        pictures = stereo(recording, episode.times_ns, wanted.fps, size)
+        if self._writer is None:
+            self._writer = Writer(self._directory, wanted.fps, size, episode)
+            self._size = size
+        source: dict[str, Any] = {
+            "recording": str(path.resolve()),
+            "scenario": recording.scenario().name,
+            "first_frame_s": int(episode.times_ns[0]) / 1e9,
+            "pictures": "recorded" if pictures.recorded else "drawn",
+            "versions": recording.versions(),
+        }
+        self._writer.add(episode, pictures.count, pictures.pairs, source)
+        return pictures.count / wanted.fps
+
+    def summary(self) -> str:
+        """Return what has been made, in one line. Raises RecordingError if nothing has."""
+        if self._writer is None or not self._writer.episodes:
+            raise RecordingError("no recording could be used, so there is no data set")
+        count, left_out = self._writer.episodes, f", {self.left_out} left out" if self.left_out else ""
+        return (
+            f"{count} episode{'s' if count != 1 else ''}, {self._writer.frames} frames{left_out}:"
+            f" {self._directory}"
+        )

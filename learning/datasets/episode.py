@@ -1,0 +1,100 @@
+"""An episode of a data set: the numbers of one recording at the times of its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from learning.datasets.columns import Columns, chosen, commanded, measured
+from schemas.errors import RecordingError
+from trocar import Recording, recover
+
+__all__ = ["Episode", "Wanted", "opened"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a data set takes from each recording."""
+
+    fps: int = 25
+    size: tuple[int, int] | None = None
+    """Width and height of the pictures; None: as the first recording has them, else 640 x 480."""
+    task: str = ""
+    """What the robot does, in words; empty: the description of each recording's scenario."""
+    state: tuple[str, ...] = ()
+    """Ports, or fields of ports; empty: measured joints of all arms."""
+    action: tuple[str, ...] = ()
+    """Likewise; empty: commanded joints of all arms."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """The numbers of a recording, a row for each frame."""
+
+    recording: Recording
+    task: str
+    times_ns: NDArray[np.int64]
+    """Simulated times of the frames, shape (n,)."""
+    state_names: tuple[str, ...]
+    state: NDArray[np.float32]
+    """The newest values at each frame, shape (n, len(state_names))."""
+    action_names: tuple[str, ...]
+    action: NDArray[np.float32]
+    """What is commanded when the next frame is taken, shape (n, len(action_names))."""
+
+    @classmethod
+    def of(cls, recording: Recording, wanted: Wanted) -> Episode:
+        """Take the numbers of `recording`, from when all are known until one of the state ends.
+
+        Raises RecordingError if it does not have them, or lasts for less than two frames.
+        """
+        state = chosen(recording, wanted.state) if wanted.state else measured(recording)
+        action = chosen(recording, wanted.action) if wanted.action else commanded(recording)
+        for one in (*state, *action):
+            if not len(one.times_ns):
+                raise RecordingError(f"'{recording.file}': nothing is recorded of '{one.port}'")
+        first = max(int(one.times_ns[0]) for one in (*state, *action))
+        last = min(int(one.times_ns[-1]) for one in state)
+        count = (last - first) * wanted.fps // 1_000_000_000 + 1
+        if count < 2:
+            raise RecordingError(
+                f"'{recording.file}' lasts for less than two frames: {max(0, last - first) * 1e-9:g} s at"
+                f" {wanted.fps} frames a second"
+            )
+        times_ns = first + np.arange(count + 1) * 1_000_000_000 // wanted.fps
+        scenario = recording.scenario()
+        return cls(
+            recording=recording,
+            task=wanted.task or " ".join(scenario.description.split()) or scenario.name,
+            times_ns=times_ns[:-1],
+            state_names=_names(state),
+            state=np.hstack([one.at(times_ns[:-1]) for one in state]),
+            action_names=_names(action),
+            # an action leads from one frame to the next: it comes after the picture that it answers
+            action=np.hstack([one.at(times_ns[1:]) for one in action]),
+        )
+
+
+def _names(columns: Sequence[Columns]) -> tuple[str, ...]:
+    return tuple(name for one in columns for name in one.names)
+
+
+def opened(path: Path, scratch: Path) -> tuple[Recording, bool]:
+    """Open a recording; return also whether it was cut short, and its readable part saved in `scratch`.
+
+    Raises RecordingError if nothing in it can be read.
+    """
+    try:
+        return Recording(path), False
+    except RecordingError as error:
+        try:
+            saved = recover(path, scratch / "recovered")
+        except RecordingError:
+            raise error from None
+        if not saved.messages:
+            raise RecordingError(f"'{path}' was cut short before anything was recorded") from error
+        return Recording(saved.path), True

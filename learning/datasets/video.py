@@ -1,0 +1,59 @@
+"""A video file of one camera, written frame by frame."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CODEC", "PIXEL_FORMAT", "Video"]
+
+CODEC, PIXEL_FORMAT = "av1", "yuv420p"
+_ENCODER = "libsvtav1"
+_OPTIONS = {"crf": "30", "g": "2", "preset": "12"}
+"""Those with which LeRobot encodes its own: a frame that is sought is at most one after a key frame."""
+
+
+class Video:
+    """An MP4 file that grows."""
+
+    def __init__(self, file: Path, size: tuple[int, int], fps: int) -> None:
+        """Create the file; `size` is width and height, pixels."""
+        os.environ.setdefault("SVT_LOG", "1")  # errors alone: the encoder writes its settings to stderr
+        import av
+
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self.frames = 0
+        """That were added."""
+        self.size_bytes = 0
+        """Of what is encoded so far."""
+        self._frame_time = Fraction(1, fps)
+        self._container = av.open(str(file), "w")
+        self._stream: Any = self._container.add_stream(_ENCODER, rate=fps, options=_OPTIONS)
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = PIXEL_FORMAT
+
+    def add(self, picture: NDArray[np.uint8]) -> None:
+        """Append a picture, shape (height, width, 3), RGB."""
+        import av
+
+        frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+        frame.pts, frame.time_base = self.frames, self._frame_time
+        self._write(self._stream.encode(frame))
+        self.frames += 1
+
+    def close(self) -> None:
+        """Finish the file. May be called twice."""
+        if self._stream is not None:
+            self._write(self._stream.encode())
+            self._container.close()
+            self._stream = None
+
+    def _write(self, packets: Sequence[Any]) -> None:
+        self.size_bytes += sum(packet.size for packet in packets)
+        self._container.mux(packets)

@@ -1,0 +1,226 @@
+"""The Gymnasium environment: a stepped session, whose task watches and whose `actions` lead the hands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, ClassVar, Literal, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import InvalidAction
+from numpy.typing import NDArray
+
+import trocar
+from learning.environments.exercises import Exercise
+from learning.environments.goals import Reward, bonus, reward
+from learning.environments.view import View
+from schemas.ros import Header, Image, Point, Pose, PoseStamped, Quaternion
+from schemas.trocar_msgs import TaskEvent
+from schemas.vectors import Vector
+from tasks.task import Task
+
+__all__ = ["Environment"]
+
+Observation = dict[str, NDArray[Any]]
+
+_FAR = 2.0
+"""m; coordinates are clipped to this, so that spaces are bounded."""
+_EYES = ("left", "right")
+
+
+class Environment(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """One exercise as a goal environment.
+
+    Args:
+        exercise: Its class.
+        reward: `sparse`, 0 once the goal is reached and else -1; `shaped`, by distance and the task's events.
+        images: Observe the camera's stereo pictures too, `left` and `right`.
+        width: Of pictures, in pixels.
+        height: Of pictures, in pixels.
+        render_mode: `rgb_array` or None.
+        record: A directory in which each episode is recorded, `episode-00000` and so on.
+        terminate_on_success: End an episode when its goal is reached, instead of going on to hold it.
+        step: Simulated time of a step, s.
+        settings: Values of the scenario, as `trocar.load_scenario` takes them.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 5}  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    def __init__(
+        self,
+        exercise: type[Exercise],
+        *,
+        reward: Reward = "sparse",
+        images: bool = False,
+        width: int = 160,
+        height: int = 120,
+        render_mode: Literal["rgb_array"] | None = None,
+        record: str | Path | None = None,
+        terminate_on_success: bool = False,
+        step: float = 0.2,
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
+        if reward not in ("sparse", "shaped"):
+            raise ValueError(f"reward '{reward}' is neither 'sparse' nor 'shaped'")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode '{render_mode}' is neither None nor 'rgb_array'")
+        self.reward: Reward = reward
+        self.images, self.render_mode = images, render_mode
+        self._record = None if record is None else Path(record)
+        self._terminates = terminate_on_success
+        scene = files("learning.environments") / "scenes" / f"{exercise.scene}.yaml"
+        duration = f"{step:g} s"
+        own = {
+            "participants.actions.action_step": duration,
+            "participants.task.period": duration,
+            "participants.camera.width": width,
+            "participants.camera.height": height,
+        }
+        self._session = trocar.SteppedSession(
+            trocar.load_scenario(str(scene), set={**own, **(settings or {})})
+        )
+        self._count, rest = divmod(round(step * 1e9), self._session.plan.step_ns)
+        if rest or not self._count:
+            self._session.close()
+            raise ValueError(
+                f"step {step:g} s is no multiple of the scenario's {self._session.plan.step_ns / 1e9:g} s"
+            )
+        self.exercise = exercise(cast("Task", self._session.participant("task")))
+        self._view = self._new_view()
+        self._describe(len(self._view.vector()), (height, width, 3))
+        self._episode, self._seen = 0, set[str]()
+        self._goal = np.zeros(exercise.goal_size)
+
+    def _new_view(self) -> View:
+        return View(self._session, self.exercise.task, self.exercise.hands)
+
+    def _describe(self, size: int, picture: tuple[int, int, int]) -> None:
+        """Set the spaces."""
+        goal = spaces.Box(-_FAR, _FAR, (self.exercise.goal_size,), np.float32)
+        parts: dict[str, spaces.Space[Any]] = {
+            "observation": spaces.Box(-_FAR, _FAR, (size,), np.float32),
+            "achieved_goal": goal,
+            "desired_goal": goal,
+        }
+        if self.images:
+            parts |= {eye: spaces.Box(0, 255, picture, np.uint8) for eye in _EYES}
+        self.observation_space = spaces.Dict(parts)  # pyright: ignore[reportAttributeAccessIssue, reportIncompatibleVariableOverride]
+        self.action_space = spaces.Box(-1.0, 1.0, (5 * len(self.exercise.hands),), np.float32)
+
+    @property
+    def layout(self) -> dict[str, slice]:
+        """Where each part of `observation` stands in it, by name."""
+        layout: dict[str, slice] = {}
+        at = 0
+        for name, size in self._view.names().items():
+            layout[name] = slice(at, at + size)
+            at += size
+        return layout
+
+    @property
+    def state_hash(self) -> str:
+        """Hash of all states of the episode so far: equal for equal seeds and actions."""
+        return self._session.state_hash
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode; the `seed` decides where things start, and the goal.
+
+        `options`: none are known. The scene settles for one step before the first observation.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise ValueError(f"options {sorted(options)}: there are none")
+        starts, self._goal = self.exercise.draw(self.np_random)
+        self._session.restart(self._next_recording())
+        self._view = self._new_view() if not self._session.restores else self._view
+        self._seen.clear()
+        inputs = {f"robot.{thing}/place": (_stamped(pose),) for thing, pose in starts.items()}
+        self._session.advance(self._count, inputs)
+        observation = self._observe()
+        return observation, self._info(observation, 0.0)
+
+    def _next_recording(self) -> Path | None:
+        if self._record is None:
+            return None
+        while (place := self._record / f"episode-{self._episode:05d}").exists():
+            self._episode += 1
+        return place
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Act for one step. What is out of range is clipped.
+
+        Raises InvalidAction for a wrong shape, or a number that is not finite.
+        """
+        given = np.asarray(action, np.float64)
+        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+            raise InvalidAction(
+                f"action {given.tolist()}: expected {self.action_space.shape} finite numbers, x, y, z, turn"
+                f" and jaw of {' and '.join(self.exercise.hands)}; they are clipped to -1 to 1"
+            )
+        self._session.advance(self._count, {"actions.action": np.clip(given, -1.0, 1.0)})
+        observation = self._observe()
+        events = cast("tuple[TaskEvent, ...]", self._session["task.events"])
+        extra = bonus([event.event for event in events], self._seen)
+        info = self._info(observation, extra)
+        worth = float(self.compute_reward(observation["achieved_goal"], observation["desired_goal"], info))
+        terminated = self.exercise.lost(self._view) or (self._terminates and info["is_success"])
+        return observation, worth, terminated, False, info
+
+    def compute_reward(
+        self,
+        achieved_goal: NDArray[Any],
+        desired_goal: NDArray[Any],
+        info: Mapping[str, Any] | Sequence[Mapping[str, Any]] | NDArray[Any],
+    ) -> NDArray[np.float64]:
+        """Return the reward of goals, shape (..., size): one, or many at once as hindsight replay asks."""
+        return reward(self.reward, self.exercise.tolerance, achieved_goal, desired_goal, info)
+
+    def _observe(self) -> Observation:
+        self._view.read()
+        parts = {
+            "observation": self._view.vector(),
+            "achieved_goal": self.exercise.achieved(self._view),
+            "desired_goal": self._goal,
+        }
+        found: Observation = {
+            name: np.clip(value, -_FAR, _FAR).astype(np.float32) for name, value in parts.items()
+        }
+        if self.images:
+            found |= self._pictures()
+        return found
+
+    def _info(self, observation: Observation, extra: float) -> dict[str, Any]:
+        reached = self.exercise.tolerance.reached(observation["achieved_goal"], observation["desired_goal"])
+        return {"is_success": bool(reached), "bonus": extra}
+
+    def _pictures(self) -> dict[str, NDArray[np.uint8]]:
+        outputs = self._session.look("camera")
+        pictures: dict[str, NDArray[np.uint8]] = {}
+        for eye in _EYES:
+            messages = cast("tuple[Image, ...]", outputs[f"{eye}/image_raw"])
+            if not messages:
+                raise gymnasium.error.DependencyNotInstalled(
+                    "no OpenGL works here, so there are no pictures: `trocar doctor` says what mends it"
+                )
+            image = messages[0]
+            pictures[eye] = np.asarray(image.data).reshape(image.height, image.width, 3).copy()
+        return pictures
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the camera's left picture, shape (height, width, 3)."""
+        return self._pictures()["left"] if self.render_mode else None
+
+    def close(self) -> None:
+        """End the recording and release the engines."""
+        self._session.close()
+
+
+def _stamped(pose: Vector) -> PoseStamped:
+    x, y, z, i, j, k, w = pose.tolist()
+    where = Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=i, y=j, z=k, w=w))
+    return PoseStamped(header=Header(frame_id="world"), pose=where)

@@ -1,0 +1,208 @@
+"""What is to be done in each environment: its scene, where things start, and which goals are drawn.
+
+Metres, in the world of the scene; quaternions (x, y, z, w). Numbers of SurRoL are those of med-air/SurRoL at
+a903fa6, in its unscaled lengths.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from math import pi
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.random import Generator
+
+from learning.environments.goals import Tolerance
+from learning.environments.view import View
+from robots import rotation
+from robots.training.dishes import DISH, PIECE
+from schemas.vectors import Vector
+from tasks.peg_board import PegBoardTask
+from tasks.pick_and_place import PickAndPlaceTask
+from tasks.task import Task
+
+__all__ = [
+    "Exercise",
+    "NeedleHandOver",
+    "NeedlePick",
+    "PegTransfer",
+    "PickAndPlace",
+    "Reach",
+    "Retraction",
+    "TwoHandedPegTransfer",
+]
+
+Starts = Mapping[str, Vector]
+"""Where things are put at reset: poses, shape (7,), by name."""
+_NEAR = Tolerance(5e-3)
+"""SurRoL's: 5 mm."""
+
+
+class Exercise(ABC):
+    """One environment's task."""
+
+    scene: ClassVar[str]
+    hands: ClassVar[tuple[str, ...]] = ("PSM1",)
+    goal_size: ClassVar[int] = 3
+    tolerance: ClassVar[Tolerance] = _NEAR
+    floor: ClassVar[float] = -0.05
+    """Height under which a thing is lost, m."""
+
+    def __init__(self, task: Task) -> None:
+        """Take the task that watches the scene, which knows where its things belong."""
+        self.task = task
+
+    @abstractmethod
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Return where things start and the goal, shape (goal_size,), of an episode."""
+
+    @abstractmethod
+    def achieved(self, view: View) -> Vector:
+        """Return what has been achieved of the goal, shape (goal_size,)."""
+
+    def lost(self, view: View) -> bool:
+        """Say whether a thing has fallen out of the scene."""
+        return bool((view.poses[:, 2] < self.floor).any())
+
+
+class Reach(Exercise):
+    """Bring the tip to a point. SurRoL's PsmReach."""
+
+    scene = "reach"
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw a point of the workspace: 80 x 80 x 50 mm."""
+        return {}, rng.uniform([-0.04, -0.04, 0.015], [0.04, 0.04, 0.065])
+
+    def achieved(self, view: View) -> Vector:
+        """Return where the tip is."""
+        return view.tips[0, :3]
+
+
+_RADIUS, _WIRE = 11.44e-3, 0.4e-3
+"""Of the needle (engines.mujoco.object_params), m."""
+_SPREAD = 10e-3
+"""SurRoL's: where a needle starts, to either side, and the standard deviation of a goal, m."""
+
+
+def _needle_at(x: float, y: float, yaw: float) -> Vector:
+    """Return the pose of a needle on the table whose middle is at (x, y), with its x axis at `yaw` (rad)."""
+    turn = rotation.exp(np.array([0.0, 0.0, yaw]))
+    centre = np.array([x, y, _WIRE]) - _RADIUS * np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    return np.concatenate([centre, turn])
+
+
+def _middle(pose: Vector) -> Vector:
+    """Return the middle of a needle's arc, m."""
+    return pose[:3] + rotation.matrix(pose[3:])[:, 0] * _RADIUS
+
+
+class NeedlePick(Exercise):
+    """Take up a needle by its middle and bring that to a goal over the table. SurRoL's NeedlePick."""
+
+    scene = "needle-pick"
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw the needle within 10 mm and half a turn, and a goal 40 mm high."""
+        x, y = rng.uniform(-_SPREAD, _SPREAD, 2)
+        yaw = pi + rng.uniform(-pi / 2.0, pi / 2.0)
+        gx, gy = np.clip(rng.normal(0.0, _SPREAD, 2), -0.035, 0.035)
+        return {"needle": _needle_at(x, y, yaw)}, np.array([gx, gy, 0.04])
+
+    def achieved(self, view: View) -> Vector:
+        """Return where the middle of the needle is."""
+        return _middle(view.poses[0])
+
+
+class NeedleHandOver(Exercise):
+    """Take up a needle with PSM1, give it to PSM2, and bring it to a goal on that one's side."""
+
+    scene = "needle-hand-over"
+    hands = ("PSM1", "PSM2")
+    goal_size = 4
+    tolerance = Tolerance(10e-3)
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw the needle within 5 mm and 30 degrees, and a goal of PSM2's, 40 mm high."""
+        x, y = rng.uniform(-0.5 * _SPREAD, 0.5 * _SPREAD, 2)
+        yaw = pi + rng.uniform(-pi / 6.0, pi / 6.0)
+        gx, gy = rng.uniform([0.02, -0.015], [0.04, 0.015])
+        return {"needle": _needle_at(x, y, yaw)}, np.array([gx, gy, 0.04, 1.0])
+
+    def achieved(self, view: View) -> Vector:
+        """Return where the middle of the needle is, and whether PSM2 holds it."""
+        return np.append(_middle(view.poses[0]), view.held[0, 1])
+
+
+class PegTransfer(Exercise):
+    """Carry a ring from a post of one side to a given post of the other. SurRoL's PegTransfer."""
+
+    scene = "peg-transfer"
+    tolerance = Tolerance(5e-3, 4e-3)
+    floor = -0.06
+    task: PegBoardTask
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw the ring's post, its turn, and the post where it belongs."""
+        goals = self.task.goals
+        assert goals.positions is not None
+        start, target = rng.choice(self.starts), rng.choice(sorted(goals.targets[0]))
+        turn = rotation.exp(np.array([0.0, 0.0, rng.uniform(-pi / 3.0, pi / 3.0)]))
+        return {"ring": np.concatenate([goals.positions[start], turn])}, goals.positions[target].copy()
+
+    @property
+    def starts(self) -> tuple[int, ...]:
+        """The posts that rings start on."""
+        return self.task.params.board.measures.starts
+
+    def achieved(self, view: View) -> Vector:
+        """Return where the ring's middle is."""
+        return view.poses[0, :3]
+
+
+class TwoHandedPegTransfer(PegTransfer):
+    """Carry a ring over the wall of the board of ICRA 2026, from one hand to the other."""
+
+    scene = "bi-peg-transfer"
+    hands = ("PSM1", "PSM2")
+    floor = 0.7
+
+
+class PickAndPlace(Exercise):
+    """Carry a piece from the table into one of two dishes."""
+
+    scene = "pick-and-place"
+    tolerance = Tolerance(DISH.inner_radius, 0.5 * DISH.height)
+    floor = -0.02
+    task: PickAndPlaceTask
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw where the piece stands, its turn, and the dish."""
+        x, y = rng.uniform([-0.01, -0.035], [0.01, -0.015])
+        height = PIECE.size[2] / 2.0
+        turn = rotation.exp(np.array([0.0, 0.0, rng.uniform(-pi / 4.0, pi / 4.0)]))
+        dishes: Mapping[str, Any] = self.task.params.fixtures
+        dish = np.array(dishes[str(rng.choice(sorted(dishes)))].position)
+        return {"piece": np.concatenate([[x, y, height], turn])}, dish + np.array([0.0, 0.0, height])
+
+    def achieved(self, view: View) -> Vector:
+        """Return where the piece's middle is."""
+        return view.poses[0, :3]
+
+
+class Retraction(Exercise):
+    """Grasp the free edge of the liver's left lobe and lift it to a height."""
+
+    scene = "retraction"
+    goal_size = 1
+    tolerance = Tolerance(4e-3)
+
+    def draw(self, rng: Generator) -> tuple[Starts, Vector]:
+        """Draw how far the edge is to be lifted: 12 to 25 mm."""
+        return {}, rng.uniform(0.012, 0.025, 1)
+
+    def achieved(self, view: View) -> Vector:
+        """Return how far what is held has been lifted, 0 while nothing is."""
+        return view.tissue[1:] * view.tissue[0]

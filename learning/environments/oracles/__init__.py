@@ -1,0 +1,33 @@
+"""Scripted policies, which do the exercises from the observation alone, in actions of an environment.
+
+They show that an exercise can be done within its steps, and give demonstrations to learn from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from learning.environments.environment import Environment
+from learning.environments.oracles import needles, others, rings
+from learning.environments.oracles.waypoints import Oracle, Plan
+
+__all__ = ["ORACLES", "Oracle", "oracle"]
+
+ORACLES: Mapping[str, Callable[[Environment], Plan]] = MappingProxyType(
+    {
+        "Reach": others.reach,
+        "NeedlePick": needles.needle_pick,
+        "NeedleHandOver": needles.hand_over,
+        "PegTransfer": rings.peg_transfer,
+        "TwoHandedPegTransfer": rings.bi_peg_transfer,
+        "PickAndPlace": others.piece,
+        "Retraction": others.retraction,
+    }
+)
+"""Plans, by the class of their exercise."""
+
+
+def oracle(env: Environment) -> Oracle:
+    """Return the policy of an environment for one episode, called with each observation."""
+    return Oracle(env, ORACLES[type(env.exercise).__name__])

@@ -1,0 +1,67 @@
+"""What an environment sees of its session at one instant: tips, jaws, things and tissue, in the world.
+
+Metres and radians; quaternions (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+import trocar
+from robots import rotation
+from schemas.vectors import Vector
+from tasks.instant import base_pose
+from tasks.task import Task
+
+__all__ = ["View"]
+
+
+class View:
+    """Reads the newest outputs of a session's robot, and of its tissue if it has one."""
+
+    def __init__(self, session: trocar.SteppedSession, task: Task, arms: Sequence[str]) -> None:
+        self._session, self.arms, self.things = session, tuple(arms), task.things
+        self._bases = [base_pose(task.params, arm) for arm in task.params.psms if arm in arms]
+        self._turns = [rotation.from_matrix(base) for base in self._bases]
+        self._numbers = [float(arm[-1]) for arm in arms]
+        self._tissue = "tissue" in session.plan.participants
+        m, n = len(self.arms), len(self.things)
+        self.tips, self.jaws = np.zeros((m, 7)), np.zeros(m)
+        """Poses of the tips, shape (m, 7), and openings of the jaws, shape (m,)."""
+        self.poses, self.held = np.zeros((n, 7)), np.zeros((n, m))
+        """Poses of the things, shape (n, 7), and whether each hand holds each, shape (n, m)."""
+        self.tissue = np.zeros(2)
+        """Whether tissue is held, and how far what is held has been lifted, m."""
+
+    def read(self) -> None:
+        """Read the present instant."""
+        session = self._session
+        for i, arm in enumerate(self.arms):
+            pose, base = session[f"robot.{arm}/measured_cp"], self._bases[i]
+            self.tips[i, :3] = base[:3, :3] @ pose[:3] + base[:3, 3]
+            self.tips[i, 3:] = rotation.product(self._turns[i], pose[3:])
+            self.jaws[i] = session[f"robot.{arm}/jaw/measured_js"][0]
+        for i, thing in enumerate(self.things):
+            self.poses[i] = session[f"robot.{thing}/pose"]
+            holder = session[f"robot.{thing}/held_by"][0]
+            self.held[i] = [holder == number for number in self._numbers]
+        if self._tissue:
+            self.tissue[:] = session["tissue.forceps/held"][0], session["tissue.forceps/lift"][0]
+
+    def names(self) -> dict[str, int]:
+        """Return the parts of `vector` with their sizes, in order."""
+        names: dict[str, int] = {}
+        for arm in self.arms:
+            names |= {f"{arm}/tip/position": 3, f"{arm}/tip/orientation": 4, f"{arm}/jaw": 1}
+        for thing in self.things:
+            names |= {f"{thing}/position": 3, f"{thing}/orientation": 4}
+            names |= {f"{thing}/held_by/{arm}": 1 for arm in self.arms}
+        return names | ({"tissue/held": 1, "tissue/lift": 1} if self._tissue else {})
+
+    def vector(self) -> Vector:
+        """Return all of it in a row, shape (size,), as `names` says."""
+        hands = np.column_stack([self.tips, self.jaws])
+        things = np.column_stack([self.poses, self.held])
+        return np.concatenate([hands.ravel(), things.ravel(), self.tissue if self._tissue else ()])

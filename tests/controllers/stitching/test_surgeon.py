@@ -1,0 +1,140 @@
+"""The stitching expert in a world without physics: a shut jaw holds the needle if it is at the wire."""
+
+import numpy as np
+import pytest
+
+from controllers.expert.hand import framed, pose_of
+from controllers.stitching.controller import Stitching
+from controllers.stitching.params import StitchingParams
+from controllers.stitching.phase import Phase
+from hub.participant import Inputs, Setup
+from hub.planning.scenario_file import load
+from robots.dvrk.cart import inverse_pose
+from robots.training.needles import NEEDLES
+from schemas.errors import SessionError
+from schemas.ros import StringMessage
+
+PERIOD = 10_000_000
+
+
+class World:
+    """Two hands and the needle of the scenario; `drop` lets it fall out of all jaws."""
+
+    def __init__(self, **params):
+        file = load("suturing", [])
+        given = file.params["lead"]
+        self.lead = Stitching("lead", StitchingParams.model_validate(given.model_dump() | params))
+        self.lead.configure(Setup(PERIOD, "."))
+        thing = file.params["robot"].objects["needle"]
+        self.needle = framed(np.array([*thing.position, *thing.orientation]))
+        self.tips = {
+            hand.arm: hand.base @ hand.chain.forward(np.array(given.arms.driven[hand.arm].start))
+            for hand in self.lead._hands
+        }
+        self.jaws, self.grips, self.t, self.said = dict.fromkeys(self.tips, 0.5), {}, 0, []
+        self.wire = NEEDLES["sh-plus"].points(np.linspace(-1.57, 1.57, 200))
+
+    @property
+    def phase(self):
+        return self.lead._surgeon.state.phase
+
+    def step(self, **events):
+        values = {}
+        for hand in self.lead._hands:
+            arm = hand.arm
+            values[f"{arm}/local/measured_cp"] = pose_of(inverse_pose(hand.base) @ self.tips[arm])
+            wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
+            values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
+        values["objects/needle/pose"] = pose_of(self.needle)
+        holders = sorted(float(arm[-1]) for arm in self.grips)
+        values["objects/needle/held_by"] = np.array([holders[0] if holders else 0.0])
+        out = self.lead.step(self.t, PERIOD, Inputs(values, events=events))
+        self.t += PERIOD
+        self.said += [message.data for message in out["status"]]
+        for hand in self.lead._hands:
+            self._follow(hand, out)
+        return out
+
+    def _follow(self, hand, out):
+        arm = hand.arm
+        for message in out[f"{arm}/jaw/move_jp"]:
+            self.jaws[arm] = float(message.position[0])
+            self.grips.pop(arm, None)
+            at = self.tips[arm][:3, 3] + 9.2e-3 * self.tips[arm][:3, 2]
+            places = self.wire @ self.needle[:3, :3].T + self.needle[:3, 3]
+            if self.jaws[arm] < 0 and np.linalg.norm(places - at, axis=1).min() < 0.5e-3:
+                self.grips[arm] = inverse_pose(self.tips[arm]) @ self.needle
+        for message in out[f"{arm}/servo_cp"]:
+            p, q = message.pose.position, message.pose.orientation
+            self.tips[arm] = hand.base @ framed(np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w]))
+        if arm in self.grips and len(self.grips) == 1:
+            self.needle = self.tips[arm] @ self.grips[arm]
+
+    def run(self, seconds, until=lambda world: world.lead.ended):
+        for _ in range(round(seconds * 1e9 / PERIOD)):
+            self.step()
+            if until(self):
+                break
+        return self
+
+
+def test_two_stitches_are_made_through_their_holes_one_after_the_other():
+    world, tips = World(stitches=2), []
+    while not world.lead.ended and world.t < 90e9:
+        world.step()
+        if world.phase in (Phase.DRIVE, Phase.PULL):
+            tips.append(world.needle[:3, :3] @ NEEDLES["sh-plus"].marks[2] + world.needle[:3, 3])
+    assert world.lead.ended == "all stitches are made"
+    assert world.said[0].startswith("2 stitches are feasible")
+    holes = world.lead.params.phantom.measures
+    for hole in (*holes.entries[:2], *holes.exits[:2]):
+        assert np.linalg.norm(np.array(tips) - hole[:3, 3], axis=1).min() < 0.2e-3
+    assert list(world.grips) == ["PSM2"]
+
+
+def test_a_needle_that_is_lost_ends_it_and_is_said_to_lie_where_it_lies():
+    world = World(stitches=1).run(60, until=lambda w: w.phase is Phase.DRIVE and w.needle[2, 3] < 0.01)
+    world.run(1.5, until=lambda _: False)
+    world.grips.clear()
+    world.run(2)
+    assert world.lead.ended == "a stitch has failed"
+    assert "PSM1 has lost the needle while it was to drive: its middle is at" in world.said[-1]
+
+
+def test_a_needle_out_of_reach_is_refused_before_anything_moves():
+    world = World(stitches=1)
+    world.needle[:3, 3] += [0.4, 0.0, 0.0]
+    world.run(1)
+    assert world.lead.ended == "a stitch has failed"
+    assert "the needle cannot be picked up: of PSM1" in world.said[-1]
+
+
+def test_a_saved_expert_goes_on_with_the_same_bits():
+    world, other = World(stitches=1), World(stitches=1)
+    world.run(6)
+    other.lead.restore(world.lead.save())
+    for each in ("jaws", "tips", "grips"):
+        setattr(other, each, dict(getattr(world, each)))
+    other.needle, other.t = world.needle, world.t
+    world.run(1), other.run(1)
+    assert world.lead.state_hash() == other.lead.state_hash()
+
+
+def test_a_refused_command_ends_the_session_and_says_what_was_done():
+    with pytest.raises(SessionError, match="PSM2 in phase 'begin': too far"):
+        World().step(**{"PSM2/error": (StringMessage(data="too far"),)})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ({"driver": "PSM3"}, "PSM3 is no arm of the scene"),
+        ({"driver": "PSM2"}, "driver and puller are both PSM2"),
+        ({"first": 3}, "stitches 3 to 6: the phantom has 4 pairs"),
+        ({"fixtures": {}}, "the scene has 0 phantoms"),
+        ({"objects": {}}, "the scene has 0 needles"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(wrong, problem):
+    with pytest.raises(ValueError, match=problem):
+        World(**wrong)

@@ -1,0 +1,117 @@
+"""The device that a page leads: what it publishes, and when it lets go."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from devices.browser.device import Browser, BrowserParams
+from devices.browser.page_hand import PageHand, PageInput
+from devices.keyboard.virtual_stylus import Wish
+from hub.testing import check_device
+
+MS = 1_000_000
+
+
+class Page:
+    """A page that leads a device which is read at 250 Hz."""
+
+    def __init__(self):
+        self.t = 0
+        self.hand = PageHand(clock=lambda: self.t)
+        self.device = Browser("hand", BrowserParams())
+        self.device.open(Path())
+        self.device._hand = self.hand
+
+    def read(self, milliseconds):
+        """Return the newest sample of each port after some time, by its name."""
+        samples = {}
+        for _ in range(milliseconds // 4):
+            self.t += 4 * MS
+            samples |= {sample.port: sample.message for sample in self.device.read(self.t)}
+        return samples
+
+    def ask(self, milliseconds, drag=(0.0, 0.0, 0.0), **wish):
+        """Ask the same every 20 ms."""
+        samples = {}
+        for _ in range(milliseconds // 20):
+            self.hand.give(PageInput(Wish(**wish), drag))
+            samples |= self.read(20)
+        return samples
+
+
+@pytest.fixture
+def page():
+    return Page()
+
+
+def position(samples):
+    at = samples["pose"].pose.position
+    return np.array([at.x, at.y, at.z])
+
+
+def test_it_is_a_device():
+    check_device(lambda: Browser("hand", BrowserParams()))
+
+
+def test_nobody_leads_at_first(page):
+    samples = page.read(100)
+    assert {*samples} == {"diagnostics"}
+    assert "host: remote" in samples["diagnostics"].message
+
+
+def test_it_moves_as_asked(page):
+    samples = page.ask(1000, linear=(1.0, 0.0, 0.0), dead_man=True)
+    assert samples["buttons"].buttons.tolist() == [1, 0]
+    assert np.allclose(position(samples), [0.1, 0, 0], atol=0.006)
+    assert np.allclose(samples["twist"].twist.linear.x, 0.1)
+    assert samples["diagnostics"].level == 0
+
+
+def test_it_lets_go_after_silence(page):
+    page.ask(200, linear=(1.0, 0.0, 0.0), dead_man=True)
+    before = page.read(76)
+    assert "pose" in before
+    assert "buttons" not in before
+    after = page.read(12)
+    assert after["buttons"].buttons.tolist() == [0, 0]
+    later = page.read(400)
+    assert {*later} <= {"diagnostics"}, "no pose: the inlet is stale after its max_age"
+
+
+def test_it_lets_go_when_nobody_leads(page):
+    page.ask(100, dead_man=True)
+    page.hand.release()
+    samples = page.read(4)
+    assert samples["buttons"].buttons.tolist() == [0, 0]
+    assert "pose" not in samples
+
+
+def test_it_never_leaps_after_a_pause(page):
+    here = position(page.ask(100, linear=(1.0, 0.0, 0.0)))
+    page.t += 3_000_000_000
+    there = position(page.ask(20, linear=(1.0, 0.0, 0.0)))
+    assert np.linalg.norm(there - here) < 0.1 * 0.05 + 0.1 * 0.02 + 1e-9
+
+
+def test_the_way_of_the_pointer_is_gone_at_the_speed_of_the_device(page):
+    page.ask(20, drag=(5.0, 0.0, 0.0))
+    start = position(page.ask(20, drag=(5.0, 0.0, 0.0)))
+    samples = page.ask(100, drag=(5.0, 0.02, 0.0))
+    assert np.allclose(position(samples) - start, [0, 0.01, 0], atol=0.001)
+    samples = page.ask(400, drag=(5.0, 0.02, 0.0))
+    assert np.allclose(position(samples) - start, [0, 0.02, 0], atol=1e-6)
+
+
+@settings(max_examples=20)
+@given(st.lists(st.tuples(*(3 * [st.floats(-1, 1)]), st.integers(1, 10)), min_size=1, max_size=6))
+def test_it_is_never_faster_than_it_may_be(moves):
+    page = Page()
+    before = np.zeros(3)
+    for x, y, z, count in moves:
+        samples = page.ask(20 * count, linear=(x, y, z), drag=(z, x, y))
+        now = position(samples)
+        assert np.linalg.norm(now - before) <= 0.1 * (0.02 * count + 0.05) + 1e-9
+        before = now

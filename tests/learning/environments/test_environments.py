@@ -1,0 +1,177 @@
+"""Environments: Gymnasium's own check, seeds, rewards, bad actions, recordings, many at once."""
+
+import subprocess
+import sys
+import warnings
+from functools import partial
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import InvalidAction
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AsyncVectorEnv
+
+import trocar
+from learning.environments import ENVIRONMENTS
+from learning.environments.oracles import oracle
+from schemas.errors import RecordingError
+
+pytestmark = pytest.mark.xdist_group("environments")
+IDS = sorted(name for name in ENVIRONMENTS if "Retraction" not in name)
+STEPS = 4
+
+
+def actions(seed, size):
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (STEPS, size))
+
+
+@pytest.fixture(scope="module")
+def needle():
+    env = gymnasium.make("trocar/NeedlePick-v0")
+    yield env
+    env.close()
+
+
+def episode(env, seed):
+    """Return the state hash and the last observation of some random steps."""
+    env.reset(seed=seed)
+    for action in actions(seed, env.action_space.shape[0]):
+        observation, *_ = env.step(action)
+    return env.unwrapped.state_hash, observation["observation"]
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_gymnasium_finds_nothing_to_complain_of(name):
+    env = gymnasium.make(name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+
+def test_the_seed_decides_the_episode(needle):
+    first, other = episode(needle, 3), episode(needle, 4)
+    again = episode(needle, 3)
+    assert first[0] == again[0]
+    assert np.array_equal(first[1], again[1])
+    assert first[0] != other[0]
+
+
+def test_episodes_of_a_vector_are_those_of_one_process(needle):
+    alone = [episode(needle, seed)[0] for seed in (3, 4)]
+    make = partial(gymnasium.make, "learning.environments:trocar/NeedlePick-v0")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        many = AsyncVectorEnv([make, make], context="spawn")
+    try:
+        many.reset(seed=3)  # 3 and 4
+        for both in zip(actions(3, 5), actions(4, 5), strict=True):
+            many.step(np.array(both))
+        assert list(many.get_attr("state_hash")) == alone
+    finally:
+        many.close()
+
+
+def test_an_action_that_is_too_large_is_clipped(needle):
+    needle.reset(seed=0)
+    needle.step(np.ones(5))
+    clipped = needle.unwrapped.state_hash
+    needle.reset(seed=0)
+    needle.step(np.full(5, 7.0))
+    assert needle.unwrapped.state_hash == clipped
+
+
+@pytest.mark.parametrize("action", [np.zeros(4), np.zeros((1, 5)), np.full(5, np.nan), [0, 0, np.inf, 0, 0]])
+def test_an_action_that_is_none_is_refused(needle, action):
+    needle.reset(seed=0)
+    with pytest.raises(InvalidAction, match=r"expected \(5,\) finite numbers.*PSM1"):
+        needle.unwrapped.step(np.asarray(action))
+
+
+def test_rewards_of_many_goals_are_those_of_one():
+    for kind in ("sparse", "shaped"):
+        env = gymnasium.make("trocar/Reach-v0", reward=kind).unwrapped
+        observation, _ = env.reset(seed=1)
+        rows = [env.step(action) for action in actions(1, 5)]
+        achieved = np.stack([row[0]["achieved_goal"] for row in rows])
+        desired = np.repeat(observation["desired_goal"][None], STEPS, axis=0)
+        infos = [row[4] for row in rows]
+        assert np.array_equal(env.compute_reward(achieved, desired, infos), [row[1] for row in rows])
+        # hindsight: what was achieved had been the goal
+        assert (env.compute_reward(achieved, achieved, infos) >= 0.0).all()
+        env.close()
+
+
+def test_a_recorded_episode_verifies(tmp_path):
+    env = gymnasium.make("trocar/NeedlePick-v0", record=tmp_path, max_episode_steps=STEPS)
+    hashes = [episode(env, seed)[0] for seed in (5, 6)]
+    env.close()
+    for number, state_hash in enumerate(hashes):
+        place = tmp_path / f"episode-{number:05d}"
+        found = trocar.verify(place)
+        assert found.same
+        assert found.steps == 10 * (STEPS + 1)
+        recording = trocar.Recording(place)
+        assert {"robot.needle/pose", "task.score", "actions.PSM1/goal_cp"} <= set(recording)
+        assert state_hash
+    with pytest.raises(RecordingError):
+        trocar.SteppedSession(env.unwrapped._session._loaded).restart(tmp_path / "episode-00000")
+
+
+def test_a_success_may_end_an_episode():
+    env = gymnasium.make("trocar/Reach-v0", terminate_on_success=True)
+    observation, _ = env.reset(seed=2)
+    policy, ended = oracle(env.unwrapped), False
+    while not ended:
+        observation, _, ended, late, info = env.step(policy(observation))
+        assert not late
+    assert info["is_success"]
+    env.close()
+
+
+@pytest.mark.parametrize("name", ["NeedlePick", "PegTransfer"])
+def test_an_oracle_does_what_surrol_s_does_in_as_many_steps(name):
+    env = gymnasium.make(f"trocar/{name}-v0")
+    observation, _ = env.reset(seed=0)
+    policy, info = oracle(env.unwrapped), {"is_success": False}
+    for _ in range(50):
+        observation, _, _, _, info = env.step(policy(observation))
+        if info["is_success"]:
+            break
+    assert info["is_success"]
+    env.close()
+
+
+def test_tissue_is_grasped_and_lifted_and_a_new_episode_has_it_where_it_was():
+    pytest.importorskip("pybullet")
+    env = gymnasium.make("trocar/Retraction-v0", reward="shaped")
+    hashes = []
+    for _ in range(2):
+        observation, _ = env.reset(seed=0)
+        policy = oracle(env.unwrapped)
+        for _ in range(8):
+            observation, *_, info = env.step(policy(observation))
+        hashes.append(env.unwrapped.state_hash)
+    assert info["is_success"]
+    assert hashes[0] == hashes[1]
+    env.close()
+
+
+def test_what_is_unknown_is_refused():
+    for arguments, problem in (
+        ({"reward": "dense"}, "neither 'sparse' nor 'shaped'"),
+        ({"render_mode": "human"}, "neither None nor"),
+        ({"step": 0.015}, "no multiple"),
+    ):
+        with pytest.raises(Exception, match=problem):
+            gymnasium.make("trocar/Reach-v0", **arguments)
+
+
+def test_without_gymnasium_the_sentence_says_what_mends_it():
+    program = (
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "try:\n    import learning.environments\nexcept Exception as error:\n    print(error)"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
+    assert "pip install 'trocar[gym]'" in done.stdout

@@ -1,0 +1,77 @@
+"""A small recorded session, its server in this process, and a browser if there is one."""
+
+import asyncio
+import shutil
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from time import monotonic, sleep
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs trocar[web]")
+
+from tests.hub.sample_session import write_session
+from webconsole.console import Console
+from webconsole.pilot import Pilots
+from webconsole.recorded import Recorded
+from webconsole.server import Server, free_socket
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+@contextmanager
+def served(source, pilots=None):
+    """Serve pages of a source in a thread; yield the server."""
+    server = Server(Console(source, pilots or Pilots()), free_socket(0))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.stop()
+        thread.join()
+
+
+def until(true, seconds=20.0):
+    """Wait until something is true, and return it."""
+    deadline = monotonic() + seconds
+    while not (found := true()):
+        if monotonic() > deadline:
+            raise TimeoutError("it did not become true")
+        sleep(0.02)
+    return found
+
+
+def finish(coroutine):
+    """Run a coroutine to its end; in a thread, as the browser's driver keeps a loop in that of the tests."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, coroutine).result()
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """A headless Chromium that draws with its own software; the tests skip where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (trocar[test])")
+    if CHROMIUM is None:
+        pytest.skip("needs Chromium: apt-get install chromium")
+    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def recording(tmp_path_factory):
+    """A recorded session without scenes: it is made of formulas."""
+    directory = tmp_path_factory.mktemp("webconsole") / "palpation"
+    write_session(directory, seconds=0.5)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def console_of_recording(recording):
+    """Its pages; a server of its own for each module."""
+    with served(Recorded(recording)) as server:
+        yield server

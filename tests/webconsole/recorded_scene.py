@@ -1,0 +1,72 @@
+"""A recording with a robot that moves and an organ that gives, made of formulas: no engine has stepped."""
+
+from pathlib import Path
+
+import numpy as np
+
+from hub.planning.scenario_file import load
+from hub.recording.recorder import Recorder
+from hub.session.launch import plan_of
+from schemas.codec import encode
+from schemas.keys import Keys, topic
+from schemas.ros import Header, Time
+from schemas.trocar_msgs import SessionStatus, SoftBodyState
+from schemas.vectors import VectorCodec
+
+STEP_NS = 16_000_000
+CUBE = 0.02 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-2, 0)], np.float32)
+TRIANGLES = np.array(
+    [
+        *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
+        *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
+    ],
+    np.uint32,
+)
+
+
+def write_scene(directory: Path, steps: int = 60) -> None:
+    """Record `palpation` with an arm that goes down by 1 mm a step from the fifth, and a top that follows."""
+    file = load("palpation", [])
+    plan, _ = plan_of(file.scenario, file.params)
+    robot, tissue, keys = plan.participants["robot"], plan.participants["tissue"], Keys("palpation")
+    qpos, wrench = (VectorCodec(one.port(name)) for one, name in ((robot, "qpos"), (tissue, "probe/wrench")))
+    attachments = {
+        "scenario.json": file.scenario.model_dump_json().encode(),
+        "plan.json": plan.model_dump_json().encode(),
+    }
+    with Recorder(directory, attachments=attachments) as recorder:
+        channels = {
+            name: recorder.channel(topic(keys.output("engine", *name.split(".", 1))), type_)
+            for name, type_ in (
+                ("robot.qpos", qpos.port.type),
+                ("tissue.probe/wrench", wrench.port.type),
+                ("tissue.block/nodes", SoftBodyState.ros_type),
+            )
+        }
+        status = recorder.channel(topic(keys.status), SessionStatus.ros_type)
+        for step in range(steps):
+            at, depth = step * STEP_NS, 0.001 * max(step - 5, 0)
+            positions = np.zeros(qpos.size)
+            positions[2] = 0.1 + depth
+            recorder.write(channels["robot.qpos"], at, qpos.encode(positions, at))
+            force = np.array([0, 0, 50 * depth, 0, 0, 0])
+            recorder.write(channels["tissue.probe/wrench"], at, wrench.encode(force, at))
+            nodes = CUBE - np.array([0, 0, depth], np.float32) * (CUBE[:, 2:] >= 0)
+            state = SoftBodyState(
+                header=Header(stamp=Time.from_ns(at), frame_id="world"),
+                body="block",
+                nodes_m=nodes.astype(np.float32).ravel(),
+                triangles=TRIANGLES.ravel() if step == 0 else np.zeros(0, np.uint32),
+            )
+            recorder.write(channels["tissue.block/nodes"], at, encode(state))
+        end = SessionStatus(
+            session="palpation",
+            run=1,
+            state="done",
+            step=steps,
+            sim_time_ns=steps * STEP_NS,
+            real_time_factor=1.0,
+            late_steps=0,
+            dropped_messages=0,
+        )
+        recorder.write(status, steps * STEP_NS, encode(end))

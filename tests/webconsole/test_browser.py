@@ -1,0 +1,216 @@
+"""The page in a real browser: what it draws, says and sends."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tests.webconsole.conftest import served, until
+from tests.webconsole.recorded_scene import write_scene
+from webconsole.recorded import Recorded
+
+pytestmark = pytest.mark.xdist_group("all cores")
+
+TIP = "trocar.scene.tips[0].axes.parent.position.toArray()"
+NO_WEBGL = """
+const get = HTMLCanvasElement.prototype.getContext
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+  return kind.startsWith("webgl") ? null : get.call(this, kind, ...rest)
+}
+"""
+GAMEPAD = """
+let pressed = 0
+window.press = (value) => { pressed = value }
+const button = (i) => ({ value: i === 4 ? Math.abs(pressed) : 0 })
+navigator.getGamepads = () => [{
+  connected: true, mapping: "standard", axes: [0, pressed, 0, 0],
+  buttons: Array.from({ length: 17 }, (_, i) => button(i)),
+}]
+"""
+NAMELESS = """
+[...document.querySelectorAll("button, input, select, canvas")].filter((e) =>
+  e.checkVisibility() && !e.ariaHidden && !(e.ariaLabel || e.textContent.trim() || e.labels?.length)
+).map((e) => e.outerHTML)
+"""
+
+
+class Person:
+    """Somebody who looks at the page."""
+
+    def __init__(self, browser, url, *scripts, **context):
+        self.context = browser.new_context(viewport={"width": 1100, "height": 700}, **context)
+        for script in scripts:
+            self.context.add_init_script(script)
+        self.page = self.context.new_page()
+        self.errors, self.requested = [], []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
+        self.page.on("request", lambda request: self.requested.append(request.url))
+        self.page.goto(url)
+
+    def sees(self, expression):
+        """Wait until an expression of the page is true, and return it."""
+        return until(lambda: self.page.evaluate(expression), 60.0)
+
+    def picture(self):
+        """Return the pixels of the scene, once they have been drawn."""
+        drawn = self.page.evaluate("trocar.drawn")
+        self.page.evaluate("trocar.scene.dirty()")
+        self.sees(f"trocar.drawn > {drawn}")
+        return self.page.locator("#canvas").screenshot()
+
+
+@pytest.fixture(scope="module")
+def served_scene(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("scene") / "palpation"
+    write_scene(directory)
+    with served(Recorded(directory)) as server:
+        yield server
+
+
+@pytest.fixture
+def person(browser, served_scene):
+    made = []
+
+    def open_page(*scripts, **context):
+        link = f"http://127.0.0.1:{served_scene.port}{served_scene.gate.invite('operator')}"
+        made.append(Person(browser, link, *scripts, **context))
+        return made[-1]
+
+    yield open_page
+    for one in made:
+        one.context.close()
+
+
+def test_a_recording_is_shown(person, served_scene):
+    one = person()
+    one.sees("Boolean(trocar.scene?.placed && trocar.scene.surfaces[0]?.mesh)")
+    first, start = one.picture(), one.page.evaluate(TIP)
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.8")
+    one.sees("trocar.time === 0.8")
+    one.sees(f"Math.abs({TIP}[2] - {start[2]} + 0.045) < 1e-6")
+    assert one.picture() != first, "the arm and the organ have moved"
+    assert "t=0.800" in until(lambda: "t=0.800" in one.page.url and one.page.url)
+    one.page.get_by_role("radio", name="Robot").click()
+    assert one.page.get_by_role("radio", name="Robot").get_attribute("aria-checked") == "true"
+
+    one.page.get_by_role("button", name="Event before").click()
+    assert one.page.locator("#instant").inner_text() == "0.096 s", "the first contact"
+    assert "contact, 0.05 N" in one.page.locator("#lines").inner_text()
+    one.page.locator("#canvas").focus()
+    one.page.keyboard.press("Space")
+    one.sees("trocar.time > 0.15")
+    one.page.keyboard.press("Space")
+
+    one.page.get_by_label("Add a port").fill("robot.qpos")
+    one.page.get_by_label("Add a port").press("Enter")
+    one.sees("document.querySelectorAll('.plot').length === 2")
+    assert one.page.get_by_text("robot.qpos").is_visible()
+    assert {re.sub(r"(:\d+)/.*", r"\1", url) for url in one.requested} == {
+        f"http://127.0.0.1:{served_scene.port}"
+    }
+    assert one.errors == []
+    assert one.page.evaluate(NAMELESS) == []
+
+
+def test_the_instant_is_in_the_link(person):
+    one = person()
+    one.sees("Boolean(trocar.session)")
+    one.page.evaluate("location.hash = 't=0.5'")
+    one.sees("trocar.time === 0.5")
+    one.page.reload()
+    one.sees("trocar.time === 0.5")
+
+
+def test_without_webgl_the_rest_works_and_it_says_why(person):
+    one = person(NO_WEBGL, color_scheme="dark")
+    text = one.page.locator("#no-scene")
+    text.wait_for(state="visible")
+    assert "draws no scene" in text.inner_text()
+    one.sees("document.querySelectorAll('.plot').length > 0")
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.6")
+    one.sees("document.querySelector('#instant').textContent === '0.600 s'")
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """A running session that a page can lead, and the page's link."""
+    command = [sys.executable, "-P", "-m", "trocar", "run", "browser", "--open", "--set", "step=5 ms"]
+    hub = tmp_path_factory.mktemp("hub")
+    said = hub / "said.txt"
+    with (
+        said.open("w") as out,
+        subprocess.Popen(
+            command, stdout=out, stderr=out, env=os.environ | {"BROWSER": "true", "TMPDIR": str(hub)}
+        ) as run,
+    ):
+        try:
+            link = until(
+                lambda: run.poll() is not None or re.search(r"http://127\S+", said.read_text()), 60.0
+            )
+            if run.poll() is not None:
+                pytest.fail(said.read_text())
+            yield run, link[0]
+        finally:
+            run.send_signal(signal.SIGINT)
+
+
+def test_a_page_leads_an_arm_and_lets_go(browser, session):
+    """Keys, then the loss of the focus; a gamepad; pause; a second page; and a page that stands still."""
+    run, link = session
+    one = Person(browser, link, GAMEPAD)
+    one.sees("Boolean(trocar.scene?.placed)")
+    one.page.get_by_role("button", name="Lead hand").click()
+    one.page.get_by_text("you lead it").wait_for()
+    start = one.page.evaluate(TIP)
+
+    def moves(from_):
+        one.sees(f"Math.hypot(...{TIP}.map((x, i) => x - {from_}[i])) > 0.004")
+
+    one.page.keyboard.down("Space")
+    one.page.keyboard.down("s")
+    moves(start)
+    one.page.evaluate("window.dispatchEvent(new Event('blur'))")
+    one.page.get_by_text("holding: the dead-man is let go").wait_for()
+    one.page.keyboard.up("s")
+    one.page.keyboard.up("Space")
+    place = still(one)
+    one.page.evaluate("press(-1)")
+    moves(place)
+    one.page.evaluate("press(0)")
+    still(one)
+
+    one.page.get_by_role("button", name="Share").click()
+    shared = until(lambda: re.search(r"http://127\S+token=\S+", one.page.locator("#lines").inner_text()))
+    other = Person(browser, shared[0])
+    other.sees("trocar.session?.role === 'viewer' && Boolean(trocar.scene?.placed)")
+    assert not other.page.get_by_role("button", name="Lead hand").is_visible()
+    assert not other.page.get_by_role("button", name="Pause").is_visible()
+
+    one.page.get_by_role("button", name="Pause").click()
+    one.page.get_by_role("button", name="Resume").wait_for()
+    one.page.get_by_role("button", name="Resume").click()
+    one.sees("document.querySelector('#state').textContent === 'running'")
+    one.page.evaluate("press(-1)")
+    one.page.get_by_text("moving: dead-man held").wait_for()
+    one.context.close()  # as a browser that dies: its page leads no more, and the arm holds
+    other.sees("document.querySelector('#lines').textContent.includes('no page leads')")
+    still(other)
+    other.context.close()
+    assert run.poll() is None
+
+
+def still(person):
+    """Wait until the arm stands still, and return where."""
+    place = [None]
+
+    def stands():
+        before, place[0] = place[0], person.page.evaluate(TIP)
+        person.page.wait_for_timeout(150)
+        return before is not None and max(abs(a - b) for a, b in zip(before, place[0], strict=True)) < 5e-5
+
+    until(stands, 60.0)
+    return place[0]

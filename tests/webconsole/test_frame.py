@@ -1,0 +1,45 @@
+"""Frames: what goes in comes out, and what is not a frame is refused."""
+
+import struct
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.errors import MessageError
+from webconsole.frame import Section, SectionKind, acknowledged, frame, sections
+
+PARTS = st.lists(
+    st.builds(Section, st.sampled_from(SectionKind), st.integers(0, 65535), st.binary(max_size=65))
+)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(-(2**63), 2**63 - 1), PARTS)
+def test_a_frame_comes_back(number, time_ns, parts):
+    data = frame(number, time_ns, parts)
+    assert sections(data) == (number, time_ns, parts)
+    assert len(data) % 8 == 0
+
+
+@settings(max_examples=40)
+@given(st.binary(max_size=80))
+def test_what_is_not_a_frame_is_refused(data):
+    with pytest.raises(MessageError):
+        sections(data)
+
+
+@settings(max_examples=40)
+@given(PARTS.filter(bool), st.data())
+def test_a_frame_cut_short_is_refused(parts, data):
+    whole = frame(1, 2, parts)
+    padding = -len(parts[-1].content) % 8
+    cut = data.draw(st.integers(0, len(whole) - padding - 1))
+    with pytest.raises(MessageError):
+        sections(whole[:cut])
+
+
+def test_an_acknowledgement_has_four_bytes():
+    assert acknowledged(struct.pack("<I", 7)) == 7
+    with pytest.raises(MessageError, match="3 bytes, expected 4"):
+        acknowledged(b"abc")

@@ -1,0 +1,127 @@
+"""Who gets in: each attempt over a real socket."""
+
+import http.client
+import logging
+import re
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import InvalidStatus
+
+from tests.webconsole.conftest import finish, served
+from webconsole.recorded import Recorded
+
+
+class Visitor:
+    """Sends requests with any head."""
+
+    def __init__(self, server):
+        self.server, self.host, self.cookie = server, f"127.0.0.1:{server.port}", ""
+
+    def get(self, path="/", method="GET", **headers):
+        connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=10)
+        connection.putrequest(method, path, skip_host=True)
+        for name, value in {"Host": self.host, "Cookie": self.cookie, **headers}.items():
+            if value:
+                connection.putheader(name, value)
+        connection.endheaders()
+        answer = connection.getresponse()
+        answer.body = answer.read()
+        connection.close()
+        return answer
+
+    def admit(self, role="operator"):
+        answer = self.get(self.server.gate.invite(role))
+        assert (answer.status, answer.headers["Location"]) == (303, "/")
+        assert {"HttpOnly", "SameSite=strict"} <= {*re.split("; ", answer.headers["Set-Cookie"])}
+        self.cookie = answer.headers["Set-Cookie"].partition(";")[0]
+        return self
+
+    def page(self, **headers):
+        """Return the first message of a page, or the status of a refusal."""
+
+        async def first():
+            try:
+                async with connect(
+                    f"ws://127.0.0.1:{self.server.port}/page", additional_headers=headers, origin=None
+                ) as socket:
+                    return await socket.recv()
+            except InvalidStatus as refused:
+                return refused.response.status_code
+
+        return finish(first())
+
+
+@pytest.fixture
+def visitor(recording):
+    with served(Recorded(recording)) as server:  # the log of one has a limit
+        yield Visitor(server)
+
+
+def test_a_link_opens_the_page_once(visitor):
+    link = visitor.server.gate.invite("operator")
+    assert visitor.get(link).status == 303
+    assert visitor.get(link).status == 403
+
+
+def test_who_is_in_may_use_the_old_link(visitor):
+    link = visitor.server.gate.invite("operator")
+    visitor.cookie = visitor.get(link).headers["Set-Cookie"].partition(";")[0]
+    assert visitor.get(link).status == 303
+
+
+def test_the_page_allows_nothing_from_elsewhere(visitor):
+    answer = visitor.admit().get()
+    assert answer.status == 200
+    policy = answer.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    assert "http" not in policy
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+@pytest.mark.parametrize(
+    ("path", "headers"),
+    [
+        ("/", {"Cookie": "none=1"}),
+        ("/", {"Cookie": "trocar_0=x"}),
+        ("/web/main.js", {"Cookie": "none=1"}),
+        ("/scene", {"Cookie": "none=1"}),
+        ("/?token=guessed", {"Cookie": "none=1"}),
+        ("/", {"Host": "evil.example"}),
+        ("/", {"Host": "127.0.0.1"}),
+        ("/", {"Origin": "https://evil.example"}),
+        ("/", {"Origin": "null"}),
+    ],
+)
+def test_others_get_nothing_and_are_logged(visitor, caplog, path, headers):
+    with caplog.at_level(logging.WARNING, "webconsole.gate"):
+        answer = visitor.admit().get(path, **headers)
+    assert answer.status == 403
+    assert b"<html" not in answer.body
+    assert "refused http" in caplog.text
+
+
+def test_only_looking_is_a_method(visitor):
+    assert visitor.admit().get("/", method="POST").status == 403
+
+
+def test_files_of_the_disk_are_not_served(visitor):
+    visitor.admit()
+    for path in (
+        "/web/../server.py",
+        "/web/%2e%2e/server.py",
+        "/web/vendor/../../server.py",
+        "/web//etc/passwd",
+    ):
+        assert visitor.get(path).status in (403, 404)
+
+
+def test_a_socket_needs_cookie_and_origin(visitor):
+    visitor.admit()
+    own = f"http://{visitor.host}"
+    assert '"is":' in visitor.page(Cookie=visitor.cookie, Origin=own)
+    assert visitor.page(Origin=own) == 403
+    assert visitor.page(Cookie=visitor.cookie) == 403
+    assert visitor.page(Cookie=visitor.cookie, Origin="https://evil.example") == 403
+    assert visitor.page(Cookie=visitor.cookie, Origin=f"http://127.0.0.1:{visitor.server.port + 1}") == 403

@@ -1,0 +1,151 @@
+"""A running session as pages see it: what arrives, what it costs the session, and what is asked of it."""
+
+import threading
+
+import numpy as np
+import pytest
+import zenoh
+
+from hub.planning.scenario_file import load
+from hub.session.launch import launch
+from hub.transport.control_messages import Empty
+from hub.transport.envelope import Tag
+from hub.transport.page_feed import PageFeed
+from hub.transport.port_codec import PortCodec
+from hub.transport.zenoh_session import open_session
+from schemas.errors import ConnectError
+from schemas.ports import Port
+from schemas.ros import Joy
+from schemas.trocar_msgs import SoftBodyState
+from tests.webconsole.conftest import until
+from webconsole.live import Live
+from webconsole.stage import Stage
+
+SCENARIO = """\
+name: seen
+step: 1 ms
+duration: 1 s
+scene:
+  arms: {PSM1: {instrument: palpation-probe}}
+participants:
+  robot: {kind: mujoco}
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    file = tmp_path_factory.mktemp("seen") / "seen.yaml"
+    file.write_text(SCENARIO)
+    return load(str(file), [])
+
+
+def test_a_session_that_is_seen_has_the_same_state_hash(scenario):
+    """It is paused and stepped meanwhile, and everything that can be drawn is subscribed to."""
+    alone = launch(scenario).run()
+    session = launch(scenario)
+    seen, failed = {}, []
+
+    def look():
+        live = Live(session.endpoint, "seen")
+        live.start()
+        try:
+            until(lambda: live.generation)
+            live.ask("pause", Empty(), Empty)
+            stage = Stage(live.scenario, live.outlets)
+            live.want(stage.shown | {"robot.PSM1/measured_js"})
+            live.ask("resume", Empty(), Empty)
+            value = until(lambda: live.newest("robot.qpos", None))
+            poses = stage.poses("robot", {"robot.qpos": value})
+            seen.update(poses=poses, bodies=stage.scenes["robot"].bodies)
+            seen.update(js=until(lambda: live.newest("robot.PSM1/measured_js", None)))
+            until(lambda: live.state["state"] == "away")
+        except Exception as error:  # noqa: BLE001  # it is raised below, in the thread of the test
+            failed.append(error)
+        finally:
+            live.close()
+
+    session.state.pause()
+    looking = threading.Thread(target=look)
+    looking.start()
+    summary = session.run()
+    looking.join()
+    assert failed == []
+    assert summary.state_hash == alone.state_hash
+    assert seen["poses"].shape == (len(seen["bodies"]), 7)
+    assert np.allclose(np.linalg.norm(seen["poses"][:, 3:], axis=1), 1.0, atol=1e-5)
+
+
+def test_without_a_session_it_says_so_and_goes_on():
+    live = Live(session="nothing", pid=-1)
+    live.start()
+    until(lambda: "nothing" in live.state["detail"])
+    with pytest.raises(ConnectError, match="no session is running"):
+        live.ask("pause", Empty(), Empty)
+    live.close()
+
+
+@pytest.fixture(scope="module")
+def ether():
+    """A Zenoh session that reaches itself alone."""
+    with open_session("peer") as session:
+        yield session
+
+
+@pytest.fixture
+def feed(ether, request):
+    """Return a feed of a port, and the list of what a page receives of it once it subscribes."""
+
+    class Fed:
+        def __init__(self, port):
+            self.key, self.changes, self.got = f"trocar/test/{request.node.name}", [], []
+            self.codec = PortCodec(port)
+            self.feed = PageFeed(ether, self.key, self.codec, 7, lambda: self.changes.append(1))
+
+        def subscribe(self):
+            take = zenoh.handlers.Callback(self.take, indirect=False)
+            self.subscriber = ether.declare_subscriber(self.key, take)
+            until(lambda: self.feed.needed)
+
+        def take(self, sample):
+            self.got.append((Tag.of(sample).step, self.codec.decode(sample.payload.to_bytes())))
+
+    made = []
+
+    def make(port):
+        made.append(Fed(port))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.subscriber.undeclare()
+        one.feed.close()
+
+
+def test_of_a_signal_pages_get_some_values_a_second(feed):
+    one = feed(Port(name="x", causality="output"))
+    assert not one.feed.needed
+    one.subscribe()
+    assert one.changes
+    for step in range(1000):
+        one.feed.put(step, step, np.array([float(step)]))
+    assert 1 <= len(one.got) < 500
+    assert one.got[0][0] == 0
+
+
+def test_of_events_pages_get_each(feed):
+    one = feed(Port(name="x", causality="output", type=Joy.ros_type, variability="event"))
+    one.subscribe()
+    for step in range(20):
+        one.feed.put(step, step, (Joy(buttons=np.array([step], np.int32)),))
+    assert [message.buttons[0] for _, message in one.got] == list(range(20))
+
+
+def test_a_page_that_comes_late_gets_the_surface_of_an_organ(feed):
+    one = feed(Port(name="x", causality="output", type=SoftBodyState.ros_type))
+    nodes = np.zeros(9, np.float32)
+    one.feed.keep_first(
+        0, SoftBodyState(header={}, body="liver", nodes_m=nodes, triangles=np.arange(3, dtype="u4"))
+    )
+    one.subscribe()
+    one.feed.put(500, 500, SoftBodyState(header={}, body="liver", nodes_m=nodes))
+    assert [(step, message.triangles.size) for step, message in one.got] == [(-1, 3), (500, 0)]

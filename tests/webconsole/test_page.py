@@ -1,0 +1,175 @@
+"""What the server tells a page of a recording, and what it refuses, without a browser."""
+
+import asyncio
+import json
+import struct
+from contextlib import ExitStack, asynccontextmanager, suppress
+
+import numpy as np
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from tests.webconsole.conftest import finish
+from tests.webconsole.test_gate import Visitor
+from webconsole.frame import SectionKind, sections
+from webconsole.recorded import Recorded, reduced
+from webconsole.serve import opened_recording
+
+
+@asynccontextmanager
+async def opened(server, role="operator"):
+    visitor = Visitor(server).admit(role)
+    headers = {"Cookie": visitor.cookie, "Origin": f"http://{visitor.host}"}
+    async with connect(f"ws://{visitor.host}/page", additional_headers=headers, origin=None) as socket:
+        yield socket
+
+
+async def answer(socket, **wanted):
+    """Return the next message with these values."""
+    async with asyncio.timeout(10):
+        async for message in socket:
+            if isinstance(message, str):
+                content = json.loads(message)
+                if wanted.items() <= content.items():
+                    return content
+    raise EOFError("the page was closed")
+
+
+async def next_frame(socket):
+    async with asyncio.timeout(10):
+        async for message in socket:
+            if isinstance(message, bytes):
+                return sections(message)
+    raise EOFError("the page was closed")
+
+
+def run(test, server, **options):
+    async def body():
+        async with opened(server, **options) as socket:
+            await answer(socket, **{"is": "session"})
+            return await test(socket)
+
+    return finish(body())
+
+
+def test_a_page_learns_what_there_is(console_of_recording):
+    async def body():
+        async with opened(console_of_recording) as socket:
+            return await answer(socket, **{"is": "session"}), await answer(socket, **{"is": "state"})
+
+    session, state = finish(body())
+    assert (session["kind"], session["role"]) == ("recording", "operator")
+    assert {"robot.PSM1/probe/pose", "tissue.probe/wrench", "stylus.pose"} <= {
+        one["name"] for one in session["numbers"]
+    }
+    assert session["notes"], "the scene of a robot without parameters cannot be made, and it says so"
+    assert (state["session"], state["end"]) == ("palpation", 0.5)
+
+
+def test_it_shows_any_instant_exactly(console_of_recording, recording):
+    wrench = Recorded(recording).recording["tissue.probe/wrench"]
+
+    async def body(socket):
+        await socket.send('{"do": "show", "numbers": ["tissue.probe/wrench"]}')
+        for time in (0.25, 0.1005, 0.4):
+            await socket.send(json.dumps({"do": "at", "time": time}))
+            number, time_ns, (section,) = await next_frame(socket)
+            await socket.send(struct.pack("<I", number))
+            if time_ns != round(time * 1e9):  # that of the end, which came before
+                number, time_ns, (section,) = await next_frame(socket)
+                await socket.send(struct.pack("<I", number))
+            row = np.frombuffer(section.content)
+            place = int(np.searchsorted(wrench.time, time, side="right")) - 1
+            assert (section.kind, row[0]) == (SectionKind.SAMPLE, wrench.time[place])
+            assert np.array_equal(row[1:], wrench.values[place])
+
+    run(body, console_of_recording)
+
+
+def test_a_page_that_does_not_acknowledge_gets_two_frames(console_of_recording):
+    async def body(socket):
+        await socket.send('{"do": "show", "numbers": ["tissue.probe/wrench"]}')
+        for i in range(50):
+            await socket.send(json.dumps({"do": "at", "time": 0.1 + 0.005 * i}))
+            await asyncio.sleep(0.002)
+        frames = [await next_frame(socket), await next_frame(socket)]
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.5):
+                await next_frame(socket)
+        await socket.send(struct.pack("<I", frames[-1][0]))
+        _, time_ns, _ = await next_frame(socket)
+        assert time_ns == 345_000_000, "then the newest, and none of those between"
+
+    run(body, console_of_recording)
+
+
+@pytest.mark.parametrize(
+    ("sent", "why"),
+    [
+        ('{"do": "pause"}', "cannot be steered"),
+        ('{"do": "lead", "device": "hand"}', "no device 'hand'"),
+        ('{"do": "hand", "number": 1}', "leads no device"),
+        ('{"do": "at", "time": NaN}', "not a command"),
+        (b"abc", "3 bytes, expected 4"),
+        (struct.pack("<I", 4_000_000), "the last one was"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_a_reason(console_of_recording, sent, why):
+    async def body(socket):
+        await socket.send(sent)
+        while "error" not in (said := await answer(socket, **{"is": "answer"})):
+            pass
+        assert why in said["error"]
+
+    run(body, console_of_recording)
+
+
+def test_a_viewer_only_looks(console_of_recording):
+    async def body(socket):
+        await socket.send('{"do": "invite", "role": "operator"}')
+        assert "a viewer may look" in (await answer(socket, **{"is": "answer"}))["error"]
+        await socket.send('{"do": "at", "time": 0.2}')
+
+    run(body, console_of_recording, role="viewer")
+
+
+def test_a_page_that_sends_too_much_is_closed(console_of_recording):
+    async def body(socket):
+        for _ in range(250):
+            await socket.send("{}")
+        with suppress(ConnectionClosed):
+            async for _ in socket:
+                pass
+        assert socket.close_code == 1008
+
+    run(body, console_of_recording)
+
+
+def test_a_message_that_is_too_long_ends_the_connection(console_of_recording):
+    async def body(socket):
+        await socket.send("x" * 20_000)
+        await socket.wait_closed()
+        assert socket.close_code == 1009
+
+    run(body, console_of_recording)
+
+
+def test_reduced_rows_keep_every_peak():
+    times, values = np.arange(10_000) * 0.001, np.zeros((10_000, 2))
+    values[4321, 0], values[777, 1] = 5.0, -3.0
+    rows = reduced(times, values, 100)
+    assert rows.shape == (200, 3)
+    assert (rows[:, 1].max(), rows[:, 2].min()) == (5.0, -3.0)
+    assert np.array_equal(reduced(times[:150], values[:150], 100)[:, 0], times[:150])
+
+
+def test_a_recording_that_was_cut_short_is_shown_as_far_as_it_goes(recording, tmp_path, caplog):
+    (file,) = recording.glob("*.mcap")
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    with ExitStack() as stack:
+        shown = opened_recording(cut, stack)
+        assert 0.1 < shown.state["end"] < 0.5
+        assert "was cut short: it is shown up to" in caplog.text
+        assert shown.newest("tissue.probe/wrench", None) is not None

@@ -1,0 +1,60 @@
+"""`trocar view`: the page on which a session or a recording is seen."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from schemas.errors import MissingExtraError
+
+__all__ = ["app"]
+
+app = typer.Typer()
+
+
+@app.command()
+def view(
+    recording: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[RECORDING]", exists=True, help="A recording; without it, the session that runs."
+        ),
+    ] = None,
+    *,
+    connect: Annotated[
+        str | None,
+        typer.Option(metavar="ENDPOINT", help="Where the hub listens; default: any hub of this machine."),
+    ] = None,
+    session: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The session; default: the first that is found.")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(help="Where the page is, on loopback; default: 8470 or the next free one.")
+    ] = None,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
+    read_only: Annotated[
+        bool, typer.Option("--read-only", help="The link is that of a viewer, who steers and leads nothing.")
+    ] = False,
+    with_parent: Annotated[int | None, typer.Option(hidden=True)] = None,
+) -> None:
+    """Show a running session or a recording on a page in the browser.
+
+    The link that is printed works once; from then on that browser may open the page.
+    """
+    for package in ("starlette", "uvicorn", "websockets"):
+        if find_spec(package) is None:
+            raise MissingExtraError("trocar view", "web", package)
+    from webconsole.serve import serve
+
+    serve(
+        recording,
+        endpoint=connect,
+        session=session,
+        port=port,
+        browse=open_,
+        role="viewer" if read_only else "operator",
+        parent=with_parent,
+    )

@@ -1,0 +1,109 @@
+"""What a page may ask for: JSON, checked before anything is done."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from schemas.errors import MessageError
+
+__all__ = ["At", "Command", "Control", "Hand", "Invite", "Lead", "Leave", "Show", "Watch", "command"]
+
+MOST_BYTES = 16_384
+"""Of one message of a page."""
+_MOST_NUMBERS = 24
+
+Finite = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
+Share = Annotated[float, Field(allow_inf_nan=False, ge=-1.0, le=1.0)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class _Command(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Show(_Command):
+    """What this page shows beside the scene."""
+
+    do: Literal["show"]
+    numbers: Annotated[list[Name], Field(max_length=_MOST_NUMBERS)] = []
+    pictures: bool = True
+    again: bool = False
+    """Send everything again: this page has only now loaded its scene."""
+
+
+class At(_Command):
+    """The instant of a recording to show."""
+
+    do: Literal["at"]
+    time: Finite
+    """Simulated time, s."""
+
+
+class Control(_Command):
+    """Steer the running session."""
+
+    do: Literal["pause", "resume", "step", "stop"]
+    steps: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+
+
+class Watch(_Command):
+    """Show another session."""
+
+    do: Literal["watch"]
+    session: Name
+
+
+class Invite(_Command):
+    """Make a link for another browser."""
+
+    do: Literal["invite"]
+    role: Literal["viewer", "operator"]
+
+
+class Lead(_Command):
+    """Become the pilot of a device."""
+
+    do: Literal["lead"]
+    device: Name
+
+
+class Leave(_Command):
+    """Lead no more."""
+
+    do: Literal["leave"]
+
+
+class Hand(_Command):
+    """What keys, sticks and pointer ask of the device that this page leads."""
+
+    do: Literal["hand"]
+    number: Annotated[int, Field(ge=0, lt=2**53)]
+    """Counts them: an older one is refused."""
+    linear: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
+    """Ahead, left, up, each a share of the greatest speed."""
+    angular: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
+    """About the stylus' own x (its point moves up), y (right) and z (as a screw going in)."""
+    drag: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    """Way of the pointer since this page leads, m: ahead, left, up."""
+    gripper: Share = 0.0
+    """1 opens, -1 closes."""
+    dead_man: bool = False
+    jaw: bool = False
+
+
+Command = Annotated[Show | At | Control | Watch | Invite | Lead | Leave | Hand, Field(discriminator="do")]
+_COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)
+
+
+def command(text: str) -> Command:
+    """Return the command in a message of a page; raises MessageError if it is not valid."""
+    if len(text) > MOST_BYTES:
+        raise MessageError(f"a command of {len(text)} characters, at most {MOST_BYTES} are allowed")
+    try:
+        return _COMMANDS.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise MessageError(f"not a command: {where[:100]}: {first['msg'][:200]}") from error

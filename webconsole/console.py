@@ -1,0 +1,93 @@
+"""What all pages of a server share: the source, what of it can be drawn, and who leads what."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from hub.transport.control_messages import Empty, StepRequest
+from schemas.errors import MessageError
+from webconsole.commands import Control
+from webconsole.frame import Section, SectionKind
+from webconsole.live import Live
+from webconsole.log import card_of
+from webconsole.pilot import Pilots
+from webconsole.recorded import Recorded
+from webconsole.source import Value
+from webconsole.stage import Stage
+
+__all__ = ["Console"]
+
+_VERBS = {"pause": "pause", "resume": "resume", "step": "step", "stop": "shutdown"}
+
+
+class Console:
+    """The pages' common ground."""
+
+    def __init__(self, source: Live | Recorded, pilots: Pilots) -> None:
+        self.source, self.pilots = source, pilots
+        self._stage: Stage | None = None
+        self._generation = -1
+        self._making = asyncio.Lock()
+        self._wants: dict[object, frozenset[str]] = {}
+        self._made: dict[str, tuple[Value, Section]] = {}
+
+    async def stage(self) -> Stage | None:
+        """Return what can be drawn of the present session; None while there is none."""
+        async with self._making:
+            scenario, generation = self.source.scenario, self.source.generation
+            if scenario is None:
+                return None
+            if generation != self._generation:
+                self._stage = await asyncio.to_thread(Stage, scenario, self.source.outlets)
+                await asyncio.to_thread(lambda: self._stage and self._stage.geometry)
+                self._generation, self._made = generation, {}
+            return self._stage
+
+    def want(self, page: object, names: frozenset[str] | None) -> None:
+        """Receive what a page shows; None: it has gone."""
+        if names is None:
+            self._wants.pop(page, None)
+        else:
+            self._wants[page] = names
+        self.source.want(frozenset[str]().union(*self._wants.values()))
+
+    def section(self, stage: Stage, name: str, value: Value) -> Section:
+        """Return the section of a surface or a picture, made once for all pages."""
+        held = self._made.get(name)
+        if held is None or held[0] is not value:
+            held = self._made[name] = value, stage.section(name, value)
+        return held[1]
+
+    def poses(self, stage: Stage, participant: str, values: dict[str, Value]) -> Section:
+        """Return the section with the poses of a participant's bodies, made once for all pages."""
+        (value,) = [*values.values()][-1:]
+        held = self._made.get(participant)
+        if held is None or held[0] is not value:
+            poses = stage.poses(participant, values).astype("<f4")
+            section = Section(SectionKind.POSES, [*stage.scenes].index(participant), poses.tobytes())
+            held = self._made[participant] = value, section
+        return held[1]
+
+    async def control(self, order: Control) -> None:
+        """Pause, resume, step or stop the session; raises MessageError or ConnectError."""
+        live = self.live()
+        request = StepRequest(steps=order.steps) if order.do == "step" else Empty()
+        await asyncio.to_thread(live.ask, _VERBS[order.do], request, Empty)
+
+    def live(self) -> Live:
+        """Return the running session's source; raises MessageError if this is a recording."""
+        if not isinstance(self.source, Live):
+            raise MessageError("this page shows a recording, which cannot be steered")
+        return self.source
+
+    def recorded(self) -> Recorded:
+        """Return the recording's source; raises MessageError if this is a running session."""
+        if not isinstance(self.source, Recorded):
+            raise MessageError("this page shows a running session; its recording has a timeline")
+        return self.source
+
+    def card(self) -> dict[str, Any] | None:
+        """Return the newest score card, ready for JSON; None if there is none."""
+        card = self.source.card if isinstance(self.source, Live) else None
+        return None if card is None else card_of(card)

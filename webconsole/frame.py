@@ -1,0 +1,90 @@
+"""The binary frames from server to page: little-endian, each a head and sections.
+
+    head      4 bytes `TRCF`, u16 version, u16 number of sections, i64 simulated time (ns), u32 number of the
+              frame, u32 zero
+    section   u16 kind, u16 index, u32 bytes of content, content, zeros up to a multiple of 8
+
+A page acknowledges a frame by its number (u32). Numbers are in the frame of the world, metres.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+from schemas.errors import MessageError
+
+__all__ = ["VERSION", "Section", "SectionKind", "acknowledged", "frame", "sections"]
+
+MAGIC = b"TRCF"
+VERSION = 1
+_HEAD = struct.Struct("<4sHHqII")
+_SECTION = struct.Struct("<HHI")
+_ACK = struct.Struct("<I")
+_ALIGN = 8
+
+
+class SectionKind(IntEnum):
+    """What a section holds; its index counts what the page knows of that kind."""
+
+    POSES = 1
+    """f32 (bodies, 7): position and quaternion (x, y, z, w), of a scene."""
+    SURFACE = 2
+    """u32 (f, 3): triangles of a soft surface, before its first nodes."""
+    NODES = 3
+    """f32 (n, 3): the nodes of a soft surface."""
+    PICTURE = 4
+    """A compressed picture as it was published."""
+    SAMPLE = 5
+    """f64 (1 + size): time (s) and value of a numeric port."""
+    ARROWS = 6
+    """f32 (n, 6): point and force (N) of each arrow of a bond."""
+
+
+class Section(NamedTuple):
+    """A part of a frame."""
+
+    kind: SectionKind
+    place: int
+    """Its index."""
+    content: bytes
+
+
+def frame(number: int, time_ns: int, parts: Sequence[Section]) -> bytes:
+    """Return the frame with this number, of this simulated time."""
+    pieces = [_HEAD.pack(MAGIC, VERSION, len(parts), time_ns, number, 0)]
+    for kind, index, content in parts:
+        pieces += _SECTION.pack(kind, index, len(content)), content, b"\0" * (-len(content) % _ALIGN)
+    return b"".join(pieces)
+
+
+def sections(data: bytes) -> tuple[int, int, list[Section]]:
+    """Return number, simulated time (ns) and sections of a frame; raises MessageError if it is not one."""
+    try:
+        magic, version, count, time_ns, number, _ = _HEAD.unpack_from(data)
+        if (magic, version) != (MAGIC, VERSION):
+            raise MessageError(
+                f"a frame begins with {magic!r}, version {version}; expected {MAGIC!r}, {VERSION}"
+            )
+        at, found = _HEAD.size, list[Section]()
+        for _ in range(count):
+            kind, index, size = _SECTION.unpack_from(data, at)
+            at += _SECTION.size
+            if at + size > len(data):
+                raise MessageError(
+                    f"a section of {size} bytes at {at} passes the end of a frame of {len(data)}"
+                )
+            found.append(Section(SectionKind(kind), index, data[at : at + size]))
+            at += size + -size % _ALIGN
+    except (struct.error, ValueError) as error:
+        raise MessageError(f"not a frame: {error}") from error
+    return number, time_ns, found
+
+
+def acknowledged(data: bytes) -> int:
+    """Return the number of the frame that a page acknowledges; raises MessageError if it is none."""
+    if len(data) != _ACK.size:
+        raise MessageError(f"an acknowledgement of {len(data)} bytes, expected {_ACK.size}")
+    return _ACK.unpack(data)[0]

@@ -1,0 +1,149 @@
+"""Who may open the page: the holder of a one-time link, by a cookie from then on.
+
+Any website that is open in the same browser can send requests to this machine, and any name can be made to
+point to it. So the Host must be this server's own name, the Origin its own page, and the cookie its own.
+"""
+
+from __future__ import annotations
+
+import logging
+import secrets
+from collections.abc import Mapping
+from http.cookies import CookieError, SimpleCookie
+from time import monotonic_ns
+from typing import Literal
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from hub.participant.token_bucket import TokenBucket
+
+__all__ = ["Gate", "Role"]
+
+log = logging.getLogger(__name__)
+
+Role = Literal["viewer", "operator"]
+
+_TOKEN_BYTES = 32
+_LOGGED_PER_S = 5.0
+_MOST_COOKIES = 64
+"""Browsers that may be let in; each took a link of its own."""
+_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
+        " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+
+
+class Gate:
+    """Lets requests through to `app` that come from this server's own page in a browser that was let in.
+
+    What passes has `role` in its scope's state.
+    """
+
+    def __init__(self, app: ASGIApp, port: int) -> None:
+        self._app = app
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+        self._cookie = f"trocar_{port}"  # cookies do not know ports
+        self._invited: dict[str, Role] = {}
+        self._in: dict[str, Role] = {}
+        self._log = TokenBucket(_LOGGED_PER_S)
+
+    def invite(self, role: Role) -> str:
+        """Return the path, with its token, of a page that one browser may open once."""
+        token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._invited[token] = role
+        return f"/?token={token}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Check a request, and pass it on or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        problem = self._foreign(scope, headers)
+        token = parse_qs(scope["query_string"].decode("ascii", "replace")).get("token", [""])[0]
+        if not problem and token and scope["type"] == "http":
+            await self._admit(token, self._role(headers), scope, receive, send)
+            return
+        role = self._role(headers)
+        if problem or role is None:
+            why = problem or "not let in: open the link that the server has printed"
+            await self._refuse(why, scope, receive, send)
+            return
+        scope.setdefault("state", {})["role"] = role
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                given = MutableHeaders(scope=message)
+                for name, value in _HEADERS.items():
+                    given.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
+
+    def _foreign(self, scope: Scope, headers: Mapping[str, str]) -> str:
+        """Return why a request does not come from this server's page; empty if it does."""
+        host = headers.get("host", "")
+        if host not in self._hosts:
+            return f"host {host[:80]!r} is not this server's"
+        origin = headers.get("origin")
+        if origin is None and scope["type"] == "websocket":
+            return "no origin: this is for the page alone"
+        if origin is not None and origin not in {f"http://{own}" for own in self._hosts}:
+            return f"origin {origin[:80]!r} is another website"
+        if scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
+            return f"method {scope['method']:.10} is not used here"
+        return ""
+
+    def _role(self, headers: Mapping[str, str]) -> Role | None:
+        try:
+            cookies = SimpleCookie(headers.get("cookie", ""))
+        except CookieError:
+            return None
+        held = cookies.get(self._cookie)
+        return None if held is None else _looked_up(self._in, held.value)
+
+    async def _admit(
+        self, token: str, known: Role | None, scope: Scope, receive: Receive, send: Send
+    ) -> None:
+        """Let a browser in by its token; one that is in already only gets its page."""
+        role = _looked_up(self._invited, token)
+        if role is None and known is not None:
+            await RedirectResponse("/", status_code=303, headers=_HEADERS)(scope, receive, send)
+            return
+        if role is None or len(self._in) >= _MOST_COOKIES:
+            await self._refuse("this link was used, or is not this server's", scope, receive, send)
+            return
+        self._invited = {other: kept for other, kept in self._invited.items() if other != token}
+        cookie = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._in[cookie] = role
+        answer = RedirectResponse("/", status_code=303, headers=_HEADERS)
+        answer.set_cookie(self._cookie, cookie, httponly=True, samesite="strict")
+        await answer(scope, receive, send)
+
+    async def _refuse(self, why: str, scope: Scope, receive: Receive, send: Send) -> None:
+        if self._log.spend(monotonic_ns()):
+            client = scope.get("client") or ("?", 0)
+            log.warning("refused %s %r from %s:%s: %s", scope["type"], scope["path"][:80], *client, why)
+        if scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
+            return
+        await PlainTextResponse(f"{why}\n", status_code=403, headers=_HEADERS)(scope, receive, send)
+
+
+def _looked_up(known: Mapping[str, Role], token: str) -> Role | None:
+    """Return the role of a token, in a time that says nothing about it."""
+    found: Role | None = None
+    for one, role in known.items():
+        if secrets.compare_digest(one.encode(), token.encode()):
+            found = role
+    return found

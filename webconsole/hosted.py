@@ -1,0 +1,87 @@
+"""The devices that pages lead: each is hosted by the pages' server, in a thread that joins its session."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+from functools import partial
+
+from devices.browser import PageInput, hand_of
+from devices.keyboard.virtual_stylus import Wish
+from hub.planning.plan import Plan
+from hub.remote.device_host import DeviceHost
+from hub.remote.hub_connection import reach
+from hub.transport.control_messages import JoinRequest
+from schemas.errors import TrocarError
+from schemas.keys import Keys
+from webconsole.commands import Hand
+from webconsole.pilot import Pilots
+
+__all__ = ["HostedDevices"]
+
+log = logging.getLogger(__name__)
+
+_KIND = "browser"
+_PATIENCE_S = 2.0
+
+
+class _StopError(Exception):
+    """Ends a device's thread."""
+
+
+class HostedDevices:
+    """Hosts the devices of kind `browser` of each session that is shown, and offers them to pilots."""
+
+    def __init__(self, pilots: Pilots) -> None:
+        self._pilots = pilots
+        self._endpoints: dict[str, str] = {}
+        """By device: where the hub of its newest session listens."""
+        self._threads: dict[str, threading.Thread] = {}
+        self._ending = threading.Event()
+
+    def join(self, endpoint: str, plan: Plan) -> None:
+        """Host what pages may lead in a session; what another process hosts already is left alone."""
+        led = [
+            name
+            for name, planned in plan.participants.items()
+            if planned.kind == _KIND and planned.host.startswith("remote/")
+        ]
+        self._pilots.keep(led)
+        for name in led:
+            self._endpoints[name] = endpoint
+            self._pilots.offer(name, partial(_give, name))
+            held = self._threads.get(name)
+            if held is None or not held.is_alive():
+                self._threads[name] = threading.Thread(target=self._host, args=(name,), daemon=True)
+                self._threads[name].start()
+
+    def _host(self, name: str) -> None:
+        hand_of(name).served = True
+        request = JoinRequest(host=f"remote/{name}", pid=os.getpid())
+        host = DeviceHost(name, lambda: reach(self._endpoints[name], name), Keys("*"), request, None)
+        try:
+            host.serve(self._check)
+        except TrocarError as error:
+            log.warning("'%s' cannot be led from pages of this server: %s", name, error)
+        except _StopError:
+            log.debug("'%s' is no longer hosted", name)
+
+    def _check(self) -> None:
+        if self._ending.is_set():
+            raise _StopError
+
+    def close(self) -> None:
+        """Let go of all devices."""
+        self._ending.set()
+        for thread in self._threads.values():
+            thread.join(_PATIENCE_S)
+
+
+def _give(device: str, hand: Hand | None) -> None:
+    """Hand what a page asks to the device; None: no page leads."""
+    if hand is None:
+        hand_of(device).release()
+        return
+    wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw)
+    hand_of(device).give(PageInput(wish, hand.drag))

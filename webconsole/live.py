@@ -1,0 +1,317 @@
+"""A running session as what a page shows: its newest values, received without a wait of the session.
+
+A thread reaches the hub, and reaches it again, or another one, when it is gone. Only the outlets that a page
+shows are subscribed to; values stay as bytes until a frame needs them.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from time import monotonic
+from typing import Any, TypeVar
+
+import zenoh
+from pydantic import BaseModel
+from zenoh.handlers import Callback
+
+from hub.planning.plan import Plan
+from hub.remote.hub_connection import reach
+from hub.remote.live_sessions import live_sessions
+from hub.security.credentials import OBSERVER
+from hub.transport.cells import INITIAL
+from hub.transport.control_client import ask
+from hub.transport.control_messages import DescribeReply, Empty
+from hub.transport.envelope import Tag
+from hub.transport.hub_files import running_hubs
+from schemas.codec import decode
+from schemas.errors import ConnectError, MessageError
+from schemas.keys import Keys
+from schemas.scenario import Scenario
+from schemas.trocar_msgs import ScoreCard, SessionStatus
+from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.source import Outlet, Value
+
+__all__ = ["Live"]
+
+log = logging.getLogger(__name__)
+
+_RETRY_S = 0.5
+_ENTRIES_KEPT = 500
+_LATE_S = 5.0
+"""Late steps are summed up for this long: on a busy machine each is one."""
+R = TypeVar("R", bound=BaseModel)
+
+
+class Live:
+    """The source of pages that show a running session.
+
+    Args:
+        endpoint: Where its hub listens; None: that of any hub of this user on this machine.
+        session: The name of the session; None: the first one that is found.
+        pid: The process of the hub; None: any.
+    """
+
+    kind = "live"
+
+    def __init__(
+        self, endpoint: str | None = None, session: str | None = None, pid: int | None = None
+    ) -> None:
+        self._endpoint, self._session_wanted, self._pid = endpoint, session, pid
+        self.generation = 0
+        self.scenario: Scenario | None = None
+        self.outlets: Sequence[Outlet] = ()
+        self.recording = ""
+        self._entries: deque[tuple[int, Entry]] = deque(maxlen=_ENTRIES_KEPT)
+        self._numbered = 0
+        self.card: Value | None = None
+        self.joined: Callable[[str, Plan], None] = lambda _endpoint, _plan: None
+        """Is called with endpoint and plan of each session that is reached."""
+        self._status: SessionStatus | None = None
+        self._trouble = "looking for a session"
+        self._values: dict[str, Value] = {}
+        self._firsts: dict[str, Value] = {}
+        self._by_name: dict[str, Outlet] = {}
+        self._wanted: frozenset[str] = frozenset()
+        self._run = self._late = 0
+        self._late_s = 0.0
+        self._device_keys: set[str] = set()
+        self._session: zenoh.Session | None = None
+        self._keys = Keys("none")
+        self._subscribers: dict[str, zenoh.Subscriber[None]] = {}
+        self._lock = threading.RLock()
+        self._gone, self._ending = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="live", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look for the session."""
+        self._thread.start()
+
+    @property
+    def state(self) -> Mapping[str, Any]:
+        """Name and state of the session, simulated time (s), factor of real time, counts and latencies."""
+        status = self._status
+        if self._session is None or status is None:
+            ended = {} if status is None else {"session": status.session, "time": status.sim_time_ns / 1e9}
+            return {"state": "away", "detail": self._trouble, **ended}
+        return {
+            "session": status.session,
+            "state": status.state,
+            "time": status.sim_time_ns / 1e9,
+            "step": status.step,
+            "factor": status.real_time_factor,
+            "late": status.late_steps,
+            "dropped": status.dropped_messages,
+            "detail": status.detail,
+            "recording": self.recording,
+            "latencies": [
+                {"way": one.way, "stream": one.stream, "p50": one.p50_s, "p99": one.p99_s}
+                for one in status.latencies
+            ],
+            "links": {one.device: one.link for one in status.devices},
+        }
+
+    def want(self, names: frozenset[str]) -> None:
+        """Subscribe to these outlets, and to no others."""
+        with self._lock:
+            self._wanted = names
+            self._subscribe()
+
+    def newest(self, name: str, time_ns: int | None) -> Value | None:  # noqa: ARG002
+        """Return the newest value that has arrived."""
+        return self._values.get(name)
+
+    def first(self, name: str) -> Value | None:
+        """Return the value at time 0 of a surface, which is sent to each subscriber that is new."""
+        return self._firsts.get(name)
+
+    def ask(self, verb: str, request: BaseModel, model: type[R]) -> R:
+        """Send a control request to the hub; raises ConnectError or MessageError."""
+        session = self._session
+        if session is None:
+            raise ConnectError("no session is running")
+        return ask(session, self._keys.control(verb), request, model)
+
+    def entries_after(self, number: int) -> tuple[int, list[Entry]]:
+        """Return the lines of the log after the one with this number, and the number of the last."""
+        with self._lock:
+            return self._numbered, [entry for of_it, entry in self._entries if of_it > number]
+
+    def sessions(self) -> list[dict[str, Any]]:
+        """Return the sessions of this user on this machine."""
+        return [
+            {"session": one.session, "state": one.state, "time": one.sim_time_ns / 1e9}
+            for one in live_sessions(self._endpoints())
+        ]
+
+    def watch(self, session: str) -> None:
+        """Show another session from now on."""
+        self._session_wanted = session
+        self._gone.set()
+
+    def close(self) -> None:
+        """Leave the session."""
+        self._ending.set()
+        self._gone.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=3.0)
+
+    def _serve(self) -> None:
+        while not self._ending.is_set():
+            self._gone.clear()
+            try:
+                self._look()
+            except (ConnectError, MessageError, zenoh.ZError) as error:
+                self._trouble = str(error)
+            self._ending.wait(_RETRY_S)
+
+    def _look(self) -> None:
+        """Show one session until it is gone; raises ConnectError if there is none."""
+        endpoint, name = self._found()
+        with reach(endpoint, OBSERVER) as session:
+            keys = Keys(name)
+            described = ask(session, keys.control("describe"), Empty(), DescribeReply)
+            with self._lock:
+                self._begin(session, keys, described)
+            self.joined(endpoint, described.plan)
+            status = session.declare_subscriber(keys.status, Callback(self._take_status, indirect=False))
+            alive = session.liveliness().declare_subscriber(
+                keys.alive("hub", "hub"), Callback(self._take_life, indirect=True), history=True
+            )
+            try:
+                while not self._gone.wait(1.0):
+                    self._ask_status(session, keys)
+            finally:
+                with self._lock:
+                    self._session = None
+                    self._trouble = f"session '{name}' is over, or its hub is gone"
+                    self._drop()
+                alive.undeclare()
+                status.undeclare()
+
+    def _found(self) -> tuple[str, str]:
+        for endpoint in self._endpoints():
+            for status in live_sessions([endpoint]):
+                if self._session_wanted in (None, status.session):
+                    return endpoint, status.session
+        named = f"session '{self._session_wanted}'" if self._session_wanted else "session"
+        raise ConnectError(f"no {named} is running on this machine")
+
+    def _endpoints(self) -> list[str]:
+        if self._endpoint is not None:
+            return [self._endpoint]
+        return [hub.endpoint for hub in running_hubs() if self._pid in (None, hub.pid)]
+
+    def _begin(self, session: zenoh.Session, keys: Keys, described: DescribeReply) -> None:
+        self._values, self._firsts = {}, {}
+        self._status, self.card, self._late = None, None, 0
+        self._run, self._keys = described.run, keys
+        self.scenario, self.recording = described.scenario, described.recording
+        self.outlets = tuple(
+            Outlet(planned.name, port, live=planned.role != "device" or not planned.simulated_time)
+            for planned in described.plan.participants.values()
+            for port in planned.ports
+            if port.causality == "output"
+        )
+        self._by_name = {one.name: one for one in self.outlets}
+        self._device_keys = {
+            planned.name for planned in described.plan.participants.values() if planned.role == "device"
+        }
+        self._session = session
+        self._trouble = f"session '{described.session}' gives no status yet"
+        self.generation += 1
+        self._note(Entry(0.0, "info", "session", f"'{described.session}' is shown"))
+        self._subscribe()
+
+    def _subscribe(self) -> None:
+        session = self._session
+        if session is None:
+            return
+        logged = {
+            one.name for one in self.outlets if one.port.type in LOGGED or one.port.type == ScoreCard.ros_type
+        }
+        names = {name for name in self._wanted | logged if name in self._by_name and self._by_name[name].live}
+        for name in self._subscribers.keys() - names:
+            self._subscribers.pop(name).undeclare()
+        for name in names - self._subscribers.keys():
+            outlet = self._by_name[name]
+            key = (
+                self._keys.output("device", outlet.participant, outlet.port.name)
+                if outlet.participant in self._device_keys
+                else self._keys.view(outlet.participant, outlet.port.name)
+            )
+            take = Callback(partial(self._take, outlet), indirect=False)
+            self._subscribers[name] = session.declare_subscriber(key, take)
+
+    def _drop(self) -> None:
+        for subscriber in self._subscribers.values():
+            subscriber.undeclare()
+        self._subscribers = {}
+
+    def _take(self, outlet: Outlet, sample: zenoh.Sample) -> None:
+        """Keep a value; it is decoded when a frame needs it."""
+        payload = sample.payload.to_bytes()
+        if outlet.participant in self._device_keys:
+            status = self._status
+            value = Value(0 if status is None else status.sim_time_ns, payload)
+        else:
+            try:
+                tag = Tag.of(sample)
+            except MessageError:
+                return
+            if tag.run != self._run:
+                return
+            value = Value(tag.time_ns, payload)
+            if tag.step == INITIAL:
+                self._firsts[outlet.name] = value
+                if outlet.name in self._values:
+                    return
+        self._values[outlet.name] = value
+        if outlet.port.type == ScoreCard.ros_type:
+            self.card = value
+        elif outlet.port.type in LOGGED:
+            try:
+                for entry in entries_of(outlet, value):
+                    self._note(entry)
+            except MessageError as error:
+                self._note(Entry(value.time_ns / 1e9, "warn", outlet.name, f"not shown: {error}"))
+
+    def _take_status(self, sample: zenoh.Sample) -> None:
+        try:
+            status = decode(SessionStatus, sample.payload.to_bytes())
+        except MessageError as error:
+            self._note(Entry(0.0, "warn", "session", f"a status is not shown: {error}"))
+            return
+        before, self._status = self._status, status
+        at = status.sim_time_ns / 1e9
+        if before is None:
+            return
+        if status.state != before.state:
+            failed = status.state == "failed"
+            self._note(Entry(at, "error" if failed else "info", "session", status.state))
+        if status.detail != before.detail and status.detail:
+            self._note(Entry(at, "warn", "session", status.detail))
+        late = status.late_steps - self._late
+        if late and monotonic() - self._late_s > _LATE_S:
+            self._late, self._late_s = status.late_steps, monotonic()
+            self._note(Entry(at, "warn", "session", f"{late} late steps"))
+        if refused := status.dropped_messages - before.dropped_messages:
+            self._note(Entry(at, "warn", "session", f"{refused} messages refused"))
+
+    def _ask_status(self, session: zenoh.Session, keys: Keys) -> None:
+        """Ask for the status: a paused session publishes none."""
+        for reply in session.get(keys.status, timeout=1.0):
+            if reply.ok is not None:
+                self._take_status(reply.ok)
+
+    def _take_life(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._gone.set()
+
+    def _note(self, entry: Entry) -> None:
+        with self._lock:
+            self._numbered += 1
+            self._entries.append((self._numbered, entry))

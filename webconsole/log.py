@@ -1,0 +1,71 @@
+"""Lines of the page's log, made of messages that say that something happened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal, NamedTuple
+
+from schemas.codec import decode, message_type
+from schemas.crtk import OperatingState
+from schemas.ros import DiagnosticStatus
+from schemas.trocar_msgs import ScoreCard, TaskEvent, TissueGrasp
+from webconsole.source import Outlet, Value
+
+__all__ = ["LOGGED", "Entry", "card_of", "entries_of"]
+
+Level = Literal["info", "warn", "error"]
+
+LOGGED = frozenset(
+    (TaskEvent.ros_type, TissueGrasp.ros_type, DiagnosticStatus.ros_type, OperatingState.ros_type)
+)
+"""Types of the messages that become lines."""
+_LEVELS: tuple[Level, ...] = ("info", "warn", "error", "error")
+"""Of a DiagnosticStatus: OK, WARN, ERROR, STALE (diagnostic_msgs/msg/DiagnosticStatus)."""
+
+
+class Entry(NamedTuple):
+    """One line."""
+
+    time_s: float
+    """Simulated time."""
+    level: Level
+    source: str
+    text: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it ready for JSON."""
+        return {"time": self.time_s, "level": self.level, "source": self.source, "text": self.text}
+
+
+def entries_of(outlet: Outlet, value: Value) -> Iterator[Entry]:
+    """Yield the lines of one message, none if its type has none; raises MessageError if it is not valid."""
+    if outlet.port.type not in LOGGED:
+        return
+    message, at = decode(message_type(outlet.port.type), value.payload), value.time_ns / 1e9
+    if isinstance(message, TaskEvent):
+        about = " ".join(filter(None, (message.object, message.arm, message.place)))
+        amount = f", {message.value:.3g} {message.unit}" if message.unit else ""
+        yield Entry(at, "info", outlet.participant, f"{message.event}: {about}{amount}")
+    elif isinstance(message, TissueGrasp):
+        torn = message.event == "torn"
+        text = f"{message.body} {message.event}, pull {message.force_n:.2g} N"
+        yield Entry(at, "warn" if torn else "info", outlet.name, text)
+    elif isinstance(message, DiagnosticStatus):
+        level = _LEVELS[min(int(message.level), len(_LEVELS) - 1)]
+        yield Entry(at, level, outlet.participant, message.message)
+    elif isinstance(message, OperatingState):
+        fault = message.state == "FAULT"
+        text = f"{message.state}{', homed' if message.is_homed else ''}"
+        yield Entry(at, "error" if fault else "info", outlet.name, text)
+
+
+def card_of(value: Value) -> dict[str, Any]:
+    """Return a score card, ready for JSON; raises MessageError if it is not valid."""
+    card = decode(ScoreCard, value.payload)
+    return {
+        "task": card.task,
+        "goals": card.goals,
+        "reached": card.reached,
+        "metrics": [one.model_dump() for one in card.metrics],
+        "rules": [{"rules": one.rules, "values": [v.model_dump() for v in one.values]} for one in card.rules],
+    }

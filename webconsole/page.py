@@ -1,0 +1,262 @@
+"""One page: it gets the newest frame that it can take, and what it asks for is done or refused."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Iterator
+from time import monotonic_ns
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from hub.participant.token_bucket import TokenBucket
+from schemas.errors import MessageError, TrocarError
+from webconsole.commands import At, Command, Control, Hand, Invite, Lead, Leave, Show, Watch, command
+from webconsole.console import Console
+from webconsole.frame import Section, acknowledged, frame
+from webconsole.gate import Gate, Role
+from webconsole.live import Live
+from webconsole.source import Value
+from webconsole.stage import Stage
+
+__all__ = ["Page"]
+
+log = logging.getLogger(__name__)
+
+_FRAME_S = 1.0 / 60.0
+_STATE_S = 0.25
+_MOST_WAITING = 2
+"""Frames that a page has not acknowledged; until it does, newer values replace what it would have got."""
+_MESSAGES_PER_S = 400.0
+"""Of a page: 60 acknowledgements, 120 inputs of a hand, and a burst of them after a pause."""
+_MOST_REFUSED = 200
+"""Invalid messages, after which a page is closed."""
+
+
+class Page:
+    """The server's side of one page.
+
+    Args:
+        socket: Its WebSocket.
+        role: What it may do.
+        console: What all pages share.
+        gate: Makes links for others.
+    """
+
+    def __init__(self, socket: WebSocket, role: Role, console: Console, gate: Gate) -> None:
+        self._socket, self._role, self._console, self._gate = socket, role, console, gate
+        self._stage: Stage | None = None
+        self._generation = -1
+        self._show = Show(do="show")
+        self._at_ns: int | None = None
+        self._number = self._acknowledged = 0
+        self._sent: dict[str, Value] = {}
+        self._surfaces: set[str] = set()
+        self._lines = 0
+        self._rate = TokenBucket(_MESSAGES_PER_S)
+        self._refused = 0
+        self._changed = asyncio.Event()
+
+    async def run(self) -> None:
+        """Serve the page until it is closed."""
+        await self._socket.accept()
+        tasks = [asyncio.create_task(work) for work in (self._read(), self._frames(), self._states())]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                error = task.exception()
+                if error is None:
+                    continue
+                if not isinstance(error, WebSocketDisconnect | RuntimeError):
+                    raise error
+                log.debug("a page has gone: %s", error)  # Starlette's errors of a socket that is closed
+        finally:
+            self._console.pilots.leave(self)
+            self._console.want(self, None)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _read(self) -> None:
+        while True:
+            message = await self._socket.receive()
+            if message["type"] != "websocket.receive":
+                return
+            if not self._rate.spend(monotonic_ns()):
+                await self._refuse("", f"more than {_MESSAGES_PER_S:g} messages/s")
+                continue
+            await self._take(message.get("text"), message.get("bytes"))
+            if self._refused > _MOST_REFUSED:
+                log.warning("a page is closed: %d invalid messages", self._refused)
+                await self._socket.close(1008, "too many invalid messages")
+                return
+
+    async def _take(self, text: str | None, data: bytes | None) -> None:
+        asked = ""
+        try:
+            if data is not None:
+                number = acknowledged(data)
+                if not self._acknowledged < number <= self._number:
+                    raise MessageError(f"frame {number} is acknowledged, the last one was {self._number}")
+                self._acknowledged = number
+                self._changed.set()
+                return
+            order = command(text or "")
+            asked = order.do
+            if self._role == "viewer" and not isinstance(order, Show | At):
+                raise MessageError("a viewer may look, and nothing else: ask the operator for a link")
+            answer = await self._do(order)
+        except TrocarError as error:
+            await self._refuse(asked, str(error))
+            return
+        if answer is not None:
+            await self._tell({"is": "answer", "to": asked, **answer})
+
+    async def _do(self, order: Command) -> dict[str, Any] | None:
+        """Do what the page asks; raises TrocarError."""
+        match order:
+            case Show():
+                self._show = order
+                if order.again:
+                    self._sent, self._surfaces = {}, set()
+                self._want()
+            case At():
+                self._console.recorded()
+                self._at_ns = round(order.time * 1e9)
+            case Hand():
+                self._console.pilots.take(self, order)
+                return None
+            case Lead():
+                self._console.pilots.lead(self, order.device)
+                return {"device": order.device}
+            case Leave():
+                self._console.pilots.leave(self)
+            case Control():
+                await self._console.control(order)
+                return {}
+            case Watch():
+                self._console.live().watch(order.session)
+            case Invite():
+                return {"path": self._gate.invite(order.role), "role": order.role}
+        self._changed.set()
+        return None
+
+    async def _refuse(self, asked: str, why: str) -> None:
+        self._refused += 1
+        if self._refused <= 3 or self._refused % 50 == 0:
+            log.warning("a message of a page is refused (%d): %s", self._refused, why[:300])
+        if self._refused <= _MOST_REFUSED:
+            await self._tell({"is": "answer", "to": asked, "error": why[:500]})
+
+    async def _tell(self, content: dict[str, Any]) -> None:
+        await self._socket.send_text(
+            json.dumps(content, separators=(",", ":"), allow_nan=False, default=float)
+        )
+
+    async def _states(self) -> None:
+        """Say what the page's head and log show, a few times a second."""
+        source = self._console.source
+        while True:
+            if source.generation != self._generation:
+                await self._begin()
+            content: dict[str, Any] = {
+                "is": "state",
+                **source.state,
+                "pilots": self._console.pilots.state(self),
+            }
+            if isinstance(source, Live):
+                self._lines, lines = source.entries_after(self._lines)
+                content["log"] = [entry.as_json() for entry in lines]
+                content["card"] = self._console.card()
+            await self._tell(content)
+            await asyncio.sleep(_STATE_S)
+
+    async def _begin(self) -> None:
+        """Describe a session that this page has not shown yet."""
+        generation = self._console.source.generation
+        stage = await self._console.stage()
+        self._generation = generation
+        self._sent, self._surfaces, self._stage = {}, set(), stage
+        described = {} if stage is None else stage.describe()
+        await self._tell(
+            {
+                "is": "session",
+                "kind": self._console.source.kind,
+                "role": self._role,
+                "generation": generation,
+                **described,
+            }
+        )
+        self._want()
+
+    def _want(self) -> None:
+        stage = self._stage
+        if stage is not None:
+            pictures = stage.pictures if self._show.pictures else ()
+            numbers = (name for name in self._show.numbers if name in stage.numbers)
+            self._console.want(self, stage.shown.union(pictures, numbers))
+
+    async def _frames(self) -> None:
+        live = self._console.source.kind == "live"
+        while True:
+            if live:
+                await asyncio.sleep(_FRAME_S)
+            else:
+                await self._changed.wait()
+                self._changed.clear()
+            if self._stage is None or self._number - self._acknowledged >= _MOST_WAITING:
+                continue
+            try:
+                parts = [*self._parts(self._stage)]
+            except TrocarError as error:
+                await self._tell({"is": "trouble", "text": str(error)[:500]})
+                await asyncio.sleep(1.0)
+                continue
+            if parts:
+                self._number += 1
+                time_ns = max((value.time_ns for value in self._sent.values()), default=0)
+                at = time_ns if self._at_ns is None else self._at_ns
+                await self._socket.send_bytes(frame(self._number, at, parts))
+
+    def _parts(self, stage: Stage) -> Iterator[Section]:
+        """Yield what has changed since the last frame."""
+        for participant in stage.scenes:
+            values = {name: value for name in stage.inputs(participant) if (value := self._newest(name))}
+            if values and self._are_new(values):
+                yield self._console.poses(stage, participant, values)
+        for name in stage.surfaces:
+            if name not in self._surfaces:
+                first = self._console.source.first(name)
+                surface = None if first is None else stage.surface(name, first)
+                if surface is None:
+                    continue
+                self._surfaces.add(name)
+                yield surface
+            yield from self._changed_section(stage, name)
+        for bond in stage.arrows:
+            place, force = self._newest(bond.place), self._newest(bond.force)
+            if place and force and self._are_new({bond.place: place, bond.force: force}, "arrows "):
+                yield stage.arrow(bond, place, force)
+        for name in stage.pictures if self._show.pictures else ():
+            yield from self._changed_section(stage, name)
+        for index, name in enumerate(self._show.numbers):
+            value = self._newest(name) if name in stage.numbers else None
+            if value is not None and self._are_new({name: value}):
+                yield stage.sample(index, name, value)
+
+    def _changed_section(self, stage: Stage, name: str) -> Iterator[Section]:
+        value = self._newest(name)
+        if value is not None and self._are_new({name: value}):
+            yield self._console.section(stage, name, value)
+
+    def _newest(self, name: str) -> Value | None:
+        return self._console.source.newest(name, self._at_ns)
+
+    def _are_new(self, values: dict[str, Value], what: str = "") -> bool:
+        """Return whether one of these was not sent before, and take them as sent; `what`: as what."""
+        new = any(self._sent.get(what + name) != value for name, value in values.items())
+        if new:
+            self._sent.update({what + name: value for name, value in values.items()})
+        return new

@@ -1,0 +1,87 @@
+"""Who leads what: at most one page a device, by a lease that ends with its page or by its silence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from time import monotonic
+from typing import Any
+
+from schemas.errors import MessageError, did_you_mean
+from webconsole.commands import Hand
+
+__all__ = ["Pilots"]
+
+LEASE_S = 3.0
+"""A page that leads and sends nothing for this long leads no more."""
+
+
+class Pilots:
+    """The devices that pages may lead, and the page that leads each."""
+
+    def __init__(self) -> None:
+        self._devices: dict[str, Callable[[Hand | None], None]] = {}
+        self._pages: dict[str, object] = {}
+        self._heard_s: dict[str, float] = {}
+        self._numbers: dict[str, int] = {}
+        self._people: dict[object, int] = {}
+
+    def offer(self, device: str, take: Callable[[Hand | None], None]) -> None:
+        """Let pages lead a device; `take` gets what they ask of it, and None when no page leads."""
+        self._devices[device] = take
+
+    def keep(self, devices: Collection[str]) -> None:
+        """Offer no others than these: another session is shown."""
+        for device in self._devices.keys() - set(devices):
+            if device in self._pages:
+                self._release(device)
+            del self._devices[device]
+
+    def lead(self, page: object, device: str) -> None:
+        """Make `page` the pilot of `device`; raises MessageError if there is none, or it has a pilot."""
+        if device not in self._devices:
+            raise MessageError(
+                f"no device '{device:.80}' can be led from a page.{did_you_mean(device, self._devices)}"
+            )
+        self._expire()
+        holder = self._pages.get(device)
+        if holder is not None and holder is not page:
+            raise MessageError(f"page {self._number_of(holder)} leads '{device}': it must leave first")
+        self.leave(page)
+        self._pages[device], self._heard_s[device], self._numbers[device] = page, monotonic(), -1
+
+    def leave(self, page: object) -> None:
+        """Let `page` lead nothing."""
+        for device in [name for name, holder in self._pages.items() if holder is page]:
+            self._release(device)
+
+    def take(self, page: object, hand: Hand) -> None:
+        """Hand what a page asks to the device that it leads; raises MessageError if it leads none."""
+        device = next((name for name, holder in self._pages.items() if holder is page), None)
+        if device is None:
+            raise MessageError("this page leads no device")
+        if hand.number <= self._numbers[device]:
+            raise MessageError(f"input {hand.number} is old: {self._numbers[device]} was here")
+        self._numbers[device], self._heard_s[device] = hand.number, monotonic()
+        self._devices[device](hand)
+
+    def state(self, page: object) -> list[dict[str, Any]]:
+        """Return each device and who leads it, as `page` sees it, ready for JSON."""
+        self._expire()
+        rows: list[dict[str, Any]] = []
+        for device in self._devices:
+            holder = self._pages.get(device)
+            who = "" if holder is None else "you" if holder is page else f"page {self._number_of(holder)}"
+            rows.append({"device": device, "pilot": who})
+        return rows
+
+    def _expire(self) -> None:
+        now = monotonic()
+        for device in [name for name in self._pages if now - self._heard_s[name] > LEASE_S]:
+            self._release(device)
+
+    def _release(self, device: str) -> None:
+        del self._pages[device]
+        self._devices[device](None)
+
+    def _number_of(self, page: object) -> int:
+        return self._people.setdefault(page, len(self._people) + 1)

@@ -1,0 +1,174 @@
+"""A recording as what a page shows: any instant of it, by its indexes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property, lru_cache
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from hub.recording.bag import output_port
+from hub.recording.moments import Moments
+from hub.recording.recording import Recording
+from hub.recording.series import Series
+from schemas.errors import RecordingError
+from schemas.ports import Port
+from schemas.scenario import Scenario
+from schemas.trocar_msgs import SessionStatus
+from schemas.vectors import Vector
+from webconsole.log import LOGGED, Entry, entries_of
+from webconsole.source import Outlet, Value
+
+__all__ = ["Recorded"]
+
+_SERIES_KEPT = 16
+_CONTACT_N = 0.02
+"""A force above it is a contact: twice what a step of the recorded hand makes in free motion."""
+
+
+class Recorded:
+    """The source of a page that shows a recording."""
+
+    kind = "recording"
+    generation = 1
+
+    def __init__(self, path: Path) -> None:
+        """Open the recording; raises RecordingError if it is not one of a session."""
+        self.recording = Recording(path)
+        self.scenario: Scenario | None = self.recording.scenario()
+        self._moments = Moments(self.recording)
+        self._lock = Lock()
+        self._topics: dict[str, str] = {}
+        self.outlets = tuple(self._find_outlets())
+        self._series = lru_cache(maxsize=_SERIES_KEPT)(self._read_series)
+
+    def _find_outlets(self) -> Iterator[Outlet]:
+        """Yield the recorded outputs: as they were declared, else as their first messages show them."""
+        recorded = self.recording
+        declared: dict[str, Port] = {}
+        if "plan.json" in recorded.attachments:
+            for planned in recorded.plan().participants.values():
+                declared |= {f"{planned.name}.{port.name}": port for port in planned.ports}
+        for name, type_name in recorded.ports.items():
+            series = recorded[name]
+            first = next(recorded.messages(series.topic), None)
+            if first is None:
+                continue
+            participant, _, port_name = name.partition(".")
+            self._topics[name] = series.topic
+            port = declared.get(name)
+            if port is None or port.type != type_name:
+                port = output_port(port_name, type_name, first.payload)
+            yield Outlet(participant, port)
+
+    @cached_property
+    def state(self) -> Mapping[str, Any]:
+        """Name of the session, and when the recording begins and ends (s)."""
+        start, end = self._moments.span_ns
+        statuses = [status for _, status in self.recording.statuses()]
+        last: SessionStatus | None = statuses[-1] if statuses else None
+        return {
+            "session": self.recording.session(),
+            "state": "recording" if last is None or last.state == "done" else f"recording, {last.state}",
+            "file": str(self.recording.file),
+            "start": start / 1e9,
+            "end": end / 1e9,
+            "late": 0 if last is None else last.late_steps,
+            "dropped": 0 if last is None else last.dropped_messages,
+            "detail": "" if last is None else last.detail,
+        }
+
+    def want(self, names: frozenset[str]) -> None:
+        """Nothing has to be asked for."""
+
+    def newest(self, name: str, time_ns: int | None) -> Value | None:
+        """Return the newest message of an outlet up to a simulated time, by default the end."""
+        found = self._moments.newest(
+            self._topics[name], self._moments.span_ns[1] if time_ns is None else time_ns
+        )
+        return None if found is None else Value(found.time_ns, found.payload)
+
+    def first(self, name: str) -> Value | None:
+        """Return the first message of an outlet."""
+        found = next(self.recording.messages(self._topics[name]), None)
+        return None if found is None else Value(found.time_ns, found.payload)
+
+    def series(self, name: str, start_s: float, end_s: float, buckets: int) -> tuple[list[str], Vector]:
+        """Return columns and rows of a numeric outlet between two times, shape (n, 1 + columns).
+
+        The first number of a row is the time, s. Of more values than two for each bucket, the least and the
+        greatest of each column in each bucket are kept, so that no peak is lost. Raises RecordingError.
+        """
+        with self._lock:
+            series = self._series(name)
+            times, values = series.time, series.values
+        if not len(times):
+            return [], np.zeros((0, 1))
+        columns = list(series.columns) if values.shape[1] > 1 else [""]
+        first, last = np.searchsorted(times, [start_s, end_s])
+        first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines go on beyond the plot
+        return columns, reduced(times[first:last], values[first:last], buckets)
+
+    def _read_series(self, name: str) -> Series:
+        if name not in self.recording:
+            raise RecordingError(f"'{self.recording.file}' has no port '{name:.80}'")
+        series = self.recording[name]
+        series.values  # noqa: B018  # read it here, within the lock
+        return series
+
+    @cached_property
+    def events(self) -> list[Entry]:
+        """What happened: in tasks, with tissue, to devices, and when inputs were lost; by time."""
+        found = [*self._messages(), *self._contacts(), *self._stale()]
+        return sorted(found, key=lambda one: one.time_s)
+
+    def _messages(self) -> Iterator[Entry]:
+        for outlet in self.outlets:
+            if outlet.port.type not in LOGGED:
+                continue
+            for message in self.recording.messages(self._topics[outlet.name]):
+                yield from entries_of(outlet, Value(message.time_ns, message.payload))
+
+    def _contacts(self) -> Iterator[Entry]:
+        """Yield when something was touched and let go: the wrench of a bond's force side."""
+        for bond in self.scenario.bonds if self.scenario else ():
+            name = f"{bond.force}/wrench"
+            if name not in self.recording:
+                continue
+            series = self._series(name)
+            force = np.linalg.norm(series.values[:, :3], axis=1)
+            touches = force > _CONTACT_N
+            for at in np.flatnonzero(touches[1:] != touches[:-1]) + 1:
+                text = f"contact, {force[at]:.2g} N" if touches[at] else "contact ends"
+                yield Entry(float(series.time[at]), "info", name, text)
+
+    def _stale(self) -> Iterator[Entry]:
+        """Yield when a device's samples ceased and when they came back."""
+        stale: dict[str, bool] = {}
+        for grant in self.recording.grants():
+            for sample in grant.inlets:
+                name = f"{sample.participant}.{sample.port}"
+                if stale.get(name, False) != sample.stale:
+                    stale[name] = sample.stale
+                    text = "is stale: the arm holds" if sample.stale else "is there again"
+                    yield Entry(grant.start_ns / 1e9, "warn" if sample.stale else "info", name, text)
+
+    def close(self) -> None:
+        """Files are opened for each look alone."""
+
+
+def reduced(times: Vector, values: Vector, buckets: int) -> Vector:
+    """Return rows of time and values, shape (n, 1 + columns), with least and greatest of each bucket."""
+    count = len(times)
+    if count <= 2 * buckets:
+        return np.column_stack([times, values])
+    edges = np.linspace(0, count, buckets + 1).astype(np.int64)[:-1]
+    low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
+    rows = np.empty((2 * buckets, 1 + values.shape[1]))
+    middles = np.append(edges[1:], count)
+    rows[0::2, 0], rows[1::2, 0] = times[edges], times[(edges + middles) // 2]
+    rows[0::2, 1:], rows[1::2, 1:] = low, high
+    return rows

@@ -1,0 +1,87 @@
+"""A server from start to end: its source, its link, and the browser that opens it."""
+
+from __future__ import annotations
+
+import logging
+import webbrowser
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hub.command_line.display import console as terminal
+from hub.hosting.end_with_parent import end_with_parent
+from hub.recording.recover import recover
+from schemas.errors import CutShortError
+from webconsole.console import Console
+from webconsole.gate import Role
+from webconsole.hosted import HostedDevices
+from webconsole.live import Live
+from webconsole.pilot import Pilots
+from webconsole.recorded import Recorded
+from webconsole.server import Server, free_socket
+
+__all__ = ["opened_recording", "serve"]
+
+log = logging.getLogger(__name__)
+
+
+def serve(
+    recording: Path | None,
+    *,
+    endpoint: str | None = None,
+    session: str | None = None,
+    port: int | None = None,
+    browse: bool = True,
+    role: Role = "operator",
+    parent: int | None = None,
+) -> None:
+    """Serve the page of a recording, or of a running session, until Ctrl-C.
+
+    Args:
+        recording: The recording; None: a running session.
+        endpoint: Where its hub listens; None: any hub of this user on this machine.
+        session: The name of the session; None: the first that is found.
+        port: On loopback; None: a free one.
+        browse: Open the page in a browser.
+        role: What the holder of the printed link may do.
+        parent: The process of the hub, with which this one ends.
+
+    Raises RecordingError if there is no such recording, ConnectError if no port is free.
+    """
+    if parent is not None:
+        end_with_parent(parent)
+    with ExitStack() as stack:
+        source = Live(endpoint, session, parent) if recording is None else opened_recording(recording, stack)
+        _serve(source, port, role, browse=browse)
+
+
+def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
+    """Return a recording; of one that was cut short, what is whole, for as long as `stack` is open."""
+    try:
+        return Recorded(recording)
+    except CutShortError:
+        whole = Path(stack.enter_context(TemporaryDirectory()), recording.stem)
+        saved = recover(recording, whole)
+        log.warning("'%s' was cut short: it is shown up to %g s", recording, saved.end_ns / 1e9)
+        return Recorded(whole)
+
+
+def _serve(source: Live | Recorded, port: int | None, role: Role, *, browse: bool) -> None:
+    pilots = Pilots()
+    listening = free_socket(port)
+    server = Server(Console(source, pilots), listening)
+    link = f"http://127.0.0.1:{server.port}{server.gate.invite(role)}"
+    hosted = HostedDevices(pilots)
+    if isinstance(source, Live):
+        source.joined = hosted.join
+        source.start()
+
+    def started() -> None:
+        terminal.print(f"the page is at {link}", markup=False, soft_wrap=True)
+        if browse:
+            webbrowser.open(link)
+
+    try:
+        server.run(started)
+    finally:
+        hosted.close()

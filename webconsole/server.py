@@ -1,0 +1,157 @@
+"""The server of the page: files, scenes, series of a recording, and a WebSocket for each page."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import logging
+import socket
+from collections.abc import Callable
+from math import isfinite
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from schemas.errors import ConnectError, TrocarError
+from webconsole.assets import asset, compressed
+from webconsole.commands import MOST_BYTES
+from webconsole.console import Console
+from webconsole.gate import Gate
+from webconsole.page import Page
+
+__all__ = ["Server", "free_socket"]
+
+log = logging.getLogger(__name__)
+
+FIRST_PORT, _PORTS = 8470, 32
+_MOST_PAGES = 16
+_MOST_BUCKETS = 4000
+_BINARY = "application/octet-stream"
+
+
+def free_socket(port: int | None = None) -> socket.socket:
+    """Return a socket that listens on loopback at `port`, by default at 8470 or the next free one.
+
+    Raises ConnectError if there is none.
+    """
+    tried = range(FIRST_PORT, FIRST_PORT + _PORTS) if port is None else (port,)
+    for number in tried:
+        found = socket.socket()
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            found.bind(("127.0.0.1", number))
+            found.listen()
+        except OSError as error:
+            found.close()
+            log.debug("port %d: %s", number, error)
+            continue
+        if port is None and number != FIRST_PORT:
+            log.info("port %d is taken: the page is at %d", FIRST_PORT, number)
+        return found
+    raise ConnectError(
+        f"the page finds no free port: {', '.join(map(str, tried))} are taken; name another one with --port"
+    )
+
+
+class Server:
+    """Serves the pages of one console on a socket."""
+
+    def __init__(self, console: Console, listening: socket.socket) -> None:
+        self._console, self._socket = console, listening
+        self.port: int = listening.getsockname()[1]
+        self._pages = 0
+        app = Starlette(
+            routes=[
+                Route("/", asset),
+                Route("/web/{name:path}", asset),
+                Route("/scene", self._scene),
+                Route("/series", self._series),
+                Route("/events", self._events),
+                Route("/sessions", self._sessions),
+                WebSocketRoute("/page", self._page),
+            ]
+        )
+        self.gate = Gate(app, self.port)
+        self._uvicorn = uvicorn.Server(
+            uvicorn.Config(
+                self.gate,
+                log_level="warning",
+                access_log=False,
+                lifespan="off",
+                ws="websockets-sansio",
+                ws_max_size=MOST_BYTES,
+                ws_per_message_deflate=False,
+                ws_ping_interval=5.0,
+                ws_ping_timeout=20.0,
+                timeout_graceful_shutdown=1,
+                server_header=False,
+            )
+        )
+
+    def run(self, started: Callable[[], None] = lambda: None) -> None:
+        """Serve until Ctrl-C or SIGTERM; `started` is called before the first request."""
+        started()
+        try:
+            self._uvicorn.run(sockets=[self._socket])
+        finally:
+            self._console.source.close()
+            self._socket.close()
+
+    def stop(self) -> None:
+        """Let `run` return soon; from any thread."""
+        self._uvicorn.should_exit = True
+
+    async def _page(self, websocket: WebSocket) -> None:
+        if self._pages >= _MOST_PAGES:
+            await websocket.close(1013, f"{_MOST_PAGES} pages are open already")
+            return
+        self._pages += 1
+        try:
+            await Page(websocket, websocket.state.role, self._console, self.gate).run()
+        finally:
+            self._pages -= 1
+
+    async def _scene(self, _request: Request) -> Response:
+        stage = await self._console.stage()
+        if stage is None:
+            return PlainTextResponse("no session\n", status_code=404)
+        return compressed(gzip.compress(stage.geometry, 5, mtime=0), _BINARY)
+
+    async def _series(self, request: Request) -> Response:
+        """Answer with the rows of a numeric port of a recording, f64; their columns are in a header."""
+        query = request.query_params
+        try:
+            start, end = float(query.get("from", "0")), float(query.get("to", "inf"))
+            buckets = min(int(query.get("buckets", "1000")), _MOST_BUCKETS)
+            if buckets < 1 or not isfinite(start):
+                raise ValueError(f"from {start}, {buckets} buckets")
+            recorded = self._console.recorded()
+            columns, rows = await asyncio.to_thread(
+                recorded.series, query.get("port", ""), start, end, buckets
+            )
+        except (TrocarError, ValueError) as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+        return Response(
+            rows.astype("<f8").tobytes(), media_type=_BINARY, headers={"X-Width": str(len(columns) + 1)}
+        )
+
+    async def _events(self, _request: Request) -> Response:
+        """Answer with what happened in a recording."""
+        try:
+            recorded = self._console.recorded()
+            found = await asyncio.to_thread(lambda: recorded.events)
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+        return JSONResponse([one.as_json() for one in found])
+
+    async def _sessions(self, _request: Request) -> Response:
+        """Answer with the sessions that run on this machine."""
+        try:
+            live = self._console.live()
+            return JSONResponse(await asyncio.to_thread(live.sessions))
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)

@@ -1,0 +1,74 @@
+"""Where a page's values come from: a running session or a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from schemas.ports import Port
+from schemas.scenario import Scenario
+
+__all__ = ["Outlet", "Source", "Value"]
+
+
+class Outlet(NamedTuple):
+    """An output port of a participant."""
+
+    participant: str
+    port: Port
+    live: bool = True
+    """Whether its values can be seen while the session runs."""
+
+    @property
+    def name(self) -> str:
+        """`participant.port`, as in a scenario."""
+        return f"{self.participant}.{self.port.name}"
+
+
+class Value(NamedTuple):
+    """The newest message of a port."""
+
+    time_ns: int
+    """Simulated time at which it is valid."""
+    payload: bytes
+    """As CDR."""
+
+
+class Source(Protocol):
+    """What is shown on the pages of one server."""
+
+    kind: str
+    """`live` or `recording`."""
+    generation: int
+    """Counts the sessions that were shown: another one has other ports and another scene."""
+
+    @property
+    def scenario(self) -> Scenario | None:
+        """The scenario; None while there is no session."""
+        ...
+
+    @property
+    def outlets(self) -> Sequence[Outlet]:
+        """The output ports, by participant, in the order in which they are declared."""
+        ...
+
+    @property
+    def state(self) -> Mapping[str, Any]:
+        """What the page's head shows, ready for JSON: name, state, times, counts."""
+        ...
+
+    def want(self, names: frozenset[str]) -> None:
+        """Receive from now on the values of these outlets, by name, and no others."""
+        ...
+
+    def newest(self, name: str, time_ns: int | None) -> Value | None:
+        """Return the newest value of an outlet at a simulated time; None: now, as for every live session."""
+        ...
+
+    def first(self, name: str) -> Value | None:
+        """Return the value of an outlet at the beginning, which alone holds the surface of an organ."""
+        ...
+
+    def close(self) -> None:
+        """Receive nothing more."""
+        ...

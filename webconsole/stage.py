@@ -1,0 +1,211 @@
+"""What of a session can be drawn: the scenes of its participants, soft surfaces, pictures, numeric ports."""
+
+from __future__ import annotations
+
+import json
+import logging
+import struct
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from importlib.metadata import entry_points
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hub.participant.view import Rgb, Scene
+from schemas.codec import decode
+from schemas.ros import CompressedImage
+from schemas.scenario import Scenario
+from schemas.trocar_msgs import SoftBodyState
+from schemas.vectors import VectorCodec, has_vector
+from webconsole.arrows import BondArrows, bond_arrows
+from webconsole.frame import Section, SectionKind
+from webconsole.source import Outlet, Value
+
+__all__ = ["GROUP", "Stage"]
+
+log = logging.getLogger(__name__)
+
+GROUP = "trocar.scenes"
+"""Entry-point group: kind of participant -> what makes its scene of its parameters."""
+_LENGTH = struct.Struct("<I")
+_GRID_M = 2.0**-16
+"""Vertices are rounded to 15 um: it is not seen, and zeros at their ends compress."""
+
+
+class Stage:
+    """All that a page may show of one session.
+
+    A scene that cannot be made is left out, and `notes` says why: plots and pictures work without it.
+    """
+
+    def __init__(self, scenario: Scenario, outlets: Sequence[Outlet]) -> None:
+        self.notes: list[str] = []
+        self.scenes: dict[str, Scene] = {}
+        """By participant, those with something to draw."""
+        self._outlets = {one.name: one for one in outlets}
+        colours: dict[str, Rgb] = {}
+        for participant, spec in scenario.participants.items():
+            scene = self._scene(participant, spec.kind, spec.params)
+            if scene is not None:
+                colours |= {f"{participant}.{port}": rgb for port, rgb in scene.surfaces.items()}
+                if scene.bodies:
+                    self.scenes[participant] = scene
+        signals = [one for one in outlets if one.port.variability == "signal"]
+        self.surfaces = {
+            one.name: colours.get(one.name, (0.8, 0.38, 0.33))
+            for one in signals
+            if one.port.type == SoftBodyState.ros_type
+        }
+        """Colour of each soft surface, by the outlet of its nodes."""
+        self.pictures = tuple(one.name for one in outlets if one.port.type == CompressedImage.ros_type)
+        self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
+        """The numeric outlets."""
+        self._codecs = {
+            f"{participant}.{port}": self.numbers[f"{participant}.{port}"]
+            for participant, scene in self.scenes.items()
+            for port in scene.inputs
+            if f"{participant}.{port}" in self.numbers
+        }
+        self.arrows = bond_arrows(scenario, self.numbers)
+        of_arrows = (name for bond in self.arrows for name in bond)
+        self.shown = frozenset((*self._codecs, *self.surfaces, *of_arrows))
+        """The outlets that the scene itself needs."""
+
+    def _scene(self, participant: str, kind: str, params: Mapping[str, Any]) -> Scene | None:
+        for entry in entry_points(group=GROUP, name=kind):
+            try:
+                make: Callable[[Mapping[str, Any]], Scene] = entry.load()
+                return make(params)
+            except Exception as error:  # noqa: BLE001  # a plug-in may raise anything; the page says what
+                self.notes.append(
+                    f"'{participant}' (kind {kind}) cannot be drawn: {type(error).__name__}:"
+                    f" {' '.join(str(error).split())[:300]}"
+                )
+                log.warning("%s", self.notes[-1])
+        return None
+
+    def poses(self, participant: str, values: Mapping[str, Value]) -> NDArray[np.float32]:
+        """Return the poses of a participant's bodies, shape (bodies, 7), for its newest values by outlet.
+
+        Raises MessageError if one is not valid.
+        """
+        scene = self.scenes[participant]
+        return scene.poses(
+            {
+                port: self._codecs[name].decode(values[name].payload)
+                for port in scene.inputs
+                if (name := f"{participant}.{port}") in self._codecs
+            }
+        )
+
+    def inputs(self, participant: str) -> tuple[str, ...]:
+        """Return the outlets that the poses of a participant are made of."""
+        return tuple(f"{participant}.{port}" for port in self.scenes[participant].inputs)
+
+    def section(self, name: str, value: Value) -> Section:
+        """Return what a frame has of an outlet that is a surface or a picture."""
+        if name in self.surfaces:
+            nodes = decode(SoftBodyState, value.payload).nodes_m
+            return Section(SectionKind.NODES, [*self.surfaces].index(name), nodes.astype("<f4").tobytes())
+        picture = decode(CompressedImage, value.payload)
+        return Section(SectionKind.PICTURE, self.pictures.index(name), picture.data.tobytes())
+
+    def surface(self, name: str, first: Value) -> Section | None:
+        """Return the triangles of a soft surface; None if this message has none."""
+        state = decode(SoftBodyState, first.payload)
+        if not state.triangles.size or state.triangles.max() >= state.nodes_m.size // 3:
+            return None
+        return Section(
+            SectionKind.SURFACE, [*self.surfaces].index(name), state.triangles.astype("<u4").tobytes()
+        )
+
+    def sample(self, index: int, name: str, value: Value) -> Section:
+        """Return time (s) and numbers of a numeric outlet; raises MessageError if they are not valid."""
+        numbers = self.numbers[name].decode(value.payload)
+        row = np.concatenate([[value.time_ns / 1e9], numbers])
+        return Section(SectionKind.SAMPLE, index, row.astype("<f8").tobytes())
+
+    def arrow(self, bond: BondArrows, place: Value, force: Value) -> Section:
+        """Return the arrows of a bond; raises MessageError if a value is not valid."""
+        vectors = (
+            self.numbers[name].decode(value.payload) for name, value in zip(bond, (place, force), strict=True)
+        )
+        rows = bond.rows(*vectors)
+        return Section(SectionKind.ARROWS, self.arrows.index(bond), rows.astype("<f4").tobytes())
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page must know before its first frame, ready for JSON."""
+        return {
+            "scenes": [*self.scenes],
+            "surfaces": [{"name": name, "colour": rgb} for name, rgb in self.surfaces.items()],
+            "pictures": list(self.pictures),
+            "numbers": [
+                {
+                    "name": name,
+                    "columns": _columns(codec),
+                    "unit": codec.port.unit,
+                    "type": codec.port.type,
+                    "frame": codec.port.frame,
+                    "text": codec.port.description,
+                    "live": self._outlets[name].live,
+                }
+                for name, codec in self.numbers.items()
+            ],
+            "notes": self.notes,
+        }
+
+    @cached_property
+    def geometry(self) -> bytes:
+        """The scenes as a page loads them once: length of the text (u32), JSON, zeros to 4, then numbers.
+
+        In the JSON, `at` is where in the numbers, in bytes, and `count` how many.
+        """
+        blob, described = bytearray(), list[dict[str, Any]]()
+        for participant, scene in self.scenes.items():
+            described.append(
+                {
+                    "participant": participant,
+                    "bodies": list(scene.bodies),
+                    "parts": list(_parts(scene, blob)),
+                    "frames": [
+                        {"name": one.name, "body": one.body, "pose": list(one.pose)} for one in scene.frames
+                    ],
+                    "cameras": [
+                        {
+                            "name": one.name,
+                            "body": one.body,
+                            "pose": list(one.pose),
+                            "fieldOfView": one.field_of_view,
+                        }
+                        for one in scene.cameras
+                    ],
+                }
+            )
+        text = json.dumps(described, separators=(",", ":")).encode()
+        text += b" " * (-(len(text) + _LENGTH.size) % 4)
+        return _LENGTH.pack(len(text)) + text + bytes(blob)
+
+
+def _parts(scene: Scene, blob: bytearray) -> Iterator[dict[str, Any]]:
+    for part in scene.parts:
+        row: dict[str, Any] = {"body": part.body, "colour": list(part.colour)}
+        vertices = np.round(part.vertices / _GRID_M) * _GRID_M
+        for key, array in (("vertices", vertices.astype("<f4")), ("faces", part.faces.astype("<u4"))):
+            row[key] = {"at": len(blob), "count": array.size}
+            blob += array.tobytes()
+        yield row
+
+
+def _columns(codec: VectorCodec) -> list[str]:
+    """Return the name of each number: `position.x`, `position.yaw`, `data.0`; one number alone has ''."""
+    names = [f"{i}" for i in range(codec.size)]
+    for field, block in codec.fields.items():
+        if "." in field and block.stop - block.start == 1 and field.count(".") == 1:
+            names[block.start] = field
+    joints = codec.port.names
+    for i, field in enumerate(codec.port.fields if joints else ()):
+        for j, joint in enumerate(joints):
+            names[i * len(joints) + j] = f"{field}.{joint}"
+    return [""] if codec.size == 1 else names

@@ -1,0 +1,56 @@
+// The WebSocket to the server: frames, states and answers in, commands and acknowledgements out.
+// webconsole/frame.py has the layout of the frames.
+
+const MAGIC = 0x46435254 // "TRCF", little-endian
+const HEAD = 24
+export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6
+
+export function parseFrame(buffer) {
+  const view = new DataView(buffer)
+  if (buffer.byteLength < HEAD || view.getUint32(0, true) !== MAGIC || view.getUint16(4, true) !== 1) return null
+  const sections = []
+  let at = HEAD
+  for (let left = view.getUint16(6, true); left > 0; left--) {
+    const kind = view.getUint16(at, true), index = view.getUint16(at + 2, true), size = view.getUint32(at + 4, true)
+    sections.push({ kind, index, at: at + 8, size })
+    at += 8 + size + ((8 - (size % 8)) % 8)
+  }
+  return { time: Number(view.getBigInt64(8, true)) / 1e9, number: view.getUint32(16, true), sections, buffer }
+}
+
+export class Link {
+  constructor(handlers) {
+    this.handlers = handlers
+    this.ack = new Uint32Array(1)
+    this.open()
+  }
+
+  open() {
+    this.socket = new WebSocket(`ws://${location.host}/page`)
+    this.socket.binaryType = "arraybuffer"
+    this.socket.onopen = () => this.handlers.opened()
+    this.socket.onmessage = ({ data }) => {
+      if (typeof data !== "string") {
+        const frame = parseFrame(data)
+        if (frame) this.handlers.frame(frame)
+        return
+      }
+      const message = JSON.parse(data)
+      this.handlers[message.is]?.(message)
+    }
+    this.socket.onclose = () => {
+      this.handlers.closed()
+      setTimeout(() => this.open(), 1000)
+    }
+  }
+
+  get ready() { return this.socket.readyState === WebSocket.OPEN }
+
+  send(command) { if (this.ready) this.socket.send(JSON.stringify(command)) }
+
+  acknowledge(number) {
+    if (!this.ready) return
+    this.ack[0] = number
+    this.socket.send(this.ack)
+  }
+}

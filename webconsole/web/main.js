@@ -1,0 +1,190 @@
+// The page: it puts together link, scene, pictures, plots, log, timeline and driving.
+
+import { ARROWS, Link, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { Head } from "./head.js"
+import { Log } from "./log.js"
+import { Plots } from "./plots.js"
+import { Pilot } from "./pilot.js"
+import { Timeline } from "./timeline.js"
+import { showCard } from "./card.js"
+
+const $ = (id) => document.getElementById(id)
+const REFRESH_MS = 100, STILL_MS = 400
+
+let scene = null, session = null, waiting = [], drawn = 0, dirty = true, refreshed = 0
+const eyes = new Map()
+
+const link = new Link({
+  opened() { head.banner("") },
+  closed() {
+    pilot.lost()
+    head.banner("The server of this page does not answer. The page comes back by itself.")
+    waiting = []
+  },
+  frame(frame) { waiting.push(frame); dirty = true },
+  session: begin,
+  state(state) {
+    head.show(state)
+    log.add(state.log)
+    showCard($("card"), state.card)
+    pilot.show(state.pilots, session?.role)
+    if (session?.kind === "recording") timeline.begin(state.start, state.end)
+  },
+  answer(answer) {
+    if (answer.error) log.add([{ time: lastTime, level: "warn", source: `page: ${answer.to || "message"}`, text: answer.error }])
+    else if (answer.path) share(answer)
+    pilot.answered(answer)
+  },
+  trouble({ text }) { log.add([{ time: lastTime, level: "warn", source: "page", text }]) },
+})
+let lastTime = 0
+const head = new Head(link)
+const pilot = new Pilot($("lead"), link)
+const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
+const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
+timeline.found = (events) => log.add(events, true)
+const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
+$("pictures").onchange = ask
+$("frames").onchange = () => scene?.frames($("frames").checked)
+
+function ask(again = false) {
+  const recorded = session?.kind === "recording"
+  link.send({ do: "show", numbers: recorded ? [] : plots.names, pictures: $("pictures").checked, again: again === true })
+}
+
+async function begin(described) {
+  session = described
+  head.begin(described)
+  log.clear()
+  for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
+  if (!described.numbers) return
+  showEyes(described.pictures)
+  plots.begin(described.numbers, described.kind === "recording")
+  await stage(described)
+  ask(true)
+  if (timeline.begun) timeline.go(timeline.time)
+}
+
+async function stage(described) {
+  if (!scene && !refused) await makeScene()
+  if (!scene) return
+  const answer = await fetch("/scene")
+  if (!answer.ok) return
+  scene.load(await answer.arrayBuffer(), described.surfaces)
+  scene.frames($("frames").checked)
+  const empty = described.scenes.length + described.surfaces.length === 0
+  $("no-scene").hidden = !empty
+  $("no-scene").textContent = empty ? "Nothing in this session has a scene to draw." : ""
+  showCameras()
+  dirty = true
+}
+
+let refused = false // the browser has no WebGL
+async function makeScene() {
+  try {
+    const { Scene } = await import("./scene.js")
+    scene = new Scene($("canvas"), () => { dirty = true })
+    scene.chosen = showCameras
+  } catch (error) {
+    refused = true
+    $("no-scene").hidden = false
+    $("no-scene").textContent =
+      `This browser draws no scene (${error.message}). Plots and pictures work; to mend it, switch on WebGL.`
+  }
+}
+
+function showCameras() {
+  const buttons = scene.choices.map((name) => {
+    const button = document.createElement("button")
+    button.textContent = name[0].toUpperCase() + name.slice(1)
+    button.setAttribute("role", "radio")
+    button.setAttribute("aria-checked", String(scene.choice === name))
+    button.onclick = () => scene.choose(name)
+    return button
+  })
+  $("cameras").replaceChildren(...buttons)
+}
+
+function showEyes(names) {
+  eyes.clear()
+  $("eyes").hidden = !names.length
+  const figures = names.map((name, index) => {
+    const figure = document.createElement("figure"), canvas = document.createElement("canvas")
+    const caption = document.createElement("figcaption")
+    caption.textContent = name.replace("/image_raw/compressed", "")
+    canvas.setAttribute("role", "img")
+    canvas.setAttribute("aria-label", `Picture of ${caption.textContent}`)
+    figure.append(canvas, caption)
+    eyes.set(index, { canvas, busy: false, next: null })
+    return figure
+  })
+  $("pictures-row").replaceChildren(...figures)
+}
+
+async function showPicture(eye, bytes) {
+  if (eye.busy) { eye.next = bytes; return }
+  eye.busy = true
+  try {
+    const picture = await createImageBitmap(new Blob([bytes]))
+    Object.assign(eye.canvas, { width: picture.width, height: picture.height })
+    eye.canvas.getContext("2d").drawImage(picture, 0, 0)
+    picture.close()
+  } catch { log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]) }
+  eye.busy = false
+  const next = eye.next
+  eye.next = null
+  if (next) showPicture(eye, next)
+}
+
+function apply(frame) {
+  lastTime = frame.time
+  for (const { kind, index, at, size } of frame.sections) {
+    if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
+    else if (kind === PICTURE) { if (eyes.has(index)) showPicture(eyes.get(index), new Uint8Array(frame.buffer, at, size)) }
+    else if (!scene) continue
+    else if (kind === POSES) scene.poses(index, new Float32Array(frame.buffer, at, size / 4))
+    else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
+    else if (kind === ARROWS) scene.arrows(index, new Float32Array(frame.buffer, at, size / 4))
+    else if (kind === NODES) scene.nodes(index, new Float32Array(frame.buffer, at, size / 4))
+  }
+}
+
+function share({ path, role }) {
+  const url = `${location.origin}${path}`
+  navigator.clipboard?.writeText(url).catch(() => {})
+  log.add([{ time: lastTime, level: "info", source: `link for a ${role}, once`, text: url }])
+  $("lines").scrollTop = $("lines").scrollHeight
+}
+
+let counted = 0, since = performance.now(), last = since, moved = since, drawing = false
+function draw(now) {
+  requestAnimationFrame(draw)
+  timeline.tick(now)
+  const frames = waiting
+  waiting = []
+  for (const frame of frames) apply(frame)
+  if (dirty) {
+    dirty = false
+    if (drawing) scene?.pace(now - last)
+    scene?.draw()
+    drawn++
+    drawing = true
+    moved = now
+  } else {
+    drawing = false
+    if (now - moved > STILL_MS) scene?.settle()
+  }
+  last = now
+  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length }
+  if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh() }
+  if (now - since > 1000) {
+    $("fps").textContent = String(Math.round((counted * 1000) / (now - since)))
+    counted = 0
+    since = now
+  }
+}
+requestAnimationFrame(draw)
+
+// For the tests and the benchmark: what this page has drawn.
+Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime },
+  get scene() { return scene }, get session() { return session } } })

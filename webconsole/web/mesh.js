@@ -1,0 +1,67 @@
+// Normals that are smooth where a surface is, and sharp where it has edges.
+
+// Split vertices where faces meet at more than the angle of `cosine`. Returns the index of the split vertices, and
+// for each of them the vertex that it was.
+export function creased(positions, faces, cosine) {
+  const normals = faceNormals(positions, faces)
+  const groups = new Map() // old vertex -> [{ vertex, nx, ny, nz }]
+  const index = new Uint32Array(faces.length), origin = []
+  for (let corner = 0; corner < faces.length; corner++) {
+    const vertex = faces[corner], f = 3 * Math.floor(corner / 3)
+    const nx = normals[f], ny = normals[f + 1], nz = normals[f + 2]
+    let at = groups.get(vertex)
+    if (!at) groups.set(vertex, (at = []))
+    let group = at.find((g) => {
+      const length = Math.hypot(g.nx, g.ny, g.nz) || 1
+      return (g.nx * nx + g.ny * ny + g.nz * nz) / length > cosine
+    })
+    if (!group) {
+      group = { vertex: origin.length, nx: 0, ny: 0, nz: 0 }
+      at.push(group)
+      origin.push(vertex)
+    }
+    group.nx += nx; group.ny += ny; group.nz += nz
+    index[corner] = group.vertex
+  }
+  return { index, origin: Uint32Array.from(origin) }
+}
+
+function faceNormals(positions, faces) {
+  const normals = new Float32Array(faces.length)
+  for (let f = 0; f < faces.length; f += 3) {
+    const [x, y, z] = cross(positions, faces[f], faces[f + 1], faces[f + 2])
+    const length = Math.hypot(x, y, z) || 1
+    normals[f] = x / length; normals[f + 1] = y / length; normals[f + 2] = z / length
+  }
+  return normals
+}
+
+function cross(p, a, b, c) {
+  a *= 3; b *= 3; c *= 3
+  const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2]
+  const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2]
+  return [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx]
+}
+
+// Write the normals of the vertices, from the areas of their faces, into `normals`.
+export function smooth(positions, index, normals) {
+  normals.fill(0)
+  for (let f = 0; f < index.length; f += 3) {
+    const n = cross(positions, index[f], index[f + 1], index[f + 2])
+    for (let corner = 0; corner < 3; corner++) {
+      const at = 3 * index[f + corner]
+      normals[at] += n[0]; normals[at + 1] += n[1]; normals[at + 2] += n[2]
+    }
+  }
+  for (let at = 0; at < normals.length; at += 3) {
+    const length = Math.hypot(normals[at], normals[at + 1], normals[at + 2]) || 1
+    normals[at] /= length; normals[at + 1] /= length; normals[at + 2] /= length
+  }
+}
+
+export function gathered(positions, origin, target) {
+  for (let i = 0; i < origin.length; i++) {
+    const from = 3 * origin[i], to = 3 * i
+    target[to] = positions[from]; target[to + 1] = positions[from + 1]; target[to + 2] = positions[from + 2]
+  }
+}

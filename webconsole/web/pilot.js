@@ -1,0 +1,198 @@
+// Driving: keys, a pad for the pointer and a gamepad lead one device, while this page is in front of its person.
+//
+// Inputs are sent by a timer of their own and at each change, whatever the drawing takes. When the page loses the
+// focus or is hidden, everything is let go and nothing more is sent: the device falls silent and the arm holds.
+
+const KEYS = {
+  w: ["ahead", { linear: [1, 0, 0] }], s: ["back", { linear: [-1, 0, 0] }],
+  a: ["left", { linear: [0, 1, 0] }], d: ["right", { linear: [0, -1, 0] }],
+  r: ["up", { linear: [0, 0, 1] }], f: ["down", { linear: [0, 0, -1] }],
+  arrowup: ["point up", { angular: [1, 0, 0] }], arrowdown: ["point down", { angular: [-1, 0, 0] }],
+  arrowleft: ["point left", { angular: [0, -1, 0] }], arrowright: ["point right", { angular: [0, 1, 0] }],
+  q: ["roll left", { angular: [0, 0, -1] }], e: ["roll right", { angular: [0, 0, 1] }],
+  " ": ["hold to move", { dead_man: true }],
+  c: ["close", { gripper: -1, jaw: true }], v: ["open", { gripper: 1 }],
+}
+const PERIOD_MS = 25
+const PAD_M_PER_PX = 0.0005
+const DEAD_ZONE = 0.24 // of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE, 7849 of 32767)
+
+export class Pilot {
+  constructor(panel, link) {
+    Object.assign(this, { panel, link })
+    this.device = null
+    this.number = 0
+    this.held = new Set()
+    this.drag = [0, 0, 0]
+    this.dragging = false
+    this.text = ""
+    addEventListener("keydown", (event) => this.key(event, true))
+    addEventListener("keyup", (event) => this.key(event, false))
+    addEventListener("blur", () => this.letGo())
+    document.addEventListener("visibilitychange", () => { if (document.hidden) this.letGo() })
+    setInterval(() => this.send(), PERIOD_MS)
+  }
+
+  get leading() { return this.device != null }
+
+  // `devices`: [{ device, pilot }] as the server sees them.
+  show(devices, role) {
+    const mine = devices?.find(({ pilot }) => pilot === "you")?.device ?? null
+    if (mine !== this.device) this.become(mine)
+    this.panel.hidden = !devices?.length || role === "viewer"
+    const text = JSON.stringify([devices, role, document.hasFocus()])
+    if (text === this.text || this.panel.hidden) return
+    this.text = text
+    this.build(devices)
+  }
+
+  become(device) {
+    this.device = device
+    this.drag = [0, 0, 0]
+    this.held.clear()
+    document.body.classList.toggle("leading", this.leading)
+  }
+
+  build(devices) {
+    this.panel.classList.toggle("leading", this.leading)
+    const rows = devices.map(({ device, pilot }) => {
+      const row = element("div", "row"), button = element("button")
+      button.textContent = pilot === "you" ? `Leave ${device}` : `Lead ${device}`
+      button.disabled = Boolean(pilot) && pilot !== "you"
+      button.onclick = () => {
+        button.blur() // the space bar is the dead-man from here on
+        this.link.send(pilot === "you" ? { do: "leave" } : { do: "lead", device })
+      }
+      const who = element("span")
+      who.textContent = pilot === "you" ? "you lead it" : pilot ? `${pilot} leads it` : "no page leads it"
+      row.append(button, who)
+      return row
+    })
+    if (this.leading) rows.push(...this.help())
+    this.panel.replaceChildren(...rows)
+    this.mark()
+  }
+
+  help() {
+    const state = element("div", "row"), dead = element("span", "pill"), focus = element("span")
+    dead.id = "dead-man"
+    focus.textContent = document.hasFocus() ? "" : "Click here: keys are read while this page has the focus."
+    state.append(dead, focus)
+    const keys = element("div", "keys")
+    for (const [key, [text]] of Object.entries(KEYS)) {
+      const one = element("span"), cap = element("kbd")
+      cap.textContent = key === " " ? "space" : key.replace("arrow", "arrow ")
+      one.append(cap, ` ${text}`)
+      keys.append(one)
+    }
+    const pad = element("div")
+    pad.id = "pad"
+    pad.setAttribute("role", "application")
+    pad.setAttribute("aria-label", "Pad: drag to move the instrument sideways and up; with Shift ahead")
+    pad.textContent = "drag to move; Shift: ahead"
+    this.listen(pad)
+    const row = element("div", "row")
+    row.append(pad, keys)
+    keys.style.flex = "1"
+    return [state, row]
+  }
+
+  listen(pad) {
+    let last = null
+    pad.onpointerdown = (event) => {
+      pad.setPointerCapture(event.pointerId)
+      last = [event.clientX, event.clientY]
+      this.dragging = true
+      this.send()
+    }
+    pad.onpointermove = (event) => {
+      if (!this.dragging || !last) return
+      const x = (event.clientX - last[0]) * PAD_M_PER_PX, y = (event.clientY - last[1]) * PAD_M_PER_PX
+      last = [event.clientX, event.clientY]
+      this.drag = event.shiftKey
+        ? [this.drag[0] - y, this.drag[1] - x, this.drag[2]]
+        : [this.drag[0], this.drag[1] - x, this.drag[2] - y]
+    }
+    pad.onpointerup = pad.onpointercancel = pad.onlostpointercapture = () => {
+      last = null
+      this.dragging = false
+      this.send()
+    }
+  }
+
+  key(event, down) {
+    const key = event.key.toLowerCase()
+    if (!this.leading || !(key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return
+    if (event.target.closest?.("input, select")) return
+    event.preventDefault()
+    if (event.repeat) return
+    if (down) this.held.add(key)
+    else this.held.delete(key)
+    this.send()
+  }
+
+  letGo() {
+    if (!this.leading) return
+    this.held.clear()
+    this.dragging = false
+    this.send(true)
+  }
+
+  lost() { this.become(null) }
+
+  answered({ to, device, error }) { if (to === "lead" && !error) this.become(device) }
+
+  wish() {
+    const wish = { linear: [0, 0, 0], angular: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false }
+    const add = (one) => {
+      for (const name of ["linear", "angular"]) one[name]?.forEach((share, i) => { wish[name][i] += share })
+      wish.gripper += one.gripper ?? 0
+      wish.dead_man ||= one.dead_man ?? false
+      wish.jaw ||= one.jaw ?? false
+    }
+    for (const key of this.held) add(KEYS[key][1])
+    const pad = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected && one.mapping === "standard")
+    if (pad) add(gamepad(pad))
+    const limit = (share) => Math.min(Math.max(share, -1), 1)
+    return { ...wish, linear: wish.linear.map(limit), angular: wish.angular.map(limit), gripper: limit(wish.gripper) }
+  }
+
+  // What is let go is sent at once; then nothing is, while the page is not in front.
+  send(last = false) {
+    if (!this.leading || (!last && (document.hidden || !document.hasFocus()))) return
+    const wish = this.wish()
+    if (last) wish.dead_man = false
+    this.link.send({ do: "hand", number: ++this.number, drag: this.drag, ...wish })
+    this.moving = wish.dead_man
+    this.mark()
+  }
+
+  mark() {
+    const dead = document.getElementById("dead-man")
+    if (!dead) return
+    const text = this.moving ? "moving: dead-man held" : "holding: the dead-man is let go"
+    if (dead.textContent !== text) dead.textContent = text
+    dead.classList.toggle("held", Boolean(this.moving))
+    document.getElementById("pad")?.classList.toggle("held", this.dragging)
+  }
+}
+
+// Buttons and axes of https://www.w3.org/TR/gamepad/#remapping, with the meaning they have for kind `keyboard`.
+function gamepad({ axes, buttons }) {
+  const axis = (i) => {
+    const value = axes[i] ?? 0, beyond = Math.max(0, Math.min(Math.abs(value), 1) - DEAD_ZONE) / (1 - DEAD_ZONE)
+    return value > 0 ? beyond : -beyond
+  }
+  const button = (i) => buttons[i]?.value ?? 0
+  return {
+    linear: [-axis(1), -axis(0), button(12) - button(13)],
+    angular: [-axis(3), axis(2), button(15) - button(14)],
+    gripper: button(6) - button(7), dead_man: button(4) > 0.5, jaw: button(7) > 0,
+  }
+}
+
+function element(name, className = "") {
+  const made = document.createElement(name)
+  if (className) made.className = className
+  return made
+}

@@ -1,0 +1,273 @@
+// The scene in three dimensions: bodies, soft surfaces, frames and cameras. It draws when something has changed.
+
+import * as THREE from "./vendor/three.module.js"
+import { Orbit } from "./orbit.js"
+import { creased, gathered, smooth } from "./mesh.js"
+
+const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
+const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5
+const FORCE = 0xf2b705, M_PER_N = 0.02, LONGEST_M = 0.08, LEAST_N = 0.005
+const FLIP = new THREE.Quaternion(1, 0, 0, 0) // from an optical frame (y down, z ahead) to three's camera (y up, -z ahead)
+
+export class Scene {
+  constructor(canvas, dirty) {
+    this.canvas = canvas
+    this.dirty = dirty
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "low-power" })
+    this.finest = this.ratio = Math.min(devicePixelRatio, 2)
+    this.renderer.setPixelRatio(this.ratio)
+    this.interval = 0
+    this.camera = new THREE.PerspectiveCamera(40, 1, 0.002, 50)
+    this.choice = "work"
+    this.orbit = new Orbit(canvas, (moved) => {
+      if (moved && this.choice === "endoscope") this.choose("work")
+      this.dirty()
+    })
+    this.world = new THREE.Scene()
+    this.world.add(new THREE.HemisphereLight(0xffffff, 0x8899a6, 1.7))
+    this.lamp = new THREE.DirectionalLight(0xffffff, 1.6)
+    this.world.add(this.lamp, this.lamp.target)
+    this.clear()
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ground())
+    this.ground()
+  }
+
+  ground() {
+    const colour = getComputedStyle(document.documentElement).getPropertyValue("--stage").trim()
+    this.world.background = new THREE.Color(colour)
+    this.dirty()
+  }
+
+  clear() {
+    for (const old of this.owned ?? []) {
+      this.world.remove(old)
+      old.traverse((one) => { one.geometry?.dispose(); one.material?.dispose() })
+    }
+    this.owned = []
+    this.bodies = [] // by scene: a group for each body
+    this.surfaces = []
+    this.axes = []
+    this.bonds = [] // arrows of each
+    this.cameras = [] // { name, group, pose, fieldOfView }
+    this.tips = [] // { name, group }
+    this.placed = false
+    this.focused = false
+  }
+
+  // `buffer` is what /scene answers: webconsole/stage.py, `geometry`.
+  load(buffer, surfaces) {
+    this.clear()
+    const size = new DataView(buffer).getUint32(0, true)
+    const text = new TextDecoder().decode(new Uint8Array(buffer, 4, size))
+    const start = 4 + size
+    for (const scene of JSON.parse(text)) this.add(scene, buffer, start)
+    this.surfaces = surfaces.map(({ colour }) => ({ colour, mesh: null, triangles: null }))
+    this.dirty()
+  }
+
+  add(scene, buffer, start) {
+    const groups = scene.bodies.map(() => new THREE.Group())
+    const materials = new Map()
+    for (const group of groups) { group.visible = false; this.own(group) }
+    for (const part of scene.parts) {
+      const positions = new Float32Array(buffer, start + part.vertices.at, part.vertices.count)
+      const faces = new Uint32Array(buffer, start + part.faces.at, part.faces.count)
+      const key = part.colour.join()
+      if (!materials.has(key)) materials.set(key, material(part.colour))
+      groups[part.body].add(new THREE.Mesh(geometry(positions, faces, SHARP), materials.get(key)))
+    }
+    for (const frame of scene.frames) {
+      const axes = new THREE.AxesHelper(frame.name.endsWith("tip") ? 0.012 : 0.06)
+      pose(axes, frame.pose)
+      axes.visible = false
+      groups[frame.body].add(axes)
+      this.axes.push(axes)
+      if (frame.name.endsWith("/tip")) this.tips.push({ name: frame.name.split("/")[0], axes })
+    }
+    for (const camera of scene.cameras) this.cameras.push({ ...camera, group: groups[camera.body] })
+    this.bodies.push(groups)
+  }
+
+  own(object) {
+    this.owned.push(object)
+    this.world.add(object)
+  }
+
+  get choices() {
+    const arms = this.tips.map(({ name }) => name).filter((name) => name !== "ECM")
+    return ["work", "robot", ...(this.cameras.length ? ["endoscope"] : []), ...arms]
+  }
+
+  poses(index, numbers) {
+    const groups = this.bodies[index]
+    if (!groups || numbers.length !== 7 * groups.length) return
+    groups.forEach((group, body) => {
+      group.position.fromArray(numbers, 7 * body)
+      group.quaternion.fromArray(numbers, 7 * body + 3)
+      group.visible = true
+    })
+    this.placed = true
+  }
+
+  surface(index, triangles) {
+    const surface = this.surfaces[index]
+    if (surface) surface.triangles = triangles
+  }
+
+  nodes(index, positions) {
+    const surface = this.surfaces[index]
+    if (!surface?.triangles) return
+    if (!surface.mesh) {
+      const split = creased(positions, surface.triangles, SOFT)
+      surface.origin = split.origin
+      const made = new THREE.BufferGeometry()
+      made.setAttribute("position", attribute(3 * split.origin.length))
+      made.setAttribute("normal", attribute(3 * split.origin.length))
+      made.setIndex(new THREE.BufferAttribute(split.index, 1))
+      surface.mesh = new THREE.Mesh(made, material([...surface.colour, 1], THREE.DoubleSide))
+      surface.mesh.frustumCulled = false
+      this.own(surface.mesh)
+    }
+    const { position, normal } = surface.mesh.geometry.attributes
+    gathered(positions, surface.origin, position.array)
+    smooth(position.array, surface.mesh.geometry.index.array, normal.array)
+    position.needsUpdate = normal.needsUpdate = true
+  }
+
+  // `rows`: point (m) and force (N) of each arrow of a bond.
+  arrows(bond, rows) {
+    const arrows = (this.bonds[bond] ??= [])
+    for (let i = 0; 6 * i < rows.length; i++) {
+      if (!arrows[i]) {
+        arrows[i] = new THREE.ArrowHelper(undefined, undefined, 1, FORCE)
+        for (const { material } of [arrows[i].line, arrows[i].cone]) material.depthTest = false // inside of organs, too
+        arrows[i].line.renderOrder = arrows[i].cone.renderOrder = 1
+        this.own(arrows[i])
+      }
+      const [x, y, z, fx, fy, fz] = rows.subarray(6 * i, 6 * i + 6), force = Math.hypot(fx, fy, fz)
+      const length = Math.min(force * M_PER_N, LONGEST_M)
+      arrows[i].visible = force > LEAST_N
+      if (!arrows[i].visible) continue
+      const way = new THREE.Vector3(fx, fy, fz).divideScalar(force)
+      arrows[i].position.set(x, y, z)
+      arrows[i].setDirection(way)
+      arrows[i].setLength(length, Math.min(length * 0.4, 0.008), Math.min(length * 0.3, 0.006))
+    }
+  }
+
+  frames(shown) {
+    for (const axes of this.axes) axes.visible = shown
+    this.dirty()
+  }
+
+  choose(name) {
+    this.choice = name
+    const box = name === "robot" ? this.robotBox() : this.workBox()
+    const tip = this.tips.find((one) => one.name === name)
+    if (tip) this.orbit.look(tip.axes.getWorldPosition(new THREE.Vector3()).toArray(), 0.12)
+    else if (name !== "endoscope" && !box.isEmpty()) {
+      const sphere = box.getBoundingSphere(new THREE.Sphere())
+      this.orbit.look(sphere.center.toArray(), Math.max(sphere.radius, 0.03) * (name === "robot" ? 2.4 : 3.2))
+    }
+    this.chosen?.(name)
+    this.dirty()
+  }
+
+  robotBox() {
+    const box = new THREE.Box3()
+    for (const groups of this.bodies) for (const group of groups) if (group.visible) box.expandByObject(group)
+    return box.isEmpty() ? this.surfaceBox() : box
+  }
+
+  surfaceBox() {
+    const box = new THREE.Box3()
+    for (const { mesh } of this.surfaces) {
+      if (mesh) { mesh.geometry.computeBoundingBox(); box.union(mesh.geometry.boundingBox) }
+    }
+    return box
+  }
+
+  // Where the work is: soft surfaces, else the tips of the instruments.
+  workBox() {
+    this.world.updateMatrixWorld()
+    const box = this.surfaceBox()
+    if (box.isEmpty()) {
+      for (const { name, axes } of this.tips) {
+        if (name !== "ECM") box.expandByPoint(axes.getWorldPosition(new THREE.Vector3()))
+      }
+      if (!box.isEmpty()) box.expandByScalar(0.04)
+    }
+    return box
+  }
+
+  draw() {
+    if (!this.focused && (this.placed || this.surfaces.some(({ mesh }) => mesh))) {
+      this.focused = true
+      this.choose(this.choices.includes(this.choice) ? this.choice : "work")
+    }
+    const { clientWidth: width, clientHeight: height } = this.canvas
+    if (!width || !height) return
+    const size = this.renderer.getSize(new THREE.Vector2())
+    if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false)
+    this.camera.aspect = width / height
+    const endoscope = this.choice === "endoscope" && this.cameras[0]
+    if (endoscope) this.follow(endoscope)
+    else {
+      this.camera.fov = 40
+      this.orbit.place(this.camera)
+    }
+    this.camera.updateProjectionMatrix()
+    this.lamp.position.copy(this.camera.position)
+    this.lamp.target.position.set(0, 0, -1).applyQuaternion(this.camera.quaternion).add(this.camera.position)
+    this.renderer.render(this.world, this.camera)
+  }
+
+  // `interval`: ms since the picture before. Where drawing is slow (no GPU), it is done with fewer pixels.
+  pace(interval) {
+    this.interval += 0.1 * (Math.min(interval, 500) - this.interval)
+    const ratio = this.interval > SLOW_MS ? Math.max(this.ratio / 1.5, COARSEST)
+      : this.interval < QUICK_MS ? Math.min(this.ratio * 1.5, this.finest) : this.ratio
+    if (ratio !== this.ratio) {
+      this.ratio = ratio
+      this.interval = (SLOW_MS + QUICK_MS) / 2
+    }
+    this.renderer.setPixelRatio(ratio)
+  }
+
+  // Nothing moves: draw once with all pixels.
+  settle() {
+    if (this.renderer.getPixelRatio() === this.finest) return
+    this.renderer.setPixelRatio(this.finest)
+    this.draw()
+  }
+
+  follow({ group, pose: [x, y, z, ...q], fieldOfView }) {
+    this.camera.fov = (2 * Math.atan(Math.tan(fieldOfView / 2) / this.camera.aspect) * 180) / Math.PI
+    this.camera.position.set(x, y, z).applyQuaternion(group.quaternion).add(group.position)
+    this.camera.quaternion.copy(group.quaternion).multiply(new THREE.Quaternion(...q)).multiply(FLIP)
+  }
+}
+
+function geometry(positions, faces, cosine) {
+  const { index, origin } = creased(positions, faces, cosine)
+  const made = new THREE.BufferGeometry()
+  const position = attribute(3 * origin.length), normal = attribute(3 * origin.length)
+  gathered(positions, origin, position.array)
+  smooth(position.array, index, normal.array)
+  made.setAttribute("position", position)
+  made.setAttribute("normal", normal)
+  made.setIndex(new THREE.BufferAttribute(index, 1))
+  return made
+}
+
+function attribute(size) { return new THREE.BufferAttribute(new Float32Array(size), 3) }
+
+function material([red, green, blue, opacity], side = THREE.FrontSide) {
+  const colour = new THREE.Color().setRGB(red, green, blue, THREE.SRGBColorSpace)
+  return new THREE.MeshLambertMaterial({ color: colour, side, transparent: opacity < 1, opacity })
+}
+
+function pose(object, [x, y, z, ...q]) {
+  object.position.set(x, y, z)
+  object.quaternion.set(...q)
+}

@@ -1,0 +1,108 @@
+// The timeline of a recording: the instant that is shown, playing, events, and the instant in the URL.
+
+const $ = (id) => document.getElementById(id)
+
+export class Timeline {
+  constructor(show) {
+    this.show = show // (time) => asks for it
+    this.time = this.start = this.end = 0
+    this.events = []
+    this.playing = false
+    this.scrub = $("scrub")
+    this.scrub.addEventListener("input", () => { this.pause(); this.go(Number(this.scrub.value)) })
+    $("play").onclick = () => this.toggle()
+    $("previous").onclick = () => this.jump(-1)
+    $("next").onclick = () => this.jump(1)
+    addEventListener("hashchange", () => this.fromUrl())
+    addEventListener("keydown", (event) => this.key(event))
+    new ResizeObserver(() => this.marks()).observe($("marks"))
+  }
+
+  async begin(start, end) {
+    if (this.begun) return
+    this.begun = true
+    Object.assign(this, { start, end })
+    this.scrub.min = start; this.scrub.max = end
+    $("timeline").hidden = false
+    if (!this.fromUrl()) this.go(start)
+    const answer = await fetch("/events")
+    if (answer.ok) this.events = await answer.json()
+    this.found?.(this.events)
+    this.marks()
+  }
+
+  fromUrl() {
+    const given = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN)
+    if (!this.begun || Number.isNaN(given) || Math.abs(given - this.time) < 5e-4) return !Number.isNaN(given)
+    this.go(given)
+    return true
+  }
+
+  go(time) {
+    this.time = Math.min(Math.max(time, this.start), this.end)
+    this.scrub.value = this.time
+    $("instant").textContent = `${this.time.toFixed(3)} s`
+    this.scrub.setAttribute("aria-valuetext", `${this.time.toFixed(3)} seconds`)
+    this.show(this.time)
+    clearTimeout(this.naming)
+    if (!this.playing) this.naming = setTimeout(() => this.name(), 150)
+  }
+
+  name() {
+    const query = new URLSearchParams(location.hash.slice(1))
+    query.set("t", this.time.toFixed(3))
+    history.replaceState(null, "", `#${query}`)
+  }
+
+  toggle() { if (this.playing) this.pause(); else this.play() }
+
+  play() {
+    if (this.time >= this.end) this.go(this.start)
+    this.playing = true
+    this.last = performance.now()
+    $("play").textContent = "Pause"
+  }
+
+  pause() {
+    this.playing = false
+    $("play").textContent = "Play"
+    this.name()
+  }
+
+  // Called at each drawing.
+  tick(now) {
+    if (!this.playing) return
+    const time = this.time + ((now - this.last) / 1000) * Number($("speed").value)
+    this.last = now
+    this.go(time)
+    if (this.time >= this.end) this.pause()
+  }
+
+  jump(way) {
+    this.pause()
+    const times = this.events.map(({ time }) => time)
+    const found = way > 0 ? times.find((t) => t > this.time + 1e-6) : times.findLast((t) => t < this.time - 1e-6)
+    if (found != null) this.go(found)
+  }
+
+  key(event) {
+    if (!this.begun || event.target.closest("input:not([type=range]), select, button")) return
+    const act = { " ": () => this.toggle(), "[": () => this.jump(-1), "]": () => this.jump(1) }[event.key]
+    if (!act) return
+    event.preventDefault()
+    act()
+  }
+
+  marks() {
+    const canvas = $("marks"), { clientWidth: width, clientHeight: height } = canvas
+    if (!width) return
+    canvas.width = width * devicePixelRatio; canvas.height = height * devicePixelRatio
+    const context = canvas.getContext("2d"), style = getComputedStyle(document.documentElement)
+    context.scale(devicePixelRatio, devicePixelRatio)
+    for (const { time, level } of this.events) {
+      context.fillStyle = style.getPropertyValue(level === "info" ? "--soft" : level === "warn" ? "--warn" : "--bad")
+      const share = (time - this.start) / (this.end - this.start || 1)
+      context.fillRect(8 + share * (width - 16) - 1, 2, 2, 7) // the thumb of the range is 16 px wide
+    }
+  }
+}
