@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import typer
 from rich.console import Console
 
-from hub.command_line.display import LATENCY_COLUMNS, latency_rows, table
+from hub.command_line.display import LATENCY_COLUMNS, console, latency_rows, table
 from hub.command_line.options import Certificates, HubEndpoints, Json
 from hub.observation.latency import by_way
 from hub.recording.profiles import profile_numbers
@@ -81,11 +81,15 @@ def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Fo
         endpoint: live_sessions([endpoint], certificates)
         for endpoint in connect or [hub.endpoint for hub in running_hubs()]
     }
-    profiles = live_profiles(at, certificates)
+    profiles = live_profiles([endpoint for endpoint, statuses in at.items() if statuses], certificates)
     hubs = {hub.endpoint: hub for hub in running_hubs()}  # again, as some may have begun in between
     found: dict[tuple[str, int], _Found] = {}
     for endpoint, statuses in at.items():
         hub = hubs.get(endpoint)
+        if hub and not statuses:
+            console.print(
+                f"the hub at {endpoint}, process {hub.pid}, does not answer: it starts, or it is stopped"
+            )
         outside, pid = (hub.outside, hub.pid) if hub else ((), None)
         for status in statuses:
             profile = profiles.get(status.run)

@@ -16,7 +16,7 @@ from hub.transport.session_secret import secret_of
 from hub.transport.zenoh_session import open_session
 from schemas.errors import ConnectError
 
-__all__ = ["obstacle", "reach"]
+__all__ = ["listens", "obstacle", "reach"]
 
 _TIMEOUT_S = 3.0
 _STARTING_S = 5.0
@@ -52,7 +52,7 @@ def reach(
                 security=_secret(endpoint),
             )
         except ConnectError as error:
-            if _answers(host, port):
+            if listens(endpoint):
                 raise
             raise ConnectError(
                 f"cannot reach the hub at {endpoint}: no process listens there. Is it running? trocar ls"
@@ -94,7 +94,7 @@ def _secret(endpoint: str) -> dict[str, Any]:
         except ConnectError:
             if monotonic() > deadline:
                 raise
-            if _answers(*address(endpoint)):
+            if listens(endpoint):
                 deadline = min(deadline, monotonic() + _PUBLISHING_S)
             sleep(_POLL_S)
 
@@ -128,7 +128,7 @@ def obstacle(host: str, port: int, credentials: Credentials) -> str:
     except ConnectionRefusedError:
         return f"no process listens there. Is the hub running, with --listen tls/0.0.0.0:{port}?"
     except TimeoutError:
-        if _answers(host, port):
+        if _accepts(host, port):
             return ""
         return (
             "no answer. Is the address right, and does the firewall of the hub's machine allow TCP port"
@@ -153,7 +153,12 @@ def _problem_of_hub(host: str, error: ssl.SSLCertVerificationError, credentials:
     )
 
 
-def _answers(host: str, port: int) -> bool:
+def listens(endpoint: str) -> bool:
+    """Return whether a process listens at `endpoint`."""
+    return _accepts(*address(endpoint))
+
+
+def _accepts(host: str, port: int) -> bool:
     try:
         with socket.create_connection((host, port), _TIMEOUT_S):
             return True

@@ -10,7 +10,7 @@ from typing import TypeVar
 import zenoh
 from pydantic import BaseModel
 
-from hub.remote.hub_connection import reach
+from hub.remote.hub_connection import listens, reach
 from hub.security.credentials import OBSERVER
 from hub.transport.control_client import ask
 from hub.transport.endpoints import is_loopback
@@ -56,6 +56,8 @@ def _answers(endpoints: Iterable[str], certificates: Path | None, key: str, mode
     """Return what the sessions at `endpoints` answer on `key`."""
     found: list[M] = []
     for endpoint in endpoints:
+        if is_loopback(endpoint) and not listens(endpoint):  # a hub that is about to start has no session yet
+            continue
         with (
             suppress(*_NO_HUB) if is_loopback(endpoint) else nullcontext(),
             reach(endpoint, OBSERVER, certificates) as session,

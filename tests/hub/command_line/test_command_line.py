@@ -1,4 +1,5 @@
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -231,6 +232,13 @@ def test_a_participant_hosted_elsewhere_and_ls(tmp_path):
                 "step": -1,
             }.items()
         )
+        if hasattr(signal, "SIGSTOP"):
+            hub.send_signal(signal.SIGSTOP)
+            stopped = subprocess.run(
+                [*command, "ls", "--connect", endpoint], capture_output=True, text=True, check=True
+            )
+            hub.send_signal(signal.SIGCONT)
+            assert f"process {hub.pid}, does not answer" in " ".join(stopped.stderr.split())
         engine = subprocess.run(
             [*command, "engine", "robot", "--connect", endpoint, "--session", "away"],
             cwd=tmp_path,
