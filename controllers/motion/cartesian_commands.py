@@ -26,6 +26,7 @@ from schemas.vectors import Vector
 
 __all__ = ["CartesianCommands"]
 
+_IDENTITY = np.eye(4)
 _SINGULAR = 1e-6
 """Singular values of the Jacobian below this share of the largest move no joint; as in `telemetry`."""
 
@@ -155,7 +156,7 @@ class CartesianCommands:
         An empty name is the reference's.
         """
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
-        return np.eye(4) if named == self._base.local else inverse_pose(self._base.pose)
+        return _IDENTITY if named == self._base.local else inverse_pose(self._base.pose)
 
     def _inverse(self, tip: Vector) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the arm's base frame, shape (4, 4).
