@@ -13,6 +13,7 @@ import numpy as np
 from controllers.motion import goals
 from controllers.motion.drives import Drives, WrenchFrame
 from controllers.motion.frames import BaseFrame, turned
+from controllers.motion.poses_ahead import PoseAhead
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import tip_frame
@@ -25,6 +26,7 @@ from schemas.vectors import Vector
 
 __all__ = ["CartesianCommands"]
 
+_IDENTITY = np.eye(4)
 _SINGULAR = 1e-6
 """Singular values of the Jacobian below this share of the largest move no joint; as in `telemetry`."""
 
@@ -45,6 +47,8 @@ class CartesianCommands:
         self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
         self._joints, self._chain = drives.joints, drives.joints.chain
         self._cannula = Cannula.of(self._chain)
+        self.ahead: PoseAhead | None = None
+        """What was solved together with other arms."""
         self.handlers: Mapping[str, Callable[[Any], None]] = {
             "body/set_cf_orientation_absolute": self._set_cf_orientation_absolute,
             "set_base_frame": self._set_base_frame,
@@ -122,9 +126,29 @@ class CartesianCommands:
         self._drives.move(self._joints, self._solve(message), self._ratio)
 
     def _solve(self, message: PoseStamped) -> Vector:
-        """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame."""
+        """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame.
+
+        They were found ahead where all that they depend on is as it was then.
+        """
+        ahead = self.ahead
+        if ahead is None or not ahead.is_for(message, self._base.pose, self._joints.setpoint.position):
+            return self._inverse(self._tip(message))
+        self._cannula.check(ahead.goal, self._joints.position)
+        return ahead.goal
+
+    def prepare(self, message: PoseStamped) -> PoseAhead | None:
+        """Return what a `servo_cp` asks of the inverse kinematics; None if its message is refused."""
+        try:
+            tip = self._tip(message)
+        except MotionError:
+            return None
+        self.ahead = None
+        return PoseAhead(message, self._base.pose, self._joints.setpoint.position, tip)
+
+    def _tip(self, message: PoseStamped) -> Vector:
+        """Return the pose that a message asks for in the arm's base frame, shape (4, 4)."""
         frame = self._from(message.header.frame_id)
-        return self._inverse(frame.dot(goals.frame(message.pose)))
+        return frame.dot(goals.frame(message.pose))
 
     def _from(self, frame_id: str) -> Vector:
         """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4).
@@ -132,7 +156,7 @@ class CartesianCommands:
         An empty name is the reference's.
         """
         named = goals.check_frame(frame_id, self._base.reference, self._base.local)
-        return np.eye(4) if named == self._base.local else inverse_pose(self._base.pose)
+        return _IDENTITY if named == self._base.local else inverse_pose(self._base.pose)
 
     def _inverse(self, tip: Vector) -> Vector:
         """Return the joint positions, shape (n,), of a pose in the arm's base frame, shape (4, 4).
