@@ -60,7 +60,8 @@ class StartedSession:
     def as_json(self) -> dict[str, Any]:
         """Return what a page shows of it: its state, how much of the past is done, and its link."""
         live = bool(self.link) and self.time_s >= self.live_from_s
-        state = "failed" if self.error else "ended" if self.ended else "live" if live else "starting"
+        over = not self._thread.is_alive()  # only then is it known whether it failed
+        state = "failed" if self.error else "ended" if over else "live" if live else "starting"
         return {
             "number": self.number,
             "title": self.title,
