@@ -44,7 +44,7 @@ class StartedSession:
         self.number, self.title, self.live_from_s = number, title, live_from_s
         self.time_s = 0.0
         self.error = self.link = ""
-        self._reached: set[str] = set()
+        self._asked_to_end = False
         self._directory = TemporaryDirectory()
         self._viewer: subprocess.Popen[bytes] | None = None
         with self._said("hub").open("wb") as said:
@@ -74,6 +74,7 @@ class StartedSession:
     def end(self) -> None:
         """End the session as Ctrl-C would; its recording is closed in order."""
         if not self.ended:
+            self._asked_to_end = True
             self._hub.send_signal(signal.SIGINT)
 
     def close(self) -> None:
@@ -90,7 +91,7 @@ class StartedSession:
             if hub is not None:
                 self._look(hub.endpoint)
             stopping.wait(_LOOK_S)
-        if self._hub.returncode not in (0, -signal.SIGINT, 130):
+        if self._hub.returncode and not self._asked_to_end:
             said = self._said("hub").read_text(encoding="utf-8", errors="replace")[-_MOST_SAID:]
             self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"
         if self._viewer is not None:

@@ -2,7 +2,7 @@
 
 const $ = (id) => document.getElementById(id)
 const SVG = "http://www.w3.org/2000/svg"
-const ROW = 34, LEFT = 8, WIDTH = 560
+const ROW = 34, LEFT = 8, WIDTH = 560, LETTER = 6.3
 
 function make(name, properties = {}, ...children) {
   const element = document.createElement(name)
@@ -131,8 +131,8 @@ function drawn(members) {
     put("path", { d: `M${x(from)} ${y}H${x(end)}`, class: shown ? "run shown" : "run" })
     put("circle", { cx: x(end), cy: y, r: 3.5, class: shown ? "shown" : "" })
     const said = at == null ? `${end.toFixed(2)} s` : `from ${at.toFixed(3)} s: ${changes.join(", ") || "nothing changed"}`
-    const right = x(from) > WIDTH * 0.5
-    put("text", { x: right ? WIDTH - LEFT : x(from) + 4, y: y - 6, "text-anchor": right ? "end" : "start" }, `${name}  ${said}`)
+    const text = `${name}  ${said}`, right = x(from) + text.length * LETTER > WIDTH
+    put("text", { x: right ? WIDTH - LEFT : x(from) + 4, y: y - 6, "text-anchor": right ? "end" : "start" }, text)
   })
   return svg
 }
