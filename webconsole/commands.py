@@ -8,7 +8,20 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from schemas.errors import MessageError
 
-__all__ = ["At", "Command", "Control", "Hand", "Invite", "Lead", "Leave", "Show", "Watch", "command"]
+__all__ = [
+    "At",
+    "Command",
+    "Control",
+    "End",
+    "Fork",
+    "Hand",
+    "Invite",
+    "Lead",
+    "Leave",
+    "Show",
+    "Watch",
+    "command",
+]
 
 MOST_BYTES = 16_384
 """Of one message of a page."""
@@ -62,6 +75,29 @@ class Invite(_Command):
     role: Literal["viewer", "operator"]
 
 
+class Fork(_Command):
+    """Go on from an instant of the recording, in a session of its own."""
+
+    do: Literal["fork"]
+    time: Annotated[float, Field(allow_inf_nan=False, ge=0.0, le=1e6)]
+    """Simulated time, s."""
+    changes: Annotated[list[Annotated[str, Field(min_length=1, max_length=400)]], Field(max_length=50)] = []
+    """`a.b.c=value`, as on the command line."""
+    lead: Annotated[list[Name], Field(max_length=8)] = []
+    """Devices that pages lead from then on."""
+    duration: Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=1e6)] | None = None
+    """Simulated time at which it ends, s; None: as in the recording."""
+    pace: Literal["fast", "realtime"] | None = None
+    record: bool = True
+
+
+class End(_Command):
+    """End a session that a page has started."""
+
+    do: Literal["end"]
+    number: Annotated[int, Field(ge=1, le=1_000_000)]
+
+
 class Lead(_Command):
     """Become the pilot of a device."""
 
@@ -93,7 +129,9 @@ class Hand(_Command):
     jaw: bool = False
 
 
-Command = Annotated[Show | At | Control | Watch | Invite | Lead | Leave | Hand, Field(discriminator="do")]
+Command = Annotated[
+    Show | At | Control | Watch | Invite | Fork | End | Lead | Leave | Hand, Field(discriminator="do")
+]
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Command)
 
 

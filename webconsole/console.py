@@ -7,7 +7,8 @@ from typing import Any
 
 from hub.transport.control_messages import Empty, StepRequest
 from schemas.errors import MessageError
-from webconsole.commands import Control
+from webconsole.commands import Control, Fork
+from webconsole.fork import fork_arguments
 from webconsole.frame import Section, SectionKind
 from webconsole.live import Live
 from webconsole.log import card_of
@@ -15,6 +16,7 @@ from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 from webconsole.source import Value
 from webconsole.stage import Stage
+from webconsole.started import Started
 
 __all__ = ["Console"]
 
@@ -26,6 +28,7 @@ class Console:
 
     def __init__(self, source: Live | Recorded, pilots: Pilots) -> None:
         self.source, self.pilots = source, pilots
+        self.started = Started()
         self._stage: Stage | None = None
         self._generation = -1
         self._making = asyncio.Lock()
@@ -74,6 +77,13 @@ class Console:
         live = self.live()
         request = StepRequest(steps=order.steps) if order.do == "step" else Empty()
         await asyncio.to_thread(live.ask, _VERBS[order.do], request, Empty)
+
+    async def fork(self, order: Fork) -> int:
+        """Start a fork of the recording and return its number; raises MessageError or ScenarioError."""
+        recording = self.recorded().recording
+        arguments = await asyncio.to_thread(fork_arguments, recording, order)
+        title = f"fork of {recording.file.parent.name} at {order.time:g} s"
+        return (await asyncio.to_thread(self.started.start, title, arguments, order.time)).number
 
     def live(self) -> Live:
         """Return the running session's source; raises MessageError if this is a recording."""

@@ -13,7 +13,20 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from hub.participant.token_bucket import TokenBucket
 from schemas.errors import MessageError, TrocarError
-from webconsole.commands import At, Command, Control, Hand, Invite, Lead, Leave, Show, Watch, command
+from webconsole.commands import (
+    At,
+    Command,
+    Control,
+    End,
+    Fork,
+    Hand,
+    Invite,
+    Lead,
+    Leave,
+    Show,
+    Watch,
+    command,
+)
 from webconsole.console import Console
 from webconsole.frame import Section, acknowledged, frame
 from webconsole.gate import Gate, Role
@@ -136,6 +149,11 @@ class Page:
             case Control():
                 await self._console.control(order)
                 return {}
+            case Fork():
+                return {"number": await self._console.fork(order)}
+            case End():
+                self._console.started.end(order.number)
+                return {}
             case Watch():
                 self._console.live().watch(order.session)
             case Invite():
@@ -166,6 +184,8 @@ class Page:
                 **source.state,
                 "pilots": self._console.pilots.state(self),
             }
+            if self._role == "operator":  # their links are an operator's
+                content["started"] = self._console.started.as_json()
             if isinstance(source, Live):
                 self._lines, lines = source.entries_after(self._lines)
                 content["log"] = [entry.as_json() for entry in lines]

@@ -16,10 +16,12 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from hub.recording.recording import Recording
 from schemas.errors import ConnectError, TrocarError
 from webconsole.assets import asset, compressed
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
+from webconsole.fork import fork_form, tree_of
 from webconsole.gate import Gate
 from webconsole.page import Page
 
@@ -72,6 +74,8 @@ class Server:
                 Route("/series", self._series),
                 Route("/events", self._events),
                 Route("/sessions", self._sessions),
+                Route("/fork", self._fork),
+                Route("/forks", self._forks),
                 WebSocketRoute("/page", self._page),
             ]
         )
@@ -98,6 +102,7 @@ class Server:
         try:
             self._uvicorn.run(sockets=[self._socket])
         finally:
+            self._console.started.close()
             self._console.source.close()
             self._socket.close()
 
@@ -153,5 +158,19 @@ class Server:
         try:
             live = self._console.live()
             return JSONResponse(await asyncio.to_thread(live.sessions))
+        except TrocarError as error:
+            return PlainTextResponse(f"{error}\n", status_code=400)
+
+    async def _fork(self, _request: Request) -> Response:
+        """Answer with what the form of a fork offers."""
+        return await self._of_recording(fork_form)
+
+    async def _forks(self, _request: Request) -> Response:
+        """Answer with the tree of the recordings beside this one."""
+        return await self._of_recording(tree_of)
+
+    async def _of_recording(self, make: Callable[[Recording], object]) -> Response:
+        try:
+            return JSONResponse(await asyncio.to_thread(make, self._console.recorded().recording))
         except TrocarError as error:
             return PlainTextResponse(f"{error}\n", status_code=400)

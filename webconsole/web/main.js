@@ -7,6 +7,7 @@ import { Plots } from "./plots.js"
 import { Pilot } from "./pilot.js"
 import { Timeline } from "./timeline.js"
 import { showCard } from "./card.js"
+import { Forks } from "./fork.js"
 
 const $ = (id) => document.getElementById(id)
 const REFRESH_MS = 100, STILL_MS = 400
@@ -28,12 +29,14 @@ const link = new Link({
     log.add(state.log)
     showCard($("card"), state.card)
     pilot.show(state.pilots, session?.role)
+    forks.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
   },
   answer(answer) {
     if (answer.error) log.add([{ time: lastTime, level: "warn", source: `page: ${answer.to || "message"}`, text: answer.error }])
     else if (answer.path) share(answer)
     pilot.answered(answer)
+    forks.answered(answer)
   },
   trouble({ text }) { log.add([{ time: lastTime, level: "warn", source: "page", text }]) },
 })
@@ -42,6 +45,7 @@ const head = new Head(link)
 const pilot = new Pilot($("lead"), link)
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
+const forks = new Forks(link, timeline)
 timeline.found = (events) => log.add(events, true)
 const plots = new Plots($("plot-list"), $("add"), $("ports"), ask)
 $("pictures").onchange = ask
@@ -55,6 +59,7 @@ function ask(again = false) {
 async function begin(described) {
   session = described
   head.begin(described)
+  forks.begin(described)
   log.clear()
   for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
   if (!described.numbers) return

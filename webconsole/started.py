@@ -1,0 +1,162 @@
+"""Sessions that an operator has started from a page: each a process of `trocar` with a page of its own."""
+
+from __future__ import annotations
+
+import logging
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO, Any
+
+from hub.remote.live_sessions import live_sessions
+from hub.transport.hub_files import running_hubs
+from schemas.errors import MessageError
+
+__all__ = ["Started", "StartedSession"]
+
+log = logging.getLogger(__name__)
+
+_TROCAR = (sys.executable, "-P", "-m", "trocar")
+_MOST = 4
+"""Sessions that may run at once: each takes a core and more."""
+_LOOK_S = 0.25
+_PATIENCE_S = 5.0
+_MOST_SAID = 4000
+_LINK = re.compile(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+")
+
+
+class StartedSession:
+    """One session: its hub's process, and the process of its page.
+
+    Args:
+        number: By which pages name it.
+        title: What it is, for people.
+        arguments: Those of `trocar`, checked.
+        live_from_s: Simulated time from which on it is live: before, a past is simulated again.
+    """
+
+    def __init__(self, number: int, title: str, arguments: Sequence[str], live_from_s: float) -> None:
+        self.number, self.title, self.live_from_s = number, title, live_from_s
+        self.time_s = 0.0
+        self.error = self.link = ""
+        self._asked_to_end = False
+        self._directory = TemporaryDirectory()
+        self._viewer: subprocess.Popen[bytes] | None = None
+        with self._said("hub").open("wb") as said:
+            self._hub = _process(arguments, said)
+        self._thread = threading.Thread(target=self._follow, name=f"session {number}", daemon=True)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the hub's process has ended."""
+        return self._hub.poll() is not None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what a page shows of it: its state, how much of the past is done, and its link."""
+        live = bool(self.link) and self.time_s >= self.live_from_s
+        over = not self._thread.is_alive()  # only then is it known whether it failed
+        state = "failed" if self.error else "ended" if over else "live" if live else "starting"
+        return {
+            "number": self.number,
+            "title": self.title,
+            "state": state,
+            "share": min(1.0, self.time_s / self.live_from_s) if self.live_from_s else float(live),
+            "link": self.link if state == "live" else "",
+            "error": self.error,
+        }
+
+    def end(self) -> None:
+        """End the session as Ctrl-C would; its recording is closed in order."""
+        if not self.ended:
+            self._asked_to_end = True
+            self._hub.send_signal(signal.SIGINT)
+
+    def close(self) -> None:
+        """End the session and wait for it."""
+        self.end()
+        _wait(self._hub)
+        self._thread.join(_PATIENCE_S)
+
+    def _follow(self) -> None:
+        """Open the session's page once its hub listens, and watch it to its end."""
+        stopping = threading.Event()
+        while not self.ended:
+            hub = next((one for one in running_hubs() if one.pid == self._hub.pid), None)
+            if hub is not None:
+                self._look(hub.endpoint)
+            stopping.wait(_LOOK_S)
+        if self._hub.returncode and not self._asked_to_end:
+            said = self._said("hub").read_text(encoding="utf-8", errors="replace")[-_MOST_SAID:]
+            self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"
+        if self._viewer is not None:
+            self._viewer.terminate()
+            _wait(self._viewer)
+        self._directory.cleanup()
+
+    def _look(self, endpoint: str) -> None:
+        if self._viewer is None:
+            with self._said("page").open("wb") as said:
+                self._viewer = _process(("view", "--connect", endpoint, "--no-open"), said)
+        if not self.link and (found := _LINK.search(self._said("page").read_text(encoding="utf-8"))):
+            self.link = found[0]
+        if self.time_s < self.live_from_s:
+            for status in live_sessions([endpoint]):
+                self.time_s = status.sim_time_ns / 1e9
+
+    def _said(self, process: str) -> Path:
+        return Path(self._directory.name, process)
+
+
+class Started:
+    """The sessions that pages of one server have started; they end with the server."""
+
+    def __init__(self) -> None:
+        self._sessions: list[StartedSession] = []
+        self._lock = threading.Lock()
+
+    def start(self, title: str, arguments: Sequence[str], live_from_s: float = 0.0) -> StartedSession:
+        """Start `trocar` with arguments that were checked; raises MessageError if too many run already."""
+        with self._lock:
+            if sum(not one.ended for one in self._sessions) >= _MOST:
+                raise MessageError(f"{_MOST} sessions that were started here are running: end one first")
+            made = StartedSession(len(self._sessions) + 1, title, arguments, live_from_s)
+            self._sessions.append(made)
+        log.info("%s: started from a page", title)
+        return made
+
+    def end(self, number: int) -> None:
+        """End a session; raises MessageError if there is none of this number."""
+        if not 1 <= number <= len(self._sessions):
+            raise MessageError(f"no session {number} was started here")
+        self._sessions[number - 1].end()
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """Return all of them, ready for JSON."""
+        return [one.as_json() for one in self._sessions]
+
+    def close(self) -> None:
+        """End them all."""
+        for one in self._sessions:
+            one.end()
+        for one in self._sessions:
+            one.close()
+
+
+def _process(arguments: Sequence[str], said: IO[bytes]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [*_TROCAR, *arguments], stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
+    )
+
+
+def _wait(process: subprocess.Popen[bytes]) -> None:
+    try:
+        process.wait(_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
