@@ -34,7 +34,7 @@ class Authority(NamedTuple):
 
 
 def free_port() -> int:
-    """Return a port for what cannot let the system choose one: nobody listens there, and no test gets it soon.
+    """Return a port for what cannot let the system choose one: nobody listens there, no test gets it soon.
 
     The system itself gives ports to connections, from 32768 on (ip_local_port_range), and would give away the
     one that it has just chosen. These lie below: 2000 for each worker, and a second run starts elsewhere.
