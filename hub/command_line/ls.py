@@ -81,7 +81,7 @@ def _found(connect: Sequence[str] | None, certificates: Path | None) -> list[_Fo
         endpoint: live_sessions([endpoint], certificates)
         for endpoint in connect or [hub.endpoint for hub in running_hubs()]
     }
-    profiles = live_profiles(at, certificates)
+    profiles = live_profiles([endpoint for endpoint, statuses in at.items() if statuses], certificates)
     hubs = {hub.endpoint: hub for hub in running_hubs()}  # again, as some may have begun in between
     found: dict[tuple[str, int], _Found] = {}
     for endpoint, statuses in at.items():
