@@ -12,12 +12,12 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the inputs are 
 @pytest.mark.parametrize(
     ("harness", "limit"),
     [
-        ("scenarios", ("--hours", str(15 / 3600))),
+        ("scenarios", ("--number", "40")),
         ("wire", ("--number", "1500")),
         ("recordings", ("--number", "16")),
         ("meshes", ("--number", "400")),
         ("fmus", ("--number", "150")),
-        ("ros", ("--number", "60")),
+        ("ros", ("--number", "40")),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

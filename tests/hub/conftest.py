@@ -1,4 +1,3 @@
-import faulthandler
 import importlib
 import os
 import sys
@@ -64,9 +63,6 @@ class Pendulum(Stepped):
 InstallPlugin = Callable[..., None]
 Prepare = Callable[..., Session]
 
-_HANGS_S = 180
-"""A test of the hub that takes longer hangs: all stacks are printed, and the test run ends."""
-
 
 @pytest.fixture
 def install_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[InstallPlugin]:
@@ -122,17 +118,11 @@ def _forget() -> None:
 
 
 @pytest.fixture
-def toys(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
-    """Let this process and its children find the participants of `toys.py`, and end a test that hangs."""
+def toys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let this process and its children find the participants of `toys.py`."""
     here = str(Path(__file__).parent)
     monkeypatch.syspath_prepend(here)
     monkeypatch.setenv("PYTHONPATH", here, prepend=os.pathsep)
-    with capfd.disabled():
-        terminal = os.dup(2)
-    faulthandler.dump_traceback_later(_HANGS_S, exit=True, file=terminal)
-    yield
-    faulthandler.cancel_dump_traceback_later()
-    os.close(terminal)
 
 
 @pytest.fixture

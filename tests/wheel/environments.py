@@ -46,5 +46,5 @@ def with_our_packages(directory: Path) -> Path:
 
 def install(there: Path, *words: str | Path) -> None:
     """Install with this environment's pip into the one whose `bin` is `there`."""
-    pip = [sys.executable, "-m", "pip", "--python", there / "python", "install", "--quiet"]
+    pip = [sys.executable, "-m", "pip", "--python", there / "python", "install", "--quiet", "--no-compile"]
     succeed(*pip, *words, cwd=there)

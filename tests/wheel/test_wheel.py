@@ -9,6 +9,7 @@ import tomllib
 import zipfile
 from base64 import urlsafe_b64encode
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,9 +18,14 @@ from tests.devices.standins import build as standins
 from tests.hub.authorities import free_port
 from tests.wheel.environments import CLEAN, bare, install, run, succeed, with_our_packages
 
-pytestmark = pytest.mark.xdist_group("wheel")  # its fixtures are expensive: made once, in one process
+pytestmark = [
+    pytest.mark.xdist_group("wheel"),  # its fixtures are expensive: made once, in one process
+    pytest.mark.timeout(600),  # they fetch packages
+]
 
 ROOT = Path(__file__).resolve().parents[2]
+IMPORT_NAMES = "from hub import doctor; print(doctor.as_json([*doctor._import_names()]))"
+"""Prints what `trocar doctor` finds of the import names, without the rest, which takes seconds."""
 
 
 @pytest.fixture(scope="session")
@@ -46,6 +52,13 @@ def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return there
 
 
+@pytest.fixture(scope="module")
+def findings(base: Path, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """What `trocar doctor` finds without extras."""
+    said = succeed(base / "trocar", "doctor", "--json", cwd=tmp_path_factory.mktemp("doctor"))
+    return json.loads(said)["findings"]
+
+
 @pytest.fixture
 def stray(tmp_path: Path) -> Path:
     """A directory with modules whose names are those of our packages."""
@@ -64,21 +77,16 @@ def test_it_holds_the_packages_and_the_scenarios_and_nothing_else(wheel):
     } <= set(names)
 
 
-def test_without_extras_the_command_line_works(base, tmp_path):
+def test_without_extras_the_command_line_works(base, findings, tmp_path):
     assert "Exit codes" in succeed(base / "trocar", "--help", cwd=tmp_path)
     assert succeed(base / "trocar", "--version", cwd=tmp_path).strip() == importlib.metadata.version("trocar")
-    findings = {
-        f["name"]: f
-        for f in json.loads(succeed(base / "trocar", "doctor", "--json", cwd=tmp_path))["findings"]
-        if f["area"] != "engine"
-    }
-    assert findings["Zenoh"]["works"]
-    assert not findings["mujoco"]["works"]
-    assert findings["mujoco"]["remedy"] == "pip install 'trocar[mujoco]'"
+    found = {f["name"]: f for f in findings if f["area"] != "engine"}
+    assert found["Zenoh"]["works"]
+    assert not found["mujoco"]["works"]
+    assert found["mujoco"]["remedy"] == "pip install 'trocar[mujoco]'"
 
 
-def test_without_extras_every_kind_can_be_described(base, tmp_path):
-    findings = json.loads(succeed(base / "trocar", "doctor", "--json", cwd=tmp_path))["findings"]
+def test_without_extras_every_kind_can_be_described(base, findings, tmp_path):
     found = {
         f["name"]
         for f in findings
@@ -235,8 +243,8 @@ def test_another_distribution_with_our_import_names_is_reported(wheel, tmp_path)
     install(there, "--no-deps", other_distribution(tmp_path))
 
     def found() -> dict[str, dict[str, str]]:
-        findings = json.loads(run(there / "trocar", "doctor", "--json", cwd=tmp_path).stdout)["findings"]
-        return {f["name"]: f for f in findings if f["area"] == "base" and f["name"].startswith("import")}
+        said = succeed(there / "python", "-P", "-c", IMPORT_NAMES, cwd=tmp_path)
+        return {f["name"]: f for f in json.loads(said)["findings"]}
 
     before = found()
     overwritten, beside = before.pop("import devices"), before.pop("import schemas")
@@ -255,10 +263,7 @@ def test_another_distribution_with_our_import_names_is_reported(wheel, tmp_path)
 
 def test_a_folder_on_the_path_with_our_import_names_is_reported(full, tmp_path):
     (tmp_path / "robots.py").write_text("")
-    script = (
-        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-        "from hub import doctor; print(doctor.as_json([*doctor._import_names()]))"
-    )
+    script = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{IMPORT_NAMES}"
     out = succeed(full / "python", "-P", "-c", script, cwd=tmp_path)
     (finding,) = json.loads(out)["findings"]
     imported = f"Python imports {tmp_path}/robots.py, which is of no distribution"

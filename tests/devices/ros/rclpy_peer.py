@@ -13,8 +13,9 @@ CONSOLE = Path(__file__).parent / "rclpy_console.py"
 
 
 def free_domain():
-    """Return a domain in which nobody is: others on this machine may run tests, too."""
-    for domain in range(1 + os.getpid() % 50, 101):
+    """Return a domain in which nobody is; it is taken a moment later, so each worker has ten of its own."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 10
+    for domain in range(1 + 10 * worker, 11 + 10 * worker):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             try:
                 first.bind(("", 7400 + 250 * domain + 10))  # what the first participant listens to

@@ -14,6 +14,7 @@ import pytest
 
 from schemas.codec import message_type
 from tests.devices.ros.helpers import until
+from tests.hub.authorities import free_port
 
 CONSOLE = Path(__file__).with_name("rospy_console.py")
 NOETIC = "/opt/ros/noetic/lib/python3/dist-packages"
@@ -67,14 +68,16 @@ class Ros1:
     """A master that can be restarted at the same port, and the environment of its programs."""
 
     def __init__(self, directory):
-        with socket.socket() as sock:
-            sock.bind(("127.0.0.1", 0))
-            self.port = sock.getsockname()[1]
+        self.port = free_port()
         self.uri = f"http://127.0.0.1:{self.port}"
         python, path = rospy_python()
         self.python, self.process = python, None
         self.environment = environment(
-            path, ROS_MASTER_URI=self.uri, ROS_HOME=str(directory), ROS_LOG_DIR=str(directory / "log")
+            path,
+            ROS_MASTER_URI=self.uri,
+            ROS_HOME=str(directory),
+            ROS_LOG_DIR=str(directory / "log"),
+            TMPDIR=str(directory),  # genpy leaves directories there when its process is killed
         )
 
     def start(self):

@@ -6,6 +6,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from hub.command_line.app import main
 from learning.sweeps.sweep import Sweep
 from learning.sweeps.variation import parse
 from schemas.errors import ScenarioError
@@ -25,19 +26,19 @@ def _rows(directory):
 def test_a_table_of_all_trials(scenario, tmp_path):
     output = tmp_path / "results"
     done = _sweep(
-        scenario, "--vary", "part.value=0.1..0.3:3", "--set", "duration=2 ms", "--repeat", 2, "-o", output
+        scenario, "--vary", "part.value=0.1..0.3:2", "--set", "duration=2 ms", "--repeat", 2, "-o", output
     )
     assert done.returncode == 0, done.stderr
     rows = _rows(output)
     assert [(row["part.value"], row["value"], row["repetition"]) for row in rows] == [
-        (value, value, repetition) for value in (0.1, 0.2, 0.3) for repetition in (0, 1)
+        (value, value, repetition) for value in (0.1, 0.3) for repetition in (0, 1)
     ]
     assert {(row["state"], row["steps"], row["attempts"], row["error"]) for row in rows} == {
         ("done", 2, 1, None)
     }
     for first, second in zip(rows[::2], rows[1::2], strict=True):
         assert first["state_hash"] == second["state_hash"]
-    assert Recording(Path(rows[3]["recording"]))["part.value"].values[-1].tolist() == [0.2]
+    assert Recording(Path(rows[3]["recording"]))["part.value"].values[-1].tolist() == [0.3]
     assert (output / "results.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -83,11 +84,14 @@ def test_a_killed_trial_is_repeated_once_and_the_table_is_whole(scenario, tmp_pa
         (["part.value=1..2"], "is not a range"),
     ],
 )
-def test_bad_values_are_refused_before_anything_runs(scenario, tmp_path, vary, says):
-    done = _sweep(scenario, *(word for each in vary for word in ("--vary", each)), "-o", tmp_path / "results")
-    assert done.returncode == 2
-    assert says in done.stderr
-    assert "Traceback" not in done.stderr
+def test_bad_values_are_refused_before_anything_runs(scenario, tmp_path, monkeypatch, capsys, vary, says):
+    varied = [word for each in vary for word in ("--vary", each)]
+    command = ["trocar", "sweep", str(scenario), *varied, "-o", str(tmp_path / "results")]
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert left.value.code == 2
+    assert says in capsys.readouterr().err
     assert not (tmp_path / "results").exists()
 
 

@@ -170,7 +170,7 @@ def test_a_flood_costs_no_other_console_its_states(rclpy_python, psm):
 @pytest.mark.parametrize(("kind", "length"), [("latched", 6), ("once", 6), ("once", 200_000)])
 def test_the_first_command_of_a_program_is_received_once(rclpy_python, psm, kind, length):
     """One above 64 kB arrives in fragments."""
-    count = 8 if length == 6 else 2
+    count = 4 if length == 6 else 2
     command = [rclpy_python, FIRST_COMMAND, "/PSM1/state_command", kind, str(count), str(length)]
     with subprocess.Popen(command, env=environment(psm.params.domain)) as programs:
         try:
