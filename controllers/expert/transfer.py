@@ -41,7 +41,9 @@ _UNHELD = 0.25
 _OPENED = 0.25
 """s: for a jaw to let go."""
 _WIDEST = 0.8
-"""rad: so far a jaw opens, a step of `AJAR` at a time, while what it let go of is still between its fingers."""
+"""rad: so far a jaw opens, a step of `AJAR` at a time, while what it let go of clings to its fingers."""
+_AS_WIDE = 0.9
+"""Share of its opening at which a jaw that still touches what it let go of does not come free by itself."""
 _GENTLE = 0.4
 """Share of the speed with which a hand comes down on things."""
 _OFFERED = 20.0
@@ -155,8 +157,9 @@ class Transfer:
 
     @property
     def _clings(self) -> bool:
-        """Whether both fingers still touch what they let go of: a ring by its corner is wider than its wall."""
-        return self._seen.holders[self.state.thing] == self.hand.number
+        """Whether open fingers both still touch what they let go of: a ring's corner is wider than its wall."""
+        is_open = self.hand.angle > _AS_WIDE * self.state.opening
+        return is_open and self._seen.holders[self.state.thing] == self.hand.number
 
     @property
     def _is_there(self) -> bool:
