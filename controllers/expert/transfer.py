@@ -157,7 +157,7 @@ class Transfer:
 
     @property
     def _clings(self) -> bool:
-        """If open fingers both touch what was let go of; a ring is wider by its corner than its wall."""
+        """Whether open fingers both touch what was let go of; a ring's corner is wider than its wall."""
         is_open = self.hand.angle > _AS_WIDE * self.state.opening
         return is_open and self._seen.holders[self.state.thing] == self.hand.number
 
