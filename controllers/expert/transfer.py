@@ -13,7 +13,7 @@ from math import acos, hypot
 import numpy as np
 
 from controllers.expert.fallen_rings import BESIDE
-from controllers.expert.grasps import UPRIGHT
+from controllers.expert.grasps import AJAR, UPRIGHT
 from controllers.expert.hand import Hand, Phase, Role
 from controllers.expert.plans import Plan, plan, plan_leaning, upright
 from controllers.expert.team import Refusals, Team
@@ -40,6 +40,10 @@ _UNHELD = 0.25
 """s without a holder after which a thing is lost."""
 _OPENED = 0.25
 """s: for a jaw to let go."""
+_WIDEST = 0.8
+"""rad: so far a jaw opens, a step of `AJAR` at a time, while what it let go of clings to its fingers."""
+_AS_WIDE = 0.9
+"""Share of its opening at which a jaw that still touches what it let go of does not come free by itself."""
 _GENTLE = 0.4
 """Share of the speed with which a hand comes down on things."""
 _OFFERED = 20.0
@@ -150,6 +154,12 @@ class Transfer:
         The engine names one holder, of two the first, and none where a finger leaves it for a moment.
         """
         return self.state.unheld < _UNHELD and self.hand.angle > _HELD_OPEN
+
+    @property
+    def _clings(self) -> bool:
+        """Whether open fingers both touch what was let go of; a ring's corner is wider than its wall."""
+        is_open = self.hand.angle > _AS_WIDE * self.state.opening
+        return is_open and self._seen.holders[self.state.thing] == self.hand.number
 
     @property
     def _is_there(self) -> bool:
@@ -318,7 +328,12 @@ class Transfer:
         return True
 
     def _open(self) -> None:
-        if self.state.waited > _OPENED:
+        if self.state.waited <= _OPENED:
+            return
+        if self._clings and self.state.opening + AJAR <= _WIDEST:
+            self.state.opening += AJAR
+            self._let_go()
+        else:
             back = -(BESIDE if self.state.leans else _HOVER) * rotation.matrix(self.hand.line()[3:])[:, 2]
             self._enter(Phase.RETREAT, self._moved(back), _GENTLE)
 

@@ -22,6 +22,9 @@ PERIOD = 10_000_000
 class World:
     """Two hands and the things of an installed scenario."""
 
+    clings = 0.0
+    """A jaw lets go when it is opened further than this, rad."""
+
     def __init__(self, name, *, poses=None, **params):
         given = load(name, []).params["lead"]
         self.expert = Expert("lead", ExpertParams.model_validate(given.model_dump() | params))
@@ -54,7 +57,8 @@ class World:
         arm = hand.arm
         for message in out[f"{arm}/jaw/move_jp"]:
             self.jaws[arm] = float(message.position[0])
-            self.grips.pop(arm, None)
+            if self.jaws[arm] > self.clings:
+                self.grips.pop(arm, None)
             if self.jaws[arm] < 0:
                 near = [
                     thing
@@ -105,6 +109,14 @@ def test_what_is_lost_on_its_way_is_taken_up_again():
     world.run(120)
     assert world.outputs["dropped"][0] == 1
     assert world.outputs["placed"][0] == len(world.things)
+
+
+def test_a_jaw_opens_further_until_nothing_clings_to_it():
+    world = one_ring("peg-board-surrol")
+    world.clings = 0.35
+    world.run(30)
+    assert world.jaws["PSM1"] == pytest.approx(0.4)
+    assert (world.outputs["placed"][0], world.outputs["attempts"][0]) == (1, 1)
 
 
 def one_ring(name, pose=None, **params):
