@@ -56,11 +56,11 @@ class GuidedStitching(Stitching):
     """Makes the stitches that a person picks, one after the other, each with the person's consent."""
 
     params_model: ClassVar[type[Params]] = GuidedStitchingParams
-    params: GuidedStitchingParams
     _surgeon: GuidedSurgeon
 
     def __init__(self, name: str, params: GuidedStitchingParams) -> None:
         super().__init__(name, params)
+        self._camera, self._banner = params.camera, params.banner
         self._frames = SceneFrames(params, params.camera)
         self._seen = _Shown()
         self.keep(self._seen, self._surgeon.guided)
@@ -142,7 +142,7 @@ class GuidedStitching(Stitching):
         if seen.published < 0:
             said = [_FIRST_WORDS]
         if said:
-            markers.append(path_markers.banner(said[-1], params.camera, params.banner))
+            markers.append(path_markers.banner(said[-1], self._camera, self._banner))
         if seen.picked != guided.picked or seen.published != stage:
             pose = params.phantom.pose
             for number, place in enumerate(guided.points):

@@ -125,7 +125,7 @@ class GuidedSurgeon(Surgeon):
             self.guided.picked = 0
             raise
         self.guided.stage = Stage.PROPOSED
-        self._status.append(f"feasible, with {plan.margin:.2f} of the joints' ranges left: consent?")
+        self._status.append(f"consent? {plan.margin:.2f} of the joints' ranges is left")
 
     def command(self, word: str) -> None:
         """Do what a person says, one of COMMANDS. Raises MotionError if that cannot be done now."""

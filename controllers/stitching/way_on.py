@@ -76,14 +76,14 @@ def way_on(
     emerge, lift = params.emerge, params.lift
     pull = pulling(stitch, emerge, lift)
     if holding is puller and inside:
-        grip, margin = _kept(puller, needle, pulling(stitch, emerge, lift, angle))
+        grip, margin = _kept(puller, needle, [pulling(stitch, emerge, lift, angle)])
         return WayOn(Phase.PULL, puller, stitch.pose(angle), angle, np.eye(4), grip, margin)
     taking, pull_margin = _chosen(puller, grips_of(puller, params.taken, stitch.needle), [pull])
     if holding is driver:
         grip = inverse_pose(needle) @ framed(driver.measured)
         require_room(_behind(grip, driver, stitch), stitch, emerge)
         drive = driving(stitch, emerge, lift, angle if inside else None)
-        grip, margin = _kept(driver, needle, drive if inside else [raised, *drive])
+        grip, margin = _kept(driver, needle, [drive] if inside else [[raised], drive])
         if not inside:
             return WayOn(Phase.LIFT, driver, raised, over, grip, taking, min(margin, pull_margin))
         phase = Phase.DRIVE if angle < stitch.exit + emerge else Phase.COME
@@ -92,7 +92,7 @@ def way_on(
     drive, grips = driving(stitch, emerge, lift), grips_of(driver, params.grip, stitch.needle)
     if holding is puller:
         shown = stitch.pose(stitch.exit + emerge, lift)
-        _, kept = _kept(puller, needle, [shown])
+        _, kept = _kept(puller, needle, [[shown]])
         grip, margin = _chosen(driver, grips, [[shown], drive])
         return WayOn(Phase.PRESENT, puller, shown, over, grip, taking, min(kept, margin, pull_margin))
     grip, margin = _chosen(driver, grips, [[raised, needle], drive])
@@ -118,9 +118,9 @@ def _behind(grip: Vector, hand: Hand, stitch: Stitch) -> float:
     return stitch.needle.arc / 2.0 - atan2(y, x)
 
 
-def _kept(hand: Hand, needle: Vector, way: list[Vector]) -> tuple[Vector, float]:
-    """Return how the hand holds the needle now, and the margin with which it goes along `way` like that."""
-    return _chosen(hand, [inverse_pose(needle) @ framed(hand.measured)], [way])
+def _kept(hand: Hand, needle: Vector, ways: list[list[Vector]]) -> tuple[Vector, float]:
+    """Return how the hand holds the needle now, and the margin with which it goes like that."""
+    return _chosen(hand, [inverse_pose(needle) @ framed(hand.measured)], ways)
 
 
 def _chosen(hand: Hand, grips: list[Vector], ways: list[list[Vector]]) -> tuple[Vector, float]:
