@@ -47,6 +47,7 @@ __all__ = [
     "MultiArrayDimension",
     "MultiArrayLayout",
     "Point",
+    "PointStamped",
     "Pose",
     "PoseStamped",
     "PoseWithCovariance",
@@ -170,6 +171,14 @@ class Point(Message):
     x: Float64 = 0.0
     y: Float64 = 0.0
     z: Float64 = 0.0
+
+
+class PointStamped(Message):
+    """A position in a frame at a time."""
+
+    ros_type: ClassVar[str] = "geometry_msgs/msg/PointStamped"
+    header: Header = Header()
+    point: Point = Point()
 
 
 class Quaternion(Message):

@@ -34,7 +34,7 @@ class Stitching(Controller):
     def __init__(self, name: str, params: StitchingParams) -> None:
         super().__init__(name, params)
         self._hands = (self._hand(params.driver), self._hand(params.puller))
-        self._surgeon = Surgeon(params, *self._hands)
+        self._surgeon = self._make_surgeon()
         self._needle = params.needle[0]
         state, self._shown = self._surgeon.state, _Shown()
         self.keep(state, self._shown, *(hand.state for hand in self._hands))
@@ -44,6 +44,9 @@ class Stitching(Controller):
             "stitch": self._shown.stitch,
             "status": (),
         }
+
+    def _make_surgeon(self) -> Surgeon:
+        return Surgeon(self.params, *self._hands)
 
     def _hand(self, arm: ArmName) -> Hand:
         params = self.params

@@ -16,7 +16,20 @@ from robots.training.phantoms import Phantom
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["BEFORE", "BEYOND", "DEEP", "Plan", "make_plan", "make_stitch"]
+__all__ = [
+    "BEFORE",
+    "BEYOND",
+    "DEEP",
+    "Plan",
+    "best_grip",
+    "driving",
+    "grips_of",
+    "make_plan",
+    "make_stitch",
+    "pulling",
+    "require_room",
+    "stitch_through",
+]
 
 BEFORE, BEYOND = radians(12.0), radians(8.0)
 """Of the arc: from a tip that is brought in line to the skin; from the last of the needle to the skin."""
@@ -40,18 +53,29 @@ def make_stitch(phantom: Phantom, pose: Vector, number: int, needle: NeedleShape
 
     Raises MotionError if it is not feasible for this needle and pad, with the number that fails.
     """
-    entry, leave = (pose @ holes[number - 1] for holes in (phantom.entries, phantom.exits))
-    for name, hole in (("entry", phantom.entries[number - 1]), ("exit", phantom.exits[number - 1])):
-        over = np.abs(hole[:2, 3]) - np.array(phantom.skin[:2]) / 2.0
+    entry, leave = (holes[number - 1, :3, 3] for holes in (phantom.entries, phantom.exits))
+    return stitch_through(phantom, pose, entry, leave, needle, f"stitch {number}")
+
+
+def stitch_through(
+    phantom: Phantom, pose: Vector, entry: Vector, leave: Vector, needle: NeedleShape, name: str
+) -> Stitch:
+    """Return the stitch through two points of the skin, shape (3,), in the phantom's frame.
+
+    Raises MotionError, which begins with `name`, if it is not feasible for this needle and pad.
+    """
+    for end, point in (("entry", entry), ("exit", leave)):
+        over = np.abs(point[:2]) - np.array(phantom.skin[:2]) / 2.0
         if (over > 0.0).any():
-            raise MotionError(f"stitch {number}: its {name} is {over.max() * 1e3:.1f} mm beside the pad")
+            raise MotionError(f"{name}: its {end} is {over.max() * 1e3:.1f} mm beside the pad")
+    there, out = (pose @ [*point, 1.0] for point in (entry, leave))
     try:
-        stitch = stitch_between(entry[:3, 3], leave[:3, 3], pose[:3, 2], needle)
+        stitch = stitch_between(there[:3], out[:3], pose[:3, 2], needle)
     except MotionError as error:
-        raise MotionError(f"stitch {number}: {error}") from error
+        raise MotionError(f"{name}: {error}") from error
     if stitch.depth > phantom.skin[2]:
         raise MotionError(
-            f"stitch {number} would be {stitch.depth * 1e3:.1f} mm deep, and the skin is"
+            f"{name} would be {stitch.depth * 1e3:.1f} mm deep, and the skin is"
             f" {phantom.skin[2] * 1e3:.1f} mm thick"
         )
     return stitch
@@ -73,41 +97,61 @@ def make_plan(
     Raises MotionError if no grip will do, with the joint that fails.
     """
     needle = stitches[0].needle
-    if held > needle.arc or emerge + stitches[0].exit - stitches[0].entry > held:
-        raise MotionError(
-            f"held {np.degrees(held):.0f} degrees behind its tip, the jaw would be driven into the skin: the"
-            f" arc in the tissue and beyond is"
-            f" {np.degrees(emerge + stitches[0].exit - stitches[0].entry):.0f} degrees, the needle's"
-            f" {np.degrees(needle.arc):.0f}"
-        )
+    require_room(held, stitches[0], emerge)
     raised = start.copy()
     raised[:3, 3] -= lift * start[:3, 2]
     best = list[tuple[Vector, float]]()
     for hand, behind, ways in (
-        (driver, held, [[raised, start], *(_driving(stitch, emerge, lift) for stitch in stitches)]),
-        (puller, taken, [_pulling(stitch, emerge, lift) for stitch in stitches]),
+        (driver, held, [[raised, start], *(driving(stitch, emerge, lift) for stitch in stitches)]),
+        (puller, taken, [pulling(stitch, emerge, lift) for stitch in stitches]),
     ):
-        grips = [
-            grip_pose(Grip(behind, left_outside=side), needle, hand.jaw.length - DEEP)
-            for side in (False, True)
-        ]
-        found = [[reach(hand.chain, hand.base, np.array(way) @ grip) for way in ways] for grip in grips]
-        worst = [min(each, key=lambda one: one.margin) for each in found]
-        chosen = max(range(len(grips)), key=lambda i: worst[i].margin)
-        _require(hand, worst[chosen], found[chosen].index(worst[chosen]) - (hand is driver))
-        best.append((grips[chosen], worst[chosen].margin))
+        grip, worst, way = best_grip(hand, grips_of(hand, behind, needle), ways)
+        _require(hand, worst, way - (hand is driver))
+        best.append((grip, worst.margin))
     return Plan(best[0][0], best[1][0], min(margin for _, margin in best))
 
 
-def _driving(stitch: Stitch, emerge: float, lift: float) -> list[Vector]:
-    """Return poses of the needle (4, 4) from over the skin to where it is taken."""
-    angles = _angles(stitch.entry - BEFORE, stitch.exit + emerge)
+def require_room(held: float, stitch: Stitch, emerge: float) -> None:
+    """Raise MotionError if a jaw that is `held` rad behind the tip would be driven into the skin."""
+    inside = emerge + stitch.exit - stitch.entry
+    if held > stitch.needle.arc or inside > held:
+        raise MotionError(
+            f"held {np.degrees(held):.0f} degrees behind its tip, the jaw would be driven into the skin: the"
+            f" arc in the tissue and beyond is {np.degrees(inside):.0f} degrees, the needle's"
+            f" {np.degrees(stitch.needle.arc):.0f}"
+        )
+
+
+def grips_of(hand: Hand, behind: float, needle: NeedleShape) -> list[Vector]:
+    """Return both ways to hold the needle `behind` its tip (rad), as in a `Plan`."""
+    return [
+        grip_pose(Grip(behind, left_outside=side), needle, hand.jaw.length - DEEP) for side in (False, True)
+    ]
+
+
+def best_grip(
+    hand: Hand, grips: Sequence[Vector], ways: Sequence[Sequence[Vector]]
+) -> tuple[Vector, Reach, int]:
+    """Return the grip with the most room on its worst way, the reach on that way, and its number."""
+    found = [[reach(hand.chain, hand.base, np.array(way) @ grip) for way in ways] for grip in grips]
+    worst = [min(each, key=lambda one: one.margin) for each in found]
+    chosen = max(range(len(grips)), key=lambda i: worst[i].margin)
+    return grips[chosen], worst[chosen], found[chosen].index(worst[chosen])
+
+
+def driving(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
+    """Return poses of the needle (4, 4) from over the skin, or from `start` (rad), to where it is taken."""
+    end = stitch.exit + emerge
+    if start is not None:
+        return [stitch.pose(angle) for angle in _angles(min(start, end), end)]
+    angles = _angles(stitch.entry - BEFORE, end)
     return [stitch.pose(angles[0], lift), *(stitch.pose(angle) for angle in angles)]
 
 
-def _pulling(stitch: Stitch, emerge: float, lift: float) -> list[Vector]:
-    """Return poses of the needle (4, 4) from where it is taken until it is out and raised."""
-    angles = _angles(stitch.exit + emerge, stitch.out + BEYOND)
+def pulling(stitch: Stitch, emerge: float, lift: float, start: float | None = None) -> list[Vector]:
+    """Return poses of the needle (4, 4) from where it is taken, or `start`, until it is out and raised."""
+    end = stitch.out + BEYOND
+    angles = _angles(stitch.exit + emerge if start is None else min(start, end), end)
     return [*(stitch.pose(angle) for angle in angles), stitch.pose(angles[-1], lift)]
 
 

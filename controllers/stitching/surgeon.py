@@ -23,18 +23,18 @@ from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Surgeon", "SurgeonState"]
+__all__ = ["BACK", "OPEN", "OPENED", "SHUT", "Surgeon", "SurgeonState", "before"]
 
-_OPEN, _SHUT = 0.70, -0.30
+OPEN, SHUT = 0.70, -0.30
 """Of the jaw, rad: around a wire, and while it holds."""
-_BACK = 0.016
+BACK = 0.016
 """From where a jaw takes hold, m, against its fingers: clear of the wire."""
 _HOVER = 0.020
 _ACCURATE, _ALIGNED = 0.15e-3, 0.20e-3
 """m: of a tip where it takes hold; of the needle before it goes in."""
 _PATIENCE = 1.5
 """s: for these; then it goes on with what has been reached."""
-_PRESSED, _OPENED = 0.5, 0.3
+_PRESSED, OPENED = 0.5, 0.3
 """s: for a jaw to close, and to let go."""
 _HELD_OPEN = 0.02
 """rad: a jaw commanded to shut that stays this far open has something between its fingers."""
@@ -228,13 +228,13 @@ class Surgeon:
             f"{len(stitches)} stitches are feasible, with {plan.margin:.2f} of the joints' ranges left"
         )
         for hand in (self.driver, self.puller):
-            hand.move_jaw(_OPEN)
+            hand.move_jaw(OPEN)
         self.driver.go(self._pick(_HOVER))
         self._enter(Phase.HOVER)
 
     def _pick(self, away: float) -> Vector:
         """Return the tip's pose, shape (7,), where the driver takes the needle up, or so far before it."""
-        return _before(self.state.needle @ self.state.planned[0], away)
+        return before(self.state.needle @ self.state.planned[0], away)
 
     def _hover(self) -> None:
         if self._arrived(self.driver, _ACCURATE):
@@ -243,7 +243,7 @@ class Surgeon:
 
     def _descend(self) -> None:
         if self._arrived(self.driver, _ACCURATE):
-            self.driver.move_jaw(_SHUT)
+            self.driver.move_jaw(SHUT)
             self.state.attempts += 1
             self._enter(Phase.CLOSE)
 
@@ -261,7 +261,7 @@ class Surgeon:
         elif state.attempts >= _ATTEMPTS:
             raise MotionError(f"{self.driver.arm} could not take the needle up in {_ATTEMPTS} attempts")
         else:
-            self.driver.move_jaw(_OPEN)
+            self.driver.move_jaw(OPEN)
             self.driver.go(self._pick(_HOVER))
             self._enter(Phase.HOVER)
 
@@ -301,13 +301,13 @@ class Surgeon:
         if angle == end:
             self.state.waited += self.driver.period
             if self.state.waited > 0.3:
-                self.puller.go(self._taking(self.puller, _BACK))
+                self.puller.go(self._taking(self.puller, BACK))
                 self._enter(Phase.COME)
 
     def _taking(self, hand: Hand, away: float) -> Vector:
         """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
         planned = self.state.planned[0 if hand is self.driver else 1]
-        return _before(self.state.needle @ planned, away)
+        return before(self.state.needle @ planned, away)
 
     def _taker(self) -> Hand:
         return self.driver if self.state.phase >= Phase.PRESENT else self.puller
@@ -323,7 +323,7 @@ class Surgeon:
         if hand.has_arrived:  # the needle may still give a little
             hand.state.goal[:] = self._taking(hand, 0.0)
         if self._arrived(hand, _ACCURATE):
-            hand.move_jaw(_SHUT)
+            hand.move_jaw(SHUT)
             self._enter(after)
 
     def _hold(self, after: Phase) -> None:
@@ -332,19 +332,19 @@ class Surgeon:
             return
         if hand.angle <= _HELD_OPEN:
             raise MotionError(f"{hand.arm} has not taken hold of the needle that {other.arm} holds")
-        other.move_jaw(_OPEN)
+        other.move_jaw(OPEN)
         self._enter(after)
 
     def _release(self, after: Phase) -> None:
         hand = self._taker()
         other = self.driver if hand is self.puller else self.puller
         self.state.waited += hand.period
-        if self.state.waited < _OPENED:
+        if self.state.waited < OPENED:
             return
         if hand.angle <= _HELD_OPEN:
             raise MotionError(f"{hand.arm} has lost the needle as {other.arm} let go")
         self._grasped(hand)
-        other.go(_before(framed(other.line()), _BACK))
+        other.go(before(framed(other.line()), BACK))
         self._enter(after)
 
     def _leave(self) -> None:
@@ -382,7 +382,7 @@ class Surgeon:
 
     def _present(self) -> None:
         if self._arrived(self.puller):
-            self.driver.go(self._taking(self.driver, _BACK))
+            self.driver.go(self._taking(self.driver, BACK))
             self._enter(Phase.COME_BACK)
 
     def _leave_back(self) -> None:
@@ -392,7 +392,7 @@ class Surgeon:
             self._to_approach()
 
 
-def _before(tip: Vector, away: float) -> Vector:
+def before(tip: Vector, away: float) -> Vector:
     """Return a pose of the tip, shape (7,), `away` metres against its fingers from `tip`, shape (4, 4)."""
     pose = pose_of(tip)
     pose[:3] -= away * tip[:3, 2]

@@ -87,6 +87,10 @@ class GatewayParams(TopicParams):
     cameras: tuple[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")], ...] = Field(
         default=("endoscope",), description="names of stereo cameras"
     )
+    stitching: bool = Field(
+        default=False,
+        description="whether there are topics under /stitch, for a participant `guided-stitching`",
+    )
     publish_period: Duration = Field(
         default=10_000_000,
         ge=500_000,

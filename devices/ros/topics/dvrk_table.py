@@ -31,6 +31,7 @@ from schemas.ros import (
     Float64MultiArray,
     Image,
     JointState,
+    PointStamped,
     PoseStamped,
     StringMessage,
     TFMessage,
@@ -74,6 +75,8 @@ def dvrk_table(params: GatewayParams) -> tuple[Row, ...]:
         rows += _events_and_commands(component, TELEOPERATION.events, TELEOPERATION.commands)
     for camera in params.cameras:
         rows += _camera(camera)
+    if params.stitching:
+        rows += _stitch()
     rows += (
         Row("/tf", TFMessage.ros_type, "publish", periodic=True),
         Row("/joint_states", JointState.ros_type, "publish", periodic=True),
@@ -181,6 +184,15 @@ def _camera(camera: str) -> Iterator[Row]:
         yield _event(camera, f"{eye}/camera_info", CameraInfo.ros_type, latched=False)
     yield _command(camera, "markers", MarkerArray.ros_type)
     yield _event(camera, "error", StringMessage.ros_type)
+
+
+def _stitch() -> Iterator[Row]:
+    """Yield the rows of a stitch that a person guides: ours, of types that every ROS program has."""
+    yield _command("stitch", "pick", PointStamped.ros_type)
+    yield _command("stitch", "command", StringMessage.ros_type)
+    yield _event("stitch", "state", StringMessage.ros_type)
+    yield _event("stitch", "status", StringMessage.ros_type)
+    yield _event("stitch", "markers", MarkerArray.ros_type, latched=False)
 
 
 def _real_state(owner: str, name: str, type_: str, **more: object) -> Row:

@@ -23,7 +23,7 @@ class World:
     def __init__(self, **params):
         file = load("suturing", [])
         given = file.params["lead"]
-        self.lead = Stitching("lead", StitchingParams.model_validate(given.model_dump() | params))
+        self.lead = self.make(given, params)
         self.lead.configure(Setup(PERIOD, "."))
         thing = file.params["robot"].objects["needle"]
         self.needle = framed(np.array([*thing.position, *thing.orientation]))
@@ -34,11 +34,14 @@ class World:
         self.jaws, self.grips, self.t, self.said = dict.fromkeys(self.tips, 0.5), {}, 0, []
         self.wire = NEEDLES["sh-plus"].points(np.linspace(-1.57, 1.57, 200))
 
+    def make(self, given, params):
+        return Stitching("lead", StitchingParams.model_validate(given.model_dump() | params))
+
     @property
     def phase(self):
         return self.lead._surgeon.state.phase
 
-    def step(self, **events):
+    def values(self):
         values = {}
         for hand in self.lead._hands:
             arm = hand.arm
@@ -48,7 +51,10 @@ class World:
         values["objects/needle/pose"] = pose_of(self.needle)
         holders = sorted(float(arm[-1]) for arm in self.grips)
         values["objects/needle/held_by"] = np.array([holders[0] if holders else 0.0])
-        out = self.lead.step(self.t, PERIOD, Inputs(values, events=events))
+        return values
+
+    def step(self, **events):
+        out = self.lead.step(self.t, PERIOD, Inputs(self.values(), events=events))
         self.t += PERIOD
         self.said += [message.data for message in out["status"]]
         for hand in self.lead._hands:

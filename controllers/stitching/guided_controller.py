@@ -1,0 +1,154 @@
+"""The guided stitch as a participant: what a person picks and says, the commands, and what is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, cast
+
+import numpy as np
+from pydantic import Field
+
+from controllers.expert.hand import framed, pose_of
+from controllers.stitching import path_markers
+from controllers.stitching.controller import Stitching
+from controllers.stitching.guided_ports import SOURCES, guided_ports
+from controllers.stitching.guided_surgeon import GuidedSurgeon
+from controllers.stitching.params import StitchingParams
+from controllers.stitching.scene_frames import SceneFrames
+from controllers.stitching.stage import Stage
+from hub.participant import Inputs, Outputs, Params, Record, Setup, array, integer
+from robots.dvrk.endoscope import BASELINE
+from schemas.errors import MotionError
+from schemas.ports import Port
+from schemas.quantity import Length
+from schemas.ros import BoolMessage, PointStamped, StringMessage
+from schemas.visualization import Marker, MarkerArray
+
+__all__ = ["GuidedStitching", "GuidedStitchingParams"]
+
+_FIRST_WORDS = "Pick entry and exit"
+
+
+class GuidedStitchingParams(StitchingParams):
+    """The scene, the two hands, and the camera in whose pictures the stitch is shown.
+
+    `stitches`, `first` and `end` have no effect: a person picks every stitch, and ends the session.
+    """
+
+    camera: str = Field(default="endoscope", description="whose pictures the banner is in")
+    banner: tuple[Length, Length, Length] = Field(
+        default=(BASELINE / 2.0, -42e-3, 0.1),
+        description="the middle of its text in the left camera's optical frame: right, down, ahead",
+    )
+
+
+class _Shown(Record):
+    stage = array(1)
+    published = integer(-1)
+    """Stage of the last `state`."""
+    picked = integer(-1)
+    """Number of points that are drawn."""
+    led = array(2)
+    """Whether a person's hand leads driver and puller."""
+
+
+class GuidedStitching(Stitching):
+    """Makes the stitches that a person picks, one after the other, each with the person's consent."""
+
+    params_model: ClassVar[type[Params]] = GuidedStitchingParams
+    _surgeon: GuidedSurgeon
+
+    def __init__(self, name: str, params: GuidedStitchingParams) -> None:
+        super().__init__(name, params)
+        self._camera, self._banner = params.camera, params.banner
+        self._frames = SceneFrames(params, params.camera)
+        self._seen = _Shown()
+        self.keep(self._seen, self._surgeon.guided)
+        self._outputs |= {"stage": self._seen.stage, "state": (), "markers": ()}
+
+    def _make_surgeon(self) -> GuidedSurgeon:
+        return GuidedSurgeon(self.params, *self._hands)
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Those of the expert; setpoints, points and words in; stage and markers out."""
+        params = self.params
+        return (*guided_ports(params.driver, params.puller, self._needle), *self._frames.ports)
+
+    @property
+    def ended(self) -> str:
+        """Never: the person ends the session."""
+        return ""
+
+    def configure(self, setup: Setup) -> Outputs:
+        """Start with idle hands."""
+        self._period = setup.period_ns * 1e-9
+        return super().configure(setup)
+
+    def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
+        """Hear what the person says, and go on with what was consented to.
+
+        Raises SessionError if a command is refused.
+        """
+        surgeon, seen = self._surgeon, self._seen
+        setpoints = np.zeros((2, 7))
+        for number, hand in enumerate(self._hands):
+            hand.period = self._period
+            self._refuse(hand.arm, inputs)
+            hand.sense(
+                inputs[f"{hand.arm}/local/measured_cp"], float(inputs[f"{hand.arm}/jaw/measured_js"][0])
+            )
+            setpoints[number] = pose_of(hand.base @ framed(inputs[f"{hand.arm}/local/setpoint_cp"]))
+            for message in cast("tuple[BoolMessage, ...]", inputs.events(f"{hand.arm}/following")):
+                seen.led[number] = message.data
+        needle = f"objects/{self._needle}"
+        surgeon.sense(inputs[f"{needle}/pose"], float(inputs[f"{needle}/held_by"][0]))
+        surgeon.measure(setpoints, led=bool(seen.led.any()))
+        said = [*self._hear(inputs)]
+        surgeon.step()
+        self._command()
+        said += surgeon.statuses()
+        self._outputs["status"] = tuple(StringMessage(data=text) for text in said)
+        self._show(said)
+        return self._outputs
+
+    def _hear(self, inputs: Inputs) -> Iterator[str]:
+        """Do what the person picks and says; yield why something cannot be done."""
+        surgeon = self._surgeon
+        for source in SOURCES:
+            for picked in cast("tuple[PointStamped, ...]", inputs.events(f"{source}pick")):
+                try:
+                    surgeon.pick(self._frames.in_world(picked, inputs))
+                except MotionError as error:
+                    yield f"refused: {error}"
+            for command in cast("tuple[StringMessage, ...]", inputs.events(f"{source}command")):
+                try:
+                    surgeon.command(command.data)
+                except MotionError as error:
+                    yield f"refused: {error}"
+
+    def _command(self) -> None:
+        surgeon, moves = self._surgeon, self._surgeon.moves
+        for hand, settles in zip(self._hands, surgeon.settles, strict=True):
+            self._outputs[f"{hand.arm}/servo_cp"] = (hand.advance(settle=settles),) if moves else ()
+            self._outputs[f"{hand.arm}/jaw/move_jp"] = hand.jaw_commands() if moves else ()
+        self._shown.phase[0], self._shown.stitch[0] = surgeon.state.phase, surgeon.state.made[0] + 1.0
+
+    def _show(self, said: list[str]) -> None:
+        """Publish the stage and the markers that have changed."""
+        guided, seen, params = self._surgeon.guided, self._seen, self.params
+        stage, markers = guided.stage, list[Marker]()
+        self._outputs["state"] = (StringMessage(data=stage.name),) if seen.published != stage else ()
+        if seen.published < 0:
+            said = [_FIRST_WORDS]
+        if said:
+            markers.append(path_markers.banner(said[-1], self._camera, self._banner))
+        if seen.picked != guided.picked or seen.published != stage:
+            pose = params.phantom.pose
+            for number, place in enumerate(guided.points):
+                there = (pose @ [*place, 1.0])[:3] if number < guided.picked else None
+                markers.append(path_markers.point(number, there))
+            planned = stage is not Stage.PICKING and guided.picked == len(guided.points)
+            markers += path_markers.path(self._surgeon.stitch if planned else None, params.emerge)
+        seen.picked, seen.published, seen.stage[0] = guided.picked, int(stage), stage
+        self._outputs["markers"] = (MarkerArray(markers=markers),) if markers else ()

@@ -1,0 +1,250 @@
+"""The surgeon of `surgeon`, led by a person, who picks where to stitch and consents before anything moves.
+
+Pause and resume are a pace between 0 and 1 at which the procedure's own time passes. After a take-over, and
+after a failure, the stitch is planned anew from where needle and hands are: the free hand opens and goes
+clear, then each hand goes on a line from its present setpoint to where the procedure goes on.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from controllers.expert.hand import Hand, framed, pose_of
+from controllers.stitching.geometry import Stitch
+from controllers.stitching.params import StitchingParams
+from controllers.stitching.phase import Phase
+from controllers.stitching.plan import stitch_through
+from controllers.stitching.stage import COMMANDS, Stage
+from controllers.stitching.surgeon import BACK, OPEN, OPENED, SHUT, Surgeon, before
+from controllers.stitching.way_on import WayOn, way_on
+from hub.participant import Record, array, choice, flag, integer, number
+from robots.dvrk.cart import inverse_pose
+from schemas.errors import MotionError
+from schemas.vectors import Vector
+
+__all__ = ["GuidedSurgeon"]
+
+_ABOVE = 5.0e-3
+"""m; a point so far from the skin is still meant to be on it."""
+_LEAST = 2.0e-3
+"""m; of a bite."""
+_RAMP = 0.2
+"""s in which a pause stops all motion."""
+_MOVED, _TURNED = 0.5e-3, 0.01
+"""m, and of a quaternion's parts: a hand this far from where it paused was moved by somebody."""
+_CLEAR = 0.04
+"""m; a free hand that is nearer to the needle goes back before it goes elsewhere."""
+
+
+class Rejoin(IntEnum):
+    """How the hands come to where the procedure goes on."""
+
+    NONE = 0
+    OPEN = 1
+    CLEAR = 2
+    GO = 3
+
+
+class GuidedState(Record):
+    """What a person has said, and how it is carried out."""
+
+    stage = choice(Stage.PICKING)
+    picked = integer()
+    """Number of points: entry, exit."""
+    points = array(2, 3)
+    """Entry and exit on the skin, in the phantom's frame."""
+    pace = number()
+    """At which the procedure's time passes, 0 to 1."""
+    rejoin = choice(Rejoin.NONE)
+    then = choice(Phase.BEGIN)
+    """The phase that the hands rejoin."""
+    goals = array(2, 7)
+    """Of driver and puller, where they rejoin it."""
+    holder = number()
+    begun = flag()
+
+
+class GuidedSurgeon(Surgeon):
+    """Two hands, a needle and a person."""
+
+    def __init__(self, params: StitchingParams, driver: Hand, puller: Hand) -> None:
+        super().__init__(params, driver, puller)
+        self.guided = GuidedState()
+        self._hands, self._setpoints = (driver, puller), np.zeros((2, 7))
+        self.led = False
+        """Whether a person's hand leads an arm now."""
+
+    @property
+    def stitch(self) -> Stitch:
+        """The stitch through the picked points. Raises MotionError if it is not feasible."""
+        phantom, (entry, leave) = self.params.phantom, self.guided.points
+        return stitch_through(phantom.measures, phantom.pose, entry, leave, self._needle, "the stitch")
+
+    @property
+    def moves(self) -> bool:
+        """Whether it commands the arms in this step."""
+        return self.guided.pace > 0.0
+
+    def measure(self, setpoints: Vector, *, led: bool) -> None:
+        """Take the setpoints of both tips in the world, shape (2, 7), and whether a hand leads an arm."""
+        self._setpoints[:], self.led = setpoints, led
+        if not self.guided.begun:
+            self.guided.begun, self.state.park[:] = True, setpoints
+            self._enter(Phase.DONE)
+
+    def pick(self, point: Vector) -> None:
+        """Take the next point, shape (3,), in the world: an entry, then its exit, then the next entry.
+
+        Raises MotionError if it is no point of the skin, or not the time to pick.
+        """
+        guided, phantom = self.guided, self.params.phantom
+        if guided.stage in (Stage.RUNNING, Stage.PAUSED):
+            raise MotionError("a stitch is being made: pause and cancel it before the next one is picked")
+        where = (inverse_pose(phantom.pose) @ [*point, 1.0])[:3]
+        if abs(where[2]) > _ABOVE:
+            raise MotionError(
+                f"the point is {where[2] * 1e3:.1f} mm above the skin, allowed are {_ABOVE * 1e3:.0f} either"
+                " way"
+            )
+        where[2] = 0.0
+        is_exit = guided.picked == 1
+        if is_exit and (bite := float(np.linalg.norm(where - guided.points[0]))) < _LEAST:
+            raise MotionError(f"entry and exit are {bite * 1e3:.1f} mm apart, at least {_LEAST * 1e3:.0f}")
+        guided.points[int(is_exit)] = where
+        guided.picked = 1 + is_exit
+        guided.stage = Stage.PICKING
+        if is_exit:
+            self._propose()
+
+    def _propose(self) -> None:
+        try:
+            plan = self._way_on()
+        except MotionError:
+            self.guided.picked = 0
+            raise
+        self.guided.stage = Stage.PROPOSED
+        self._status.append(f"consent? {plan.margin:.2f} of the joints' ranges is left")
+
+    def command(self, word: str) -> None:
+        """Do what a person says, one of COMMANDS. Raises MotionError if that cannot be done now."""
+        guided, word = self.guided, word.strip().lower()
+        if word not in COMMANDS:
+            raise MotionError(f"'{word}' is no command, allowed: {', '.join(COMMANDS)}")
+        if guided.stage not in COMMANDS[word]:
+            allowed = ", ".join(name for name, stages in COMMANDS.items() if guided.stage in stages)
+            raise MotionError(f"'{word}' while {_words(guided.stage)}, allowed: {allowed}")
+        if word == "pause":
+            self._stage(Stage.PAUSED)
+        elif word == "take over":
+            self.take_over()
+        elif word == "cancel":
+            guided.picked, guided.rejoin = 0, Rejoin.NONE
+            self._enter(Phase.DONE)
+            self._stage(Stage.PICKING)
+        elif self.led:
+            raise MotionError(f"'{word}' while a hand leads an arm: release it first")
+        elif guided.stage is Stage.PAUSED and self._is_where_it_paused:
+            self._stage(Stage.RUNNING)
+        else:
+            self._go_on()
+
+    def take_over(self) -> None:
+        """Command nothing from now on: the arms are in a person's hands."""
+        self._stage(Stage.TAKEN_OVER)
+        self.guided.pace = 0.0
+
+    def _stage(self, stage: Stage) -> None:
+        self.guided.stage = stage
+        self._status.append(_words(stage))
+
+    @property
+    def _is_where_it_paused(self) -> bool:
+        for hand, setpoint in zip(self._hands, self._setpoints, strict=True):
+            off = hand.line() - setpoint
+            off[:3] += hand.state.correction
+            turned = min(np.abs(off[3:]).max(), np.abs(off[3:] + 2.0 * setpoint[3:]).max())
+            if np.abs(off[:3]).max() > _MOVED or turned > _TURNED:
+                return False
+        return True
+
+    def _way_on(self) -> WayOn:
+        if self.guided.picked < len(self.guided.points):
+            raise MotionError("no stitch is picked: entry and exit are needed")
+        return way_on(
+            self.params, self.driver, self.puller, self.stitch, self.state.needle, self.state.holder
+        )
+
+    def _go_on(self) -> None:
+        """Plan anew, and let the hands go to where the procedure goes on, each from its setpoint."""
+        plan, state, guided = self._way_on(), self.state, self.guided
+        state.planned[0], state.planned[1] = plan.driver, plan.puller
+        state.angle[0], state.attempts, state.waited, state.failed[0] = plan.angle, 0, 0.0, 0.0
+        for hand, setpoint in zip(self._hands, self._setpoints, strict=True):
+            hand.state.correction[:] = 0.0
+            hand.state.start[:] = hand.state.goal[:] = setpoint
+            hand.state.duration = hand.state.elapsed = 0.0
+            hand.move_jaw(SHUT if hand is plan.holder else OPEN)
+        guided.goals[:] = state.park
+        if plan.holder is not None:
+            self._grasped(plan.holder)
+            guided.goals[self._hands.index(plan.holder)] = pose_of(plan.needle @ state.grip)
+        if plan.phase is Phase.HOVER:
+            guided.goals[0] = before(plan.needle @ plan.driver, BACK)
+        elif plan.phase is Phase.COME:
+            guided.goals[1] = before(plan.needle @ plan.puller, BACK)
+        guided.rejoin, guided.then = Rejoin.OPEN, plan.phase
+        guided.holder = 0.0 if plan.holder is None else plan.holder.number
+        self._enter(Phase.BEGIN)
+        self._stage(Stage.RUNNING)
+
+    def step(self) -> None:
+        """Let time pass at the present pace, and do what comes next."""
+        guided, share = self.guided, self.driver.period / _RAMP
+        if self.led and guided.stage in (Stage.RUNNING, Stage.PAUSED, Stage.STOPPED):
+            self.take_over()
+        wanted = 1.0 if guided.stage is Stage.RUNNING else 0.0
+        guided.pace += min(max(wanted - guided.pace, -share), share)
+        for hand in self._hands:
+            hand.period *= guided.pace
+        if guided.pace == 0.0:
+            return
+        if guided.rejoin is Rejoin.NONE:
+            super().step()
+        else:
+            self._rejoin()
+
+    def _rejoin(self) -> None:
+        guided, state = self.guided, self.state
+        state.waited += self.driver.period
+        if guided.rejoin is Rejoin.OPEN and state.waited >= OPENED:
+            for hand in self._hands:
+                near = float(np.linalg.norm(hand.measured[:3] - state.needle[:3, 3])) < _CLEAR
+                if hand.number != guided.holder and near:
+                    hand.go(before(framed(hand.line()), BACK))
+            guided.rejoin = Rejoin.CLEAR
+        elif guided.rejoin is Rejoin.CLEAR and all(hand.has_arrived for hand in self._hands):
+            for hand, goal in zip(self._hands, guided.goals, strict=True):
+                hand.go(goal, 0.35 if hand.number == guided.holder else 1.0)
+            guided.rejoin = Rejoin.GO
+        elif guided.rejoin is Rejoin.GO and all(hand.has_arrived for hand in self._hands):
+            guided.rejoin = Rejoin.NONE
+            self._enter(guided.then)
+
+    def _raise(self) -> None:
+        """Let the puller hold the needle over the skin until the next stitch is picked."""
+        if self._arrived(self.puller):
+            self.state.made[0] += 1.0
+            self.guided.picked = 0
+            self._enter(Phase.DONE)
+            self._stage(Stage.PICKING)
+
+    def _fail(self, why: str) -> None:
+        self.state.failed[0], self.guided.stage = 1.0, Stage.STOPPED
+        self._status.append(f"stopped: {why}")
+        self._enter(Phase.FAILED)
+
+
+def _words(stage: Stage) -> str:
+    return stage.name.lower().replace("_", " ")

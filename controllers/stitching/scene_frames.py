@@ -1,0 +1,86 @@
+"""The frames of a scene in which a person may pick points, under the names of /tf. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from controllers.expert.hand import framed
+from controllers.motion.frames import base_in_world
+from controllers.motion.params import MotionParams
+from controllers.stitching.params import StitchingParams
+from hub.participant import Inputs
+from robots.dvrk import crtk
+from robots.dvrk.cart import inverse_pose
+from robots.dvrk.ecm import tip
+from robots.dvrk.endoscope import BASELINE, optical_in_roll
+from robots.dvrk.mounted import MountedEcm
+from schemas.errors import MotionError, did_you_mean
+from schemas.ports import Port
+from schemas.ros import PointStamped, PoseStamped
+from schemas.vectors import Vector
+
+__all__ = ["SceneFrames"]
+
+
+class SceneFrames:
+    """Where the frames are: those that stand fast, the tips of the arms, the camera and the needle."""
+
+    def __init__(self, params: StitchingParams, camera: str) -> None:
+        """`camera`: name of the endoscope, whose left optical frame is one of them."""
+        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
+        self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.driven}
+        self._fixed = {crtk.WORLD_FRAME: np.eye(4)}
+        if params.mounting == "cart":
+            self._fixed[crtk.CART_FRAME] = np.eye(4)
+        self._fixed |= {crtk.base_frame(arm): base for arm, base in self._bases.items()}
+        self._fixed |= {name: fixture.pose for name, fixture in params.fixtures.items()}
+        self._needle, self._optical = params.needle[0], f"{camera}_left_optical"
+        ecm = params.arms.driven.get("ECM")
+        self._left = _left_in_tip(ecm) if isinstance(ecm, MountedEcm) else None
+        self.others = tuple(arm for arm in self._bases if arm not in (params.driver, params.puller))
+        """Arms that do not stitch, whose tips are measured all the same."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all frames."""
+        camera = () if self._left is None else (self._optical,)
+        return (*self._fixed, *self._bases, *camera, self._needle)
+
+    @property
+    def ports(self) -> Iterator[Port]:
+        """The measured tips of the other arms."""
+        for arm in self.others:
+            yield Port(
+                name=f"{arm}/local/measured_cp",
+                causality="input",
+                type=PoseStamped.ros_type,
+                frame=crtk.base_frame(arm),
+            )
+
+    def in_world(self, picked: PointStamped, inputs: Inputs) -> Vector:
+        """Return a point in the world, shape (3,). Raises MotionError if its frame is unknown."""
+        point = picked.point
+        return (self._pose(picked.header.frame_id, inputs) @ [point.x, point.y, point.z, 1.0])[:3]
+
+    def _pose(self, frame: str, inputs: Inputs) -> Vector:
+        if (fixed := self._fixed.get(frame)) is not None:
+            return fixed
+        if frame in self._bases:
+            return self._bases[frame] @ framed(inputs[f"{frame}/local/measured_cp"])
+        if frame == self._needle:
+            return framed(inputs[f"objects/{frame}/pose"])
+        if self._left is not None and frame == self._optical:
+            return self._pose("ECM", inputs) @ self._left
+        raise MotionError(
+            f"frame_id '{frame}' is no frame of this scene; allowed: {', '.join(self.names)}"
+            f".{did_you_mean(frame, self.names)}"
+        )
+
+
+def _left_in_tip(arm: MountedEcm) -> Vector:
+    """Return the left camera's optical frame in that of the ECM's tip, shape (4, 4), as on /tf."""
+    left = np.eye(4)
+    left[0, 3] = -0.5 * BASELINE
+    return inverse_pose(tip(arm.endoscope, arm.tip_frame)) @ optical_in_roll(arm.endoscope) @ left

@@ -1,0 +1,203 @@
+"""A stitch that a person guides, in the world without physics of the stitching expert's tests."""
+
+import re
+
+import numpy as np
+import pytest
+
+from controllers.expert.hand import pose_of
+from controllers.stitching.guided_controller import GuidedStitching, GuidedStitchingParams
+from controllers.stitching.stage import Stage
+from hub.planning.scenario_file import load
+from robots.dvrk.cart import inverse_pose
+from schemas.ros import BoolMessage, Header, Point, PointStamped, StringMessage
+from schemas.visualization import MarkerAction
+from tests.controllers.stitching.test_surgeon import World
+
+TIP_PERIOD = 1.2e-3
+"""m; the way of a tip at its largest speed, 0.12 m/s, in a period."""
+
+
+class Guided(World):
+    """The world of the expert; its controllers are ideal, so that a setpoint is where the tip is."""
+
+    def make(self, given, params):
+        given = load("suturing-by-hand", []).params["lead"]
+        ecm = given.arms.ECM
+        self.camera = pose_of(ecm.chain.forward(np.array(ecm.start)))
+        return GuidedStitching("lead", GuidedStitchingParams.model_validate(given.model_dump() | params))
+
+    def __init__(self, **params):
+        self.markers, self.led, self.largest = {}, False, 0.0
+        super().__init__(**params)
+        self.step()
+
+    @property
+    def stage(self):
+        return self.lead._surgeon.guided.stage
+
+    def values(self):
+        values = super().values()
+        for hand in self.lead._hands:
+            values[f"{hand.arm}/local/setpoint_cp"] = values[f"{hand.arm}/local/measured_cp"]
+        values["ECM/local/measured_cp"] = self.camera
+        return values
+
+    def step(self, **events):
+        before = {arm: tip[:3, 3].copy() for arm, tip in self.tips.items()}
+        if self.led:
+            events["PSM1/following"] = (BoolMessage(data=True),)
+        out = super().step(**events)
+        for arm, place in before.items():
+            self.largest = max(self.largest, float(np.linalg.norm(self.tips[arm][:3, 3] - place)))
+        for array in out["markers"]:
+            for marker in array.markers:
+                if marker.action == MarkerAction.DELETE:
+                    self.markers.pop(marker.ns, None)
+                else:
+                    self.markers[marker.ns] = marker
+        return out
+
+    def pick(self, x, y, frame="phantom", z=0.0):
+        point = PointStamped(header=Header(frame_id=frame), point=Point(x=x, y=y, z=z))
+        self.step(pick=(point,))
+        return self
+
+    def say(self, word):
+        self.step(command=(StringMessage(data=word),))
+        return self
+
+    def consented(self):
+        return self.pick(0.008, 0.018).pick(-0.008, 0.018).say("consent")
+
+    def until(self, phase, seconds=30):
+        return self.run(seconds, until=lambda world: world.phase.name == phase)
+
+
+def test_a_person_picks_sees_the_path_consents_and_gets_a_stitch_through_both_points():
+    world = Guided()
+    world.pick(0.008, 0.018)
+    assert {"stitch/entry", "stitch/banner"} <= set(world.markers)
+    world.pick(-0.008, 0.018)
+    tips = dict(world.tips)
+    assert world.stage is Stage.PROPOSED
+    assert {"stitch/entry", "stitch/exit", "stitch/path", "stitch/disc"} <= set(world.markers)
+    assert "consent?" in world.markers["stitch/banner"].text
+    world.run(1.0, until=lambda _: False)
+    assert all((world.tips[arm] == tip).all() for arm, tip in tips.items())  # nothing moves before consent
+    world.say("consent").run(60, until=lambda w: w.stage is Stage.PICKING)
+    assert list(world.grips) == ["PSM2"]
+    assert world.lead._surgeon.state.made[0] == 1.0
+    assert "stitch/path" not in world.markers
+    world.pick(0.008, 0.006).pick(-0.008, 0.006).say("consent").until("COME_BACK")  # from the other hand
+    assert world.largest < TIP_PERIOD
+
+
+def test_points_may_be_in_any_frame():
+    world = Guided()
+    entry = np.array([0.008, 0.018, 0.0, 1.0])
+    for frame, pose in (
+        ("PSM1_base", world.lead._hands[0].base),
+        ("PSM1", world.tips["PSM1"]),
+        ("needle", world.needle),
+    ):
+        x, y, z = (inverse_pose(pose) @ entry)[:3].tolist()
+        world.pick(x, y, frame, z)
+        assert world.lead._surgeon.guided.points[0] == pytest.approx(entry[:3])
+        world.say("cancel")
+    world.pick(0, 0, "endoscope_left_optical", 0.05)
+    assert "above the skin" in world.said[-1]
+    world.pick(0, 0, "PSM7")
+    assert "frame_id 'PSM7' is no frame of this scene" in world.said[-1]
+
+
+@pytest.mark.parametrize(
+    ("entry", "leave", "why"),
+    [
+        ((0.081, 0.0), (0.070, 0.0), r"entry is 1\.0 mm beside the pad"),
+        ((0.012, 0.0), (-0.012, 0.0), r"24\.0 mm apart, and the needle is 22\.9 mm across"),
+        ((0.008, 0.0), (0.007, 0.0), r"1\.0 mm apart, at least 2"),
+        ((0.0, 0.008), (0.0, -0.008), r"of PSM[12], .* would .*"),
+    ],
+)
+def test_what_is_not_feasible_is_refused_with_the_number_that_fails(entry, leave, why):
+    world = Guided().pick(*entry).pick(*leave)
+    assert re.search(why, world.said[-1]), world.said
+    assert world.stage is Stage.PICKING
+    assert "stitch/path" not in world.markers
+    world.say("consent")
+    assert "refused: 'consent' while picking, allowed: cancel" in world.said[-1]
+
+
+@pytest.mark.parametrize("phase", ["HOVER", "DRIVE"])
+def test_it_pauses_and_resumes_in_any_phase_without_a_step(phase):
+    world = Guided().consented().until(phase)
+    world.run(0.3, until=lambda _: False)
+    world.say("pause").run(0.5, until=lambda _: False)
+    tips = {arm: tip.copy() for arm, tip in world.tips.items()}
+    out = world.step()
+    assert not out["PSM1/servo_cp"]
+    world.run(1.0, until=lambda _: False)
+    assert all((world.tips[arm] == tip).all() for arm, tip in tips.items())
+    world.say("resume").until("DRIVE" if phase != "DRIVE" else "COME")
+    assert world.stage is Stage.RUNNING, world.said
+    assert world.phase.name != phase
+    assert world.largest < TIP_PERIOD
+
+
+@pytest.mark.parametrize("phase", ["LIFT", "DRIVE"])
+def test_a_hand_takes_over_at_any_moment_and_the_stitch_is_planned_from_there(phase):
+    world = Guided().consented().until(phase)
+    world.run(0.3, until=lambda _: False)
+    world.led = True
+    out = world.step()
+    assert world.stage is Stage.TAKEN_OVER
+    assert not out["PSM1/servo_cp"]
+    assert not out["PSM2/servo_cp"]
+    world.say("resume")
+    assert "while a hand leads an arm" in world.said[-1]
+    if phase == "LIFT":  # the person moves an arm, and with it the needle
+        for _ in range(20):
+            world.tips["PSM1"][:3, 3] += [1e-4, 2e-4, 5e-4]
+            if "PSM1" in world.grips:
+                world.needle = world.tips["PSM1"] @ world.grips["PSM1"]
+            world.step()
+    world.led = False
+    world.step(**{"PSM1/following": (BoolMessage(data=False),)})
+    world.say("resume").until("DRIVE" if phase != "DRIVE" else "COME")
+    assert world.stage is Stage.RUNNING, world.said
+    assert world.phase.name != phase
+    assert world.largest < TIP_PERIOD
+
+
+def test_it_says_why_it_cannot_go_on():
+    world = Guided().consented().until("DRIVE")
+    world.run(2.0, until=lambda _: False)
+    world.say("take over")
+    world.tips["PSM1"][:3, 3] += [0.0, 0.003, 0.0]
+    world.needle = world.tips["PSM1"] @ world.grips["PSM1"]
+    world.say("resume")
+    assert "in the tissue and 3.0 mm beside its way, allowed are 2" in world.said[-1]
+    world.grips.clear()
+    world.tips["PSM1"][:3, 3] -= [0.0, 0.003, 0.0]
+    world.needle[:3, 3] -= [0.0, 0.003, 0.0]
+    world.say("resume")
+    assert "no jaw holds the needle, which is in the tissue" in world.said[-1]
+    assert world.stage is Stage.TAKEN_OVER
+
+
+def test_a_saved_stitch_goes_on_with_the_same_bits():
+    world, other = Guided(), Guided()
+    world.consented().run(4, until=lambda _: False)
+    other.lead.restore(world.lead.save())
+    other.tips = {arm: tip.copy() for arm, tip in world.tips.items()}
+    other.jaws, other.grips = dict(world.jaws), dict(world.grips)
+    other.needle, other.t = world.needle.copy(), world.t
+    world.run(1, until=lambda _: False)
+    other.run(1, until=lambda _: False)
+    assert world.lead.state_hash() == other.lead.state_hash()
+
+
+def test_words_that_are_none_are_refused():
+    world = Guided().say("go")
+    assert "'go' is no command, allowed: consent, pause, resume" in world.said[-1]
