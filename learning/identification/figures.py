@@ -24,9 +24,9 @@ def write_figure(file: Path, found: Fit, joints: Sequence[str]) -> None:
         zip(joints, figure.subplots(len(joints), sharex=True, squeeze=False)[:, 0], strict=True)
     ):
         axes.axvspan(unseen[0], unseen[-1], color="0.92", label="not seen by the fit")
-        axes.plot(found.time, found.measured[:, i], color="0.45", lw=1.0, label="measured")
+        axes.plot(found.time, found.measured[:, i], color="0.6", lw=3.0, label="measured")
         axes.plot(found.time, found.predicted[:, i], color="tab:blue", lw=1.0, label="predicted")
         axes.set_ylabel(f"{joint}, {'N' if joint == 'insertion' else 'N m'}")
     figure.axes[0].legend(loc="upper right", ncols=3, fontsize="small")
     figure.axes[-1].set_xlabel("time, s")
-    figure.savefig(file, dpi=_DPI)
+    figure.savefig(file, dpi=_DPI)  # pyright: ignore[reportUnknownMemberType]

@@ -33,7 +33,7 @@ def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = csv.reader(file)
-            names = [name.strip() for name in next(rows, [])]
+            names = [name.strip() for name in next(rows, list[str]())]
             table = np.array([[float(cell) for cell in row] for row in rows if row], np.float64)
     except OSError as error:
         raise RecordingError(f"cannot read '{path}': {error.strerror}") from error

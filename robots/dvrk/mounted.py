@@ -106,7 +106,7 @@ class MountedPsm(PsmTool, MountedArm):
     )
     dynamics: Path | None = Field(
         default=None,
-        description="file of `trocar identify`: masses, friction and springs of your own arm; null: published",
+        description="file of `trocar identify`: masses, friction, springs of your own arm; null: published",
     )
 
     @field_validator("dynamics")

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -94,7 +94,8 @@ class OwnDynamics(_Part):
                 raise MotionError(
                     f"'{file}' is larger than {_LARGEST} bytes: not a file of `trocar identify`"
                 )
-            return cls.model_validate(YAML(typ="safe").load(file.read_text(encoding="utf-8")))
+            yaml: Any = YAML(typ="safe")
+            return cls.model_validate(yaml.load(file.read_text(encoding="utf-8")))
         except OSError as error:
             raise MotionError(f"cannot read '{file}': {error.strerror}") from error
         except ValidationError as error:
@@ -106,9 +107,9 @@ class OwnDynamics(_Part):
 
     def text(self) -> str:
         """Return the content as YAML."""
-        stream, yaml = StringIO(), YAML()
-        yaml.default_flow_style = None
-        yaml.dump(self.model_dump(mode="json"), stream)  # pyright: ignore[reportUnknownMemberType]
+        stream, yaml = StringIO(), cast("Any", YAML())
+        yaml.default_flow_style = None  # lists in one line
+        yaml.dump(self.model_dump(mode="json"), stream)
         return stream.getvalue()
 
     def bodies_of(self, published: Mapping[str, Inertia]) -> Mapping[str, Inertia]:

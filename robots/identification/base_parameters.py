@@ -1,7 +1,7 @@
 """Base parameters: the combinations of an arm's parameters that its efforts depend on.
 
-Measurements tell combinations only. QR with column pivoting picks independent columns W1 of a regressor W; the
-others are W2 = W1 K, so that W p = W1 (p1 + K p2) (Gautier, "Numerical calculation of the base inertial
+Measurements tell combinations only. QR with column pivoting picks independent columns W1 of a regressor W;
+the others are W2 = W1 K, so that W p = W1 (p1 + K p2) (Gautier, "Numerical calculation of the base inertial
 parameters of robots", ICRA 1990).
 """
 

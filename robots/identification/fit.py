@@ -1,7 +1,7 @@
 """The parameters of an arm that explain its measured efforts and that an arm can have.
 
-First weighted least squares over the base parameters: the weight of a joint is one over the standard deviation of
-what an unweighted fit leaves there (Swevers et al., IEEE Control Systems 27(5), 2007). It gives standard
+First weighted least squares over the base parameters: the weight of a joint is one over the standard
+deviation of what an unweighted fit leaves there (Swevers et al., IEEE Control Systems 27(5), 2007). It gives standard
 deviations and the condition number. Then the parameters themselves, physically feasible: the pseudo-inertia
 of each body is (L M) (L M)^T with L of the published body and M lower triangular with diagonal exp(x) (Rucker
 and Wensing, RA-L 2022), friction, springs and rotors are not negative. What the measurements do not tell
@@ -30,8 +30,8 @@ LARGEST_CONDITION = 1e5
 _TRAINED = 0.75
 """Of the samples, the first ones; the rest is not seen by the fit and judges it."""
 _PRIOR = 1e-2
-"""Weight of a change of a body by exp(1), or of another parameter by its scale, against one standard deviation
-of one measured effort."""
+"""Weight of a change of a body by exp(1), or of another parameter by its scale, against one standard
+deviation of one measured effort."""
 _SCALES = {
     "armature": 1e-2,
     "stiffness": 0.1,
@@ -91,7 +91,7 @@ def fit(recorded: Sequence[Samples], tool: Instrument) -> Fit:
     rows = (regressor[seen] / sigma[:, None]).reshape(-1, regressor.shape[-1])
     goal = (effort[seen] / sigma).ravel()
     chosen = rows[:, base.columns]
-    base_values = np.linalg.lstsq(chosen, goal)[0]
+    base_values: Vector = np.asarray(np.linalg.lstsq(chosen, goal)[0], np.float64)
     deviations = np.sqrt(np.diag(np.linalg.inv(chosen.T @ chosen)) * _samples_per_independent(recorded[0]))
     parameters = _feasible(model, rows, goal)
     predicted = regressor @ parameters + carried
@@ -141,7 +141,8 @@ def _condition(regressor: Vector, base: BaseParameters) -> float:
     if condition > LARGEST_CONDITION:
         raise RecordingError(
             f"the motion does not excite the arm: condition number {condition:.2g}, allowed up to"
-            f" {LARGEST_CONDITION:.2g}. Record a motion of all joints at once, over their range, fast and slow"
+            f" {LARGEST_CONDITION:.2g}. Record all joints moving at once,"
+            f" over their range, fast and slow"
         )
     return condition
 
@@ -164,7 +165,7 @@ def _feasible(model: LinearModel, rows: Vector, goal: Vector) -> Vector:
     body = model.parts["body"]
     roots = np.linalg.cholesky(pseudo_inertias(model.nominal[body]))
     # Of as many rows as parameters: the triangle of QR leaves the same sum of squares, but for a constant.
-    triangle = np.linalg.qr(np.column_stack([rows, goal]), mode="r")
+    triangle: Vector = np.asarray(np.linalg.qr(np.column_stack([rows, goal]), mode="r"), np.float64)
     matrix, wanted = triangle[:, :-1], triangle[:, -1]
     nominal = model.nominal[body.stop :]
     scales = np.concatenate(

@@ -1,9 +1,10 @@
 """The efforts of a PSM as a linear function of its dynamic parameters.
 
-effort = sum_b trace(Y_b^T J_b) + armature ddq + stiffness q + offset + friction(dq) of joints and discs. J_b is the
-pseudo-inertia of a body of the arm (`robots.dvrk.dynamics`); the instrument's own bodies, which weigh
-grams, keep their known masses. Friction is viscous and Coulomb's, smoothed as `robots.dvrk.drives` has it; of
-roll and wrist it is in the discs that turn them, which is the cables' coupling. SI units, radians.
+effort = sum_b trace(Y_b^T J_b) + armature ddq + stiffness q + offset + friction(dq) of joints and
+discs. J_b is the pseudo-inertia of a body of the arm (`robots.dvrk.dynamics`); the instrument's own bodies,
+which weigh grams, keep their known masses. Friction is viscous and Coulomb's, smoothed as
+`robots.dvrk.drives` has it; of roll and wrist it is in the discs that turn them, which is the coupling of the
+cables. SI units, radians.
 """
 
 from __future__ import annotations

@@ -71,9 +71,7 @@ def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:
     step = float(np.median(np.diff(measured.time)))
     clock = np.arange(measured.time[0], measured.time[-1], step)
     q, effort = (
-        _low_passed(
-            np.array([np.interp(clock, measured.time, column) for column in values.T]).T, step, cutoff
-        )
+        _low_passed(_resampled(clock, measured.time, values), step, cutoff)
         for values in (measured.position, measured.effort)
     )
     dq, ddq = np.zeros_like(q), np.zeros_like(q)
@@ -81,6 +79,13 @@ def filtered(measured: Measured, cutoff: float, rate: float) -> Samples:
     ddq[1:-1] = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2
     kept = slice(None, None, max(1, round(1.0 / (rate * step))))
     return Samples(clock[kept], q[kept], dq[kept], ddq[kept], effort[kept], cutoff)
+
+
+def _resampled(clock: Vector, time: Vector, values: Vector) -> Vector:
+    result = np.empty((len(clock), values.shape[1]))
+    for i in range(values.shape[1]):
+        result[:, i] = np.interp(clock, time, values[:, i])
+    return result
 
 
 def _low_passed(values: Vector, step: float, cutoff: float) -> Vector:
