@@ -4,8 +4,8 @@ First weighted least squares over the base parameters: the weight of a joint is 
 deviation of what an unweighted fit leaves there (Swevers et al., IEEE Control Systems 27(5), 2007). It gives
 standard deviations and the condition number. Then the parameters themselves, physically feasible: the
 pseudo-inertia of each body is (L M) (L M)^T with L of the published body and M lower triangular with diagonal
-exp(x) (Rucker and Wensing, RA-L 2022), friction, springs and rotors are not negative. What the measurements do
-not tell stays near the published values.
+exp(x) (Rucker and Wensing, RA-L 2022), friction, springs and rotors are not negative. What the measurements
+do not tell stays near the published values.
 """
 
 from __future__ import annotations
