@@ -91,6 +91,14 @@ Velocities = Annotated[
         help="Joint velocities for the friction, rad/s and m/s; 0 unless given.",
     ),
 ]
+Own = Annotated[
+    Path | None,
+    typer.Option(
+        "--dynamics",
+        metavar="FILE",
+        help="Of a PSM: a file of `trocar identify`; the published ones unless given.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 
@@ -104,7 +112,13 @@ def fk(arm: Arm, *, instrument: Tool = None, q: Positions, as_json: Json = False
 
 @app.command(cls=_NumbersInARow)
 def dynamics(
-    arm: ArmArgument, *, instrument: Tool = None, q: Positions, dq: Velocities = None, as_json: Json = False
+    arm: ArmArgument,
+    *,
+    instrument: Tool = None,
+    own: Own = None,
+    q: Positions,
+    dq: Velocities = None,
+    as_json: Json = False,
 ) -> None:
     """Print an arm's joint-space inertia, gravity, friction and elasticity, its base upright; SI units."""
     _need_mujoco("dynamics")
@@ -119,7 +133,7 @@ def dynamics(
             raise MotionError(f"{arm}: not all joint velocities are finite: {velocities}")
         from engines.mujoco.model.dynamics import dynamics as of
 
-        found = of(name, tool, positions, velocities)
+        found = of(name, tool, positions, velocities, own)
     if as_json:
         typer.echo(
             json.dumps(
@@ -172,6 +186,14 @@ def export(
             ),
         ),
     ] = None,
+    own: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--dynamics",
+            metavar="ARM=FILE",
+            help="File of `trocar identify` for a PSM (published dynamics unless given). May be repeated.",
+        ),
+    ] = None,
     mounting: Annotated[
         Literal["cart", "free"],
         typer.Option(help="On the cart's setup joints, or one arm alone with its base in the origin."),
@@ -192,7 +214,7 @@ def export(
     named: list[CartArm] = [_cart_arm(arm) for arm in arms.replace(",", " ").split()]
     if not named:
         raise typer.BadParameter(f"name at least one of {', '.join(_CART)}", param_hint="--arms")
-    scene = _scene(named, instrument or [], mounting)
+    scene = _scene(named, instrument or [], own or [], mounting)
     try:
         files = write(scene, path, form)
     except OSError as error:
@@ -200,17 +222,14 @@ def export(
     typer.echo(f"{path}  ({len(files) - 1} meshes in {path.parent / 'assets'})")
 
 
-def _scene(arms: list[CartArm], instruments: list[str], mounting: str) -> SceneParams:
+def _scene(arms: list[CartArm], instruments: list[str], own: list[str], mounting: str) -> SceneParams:
     tools = {arm: {} if arm == "ECM" else {"instrument": DEFAULT_INSTRUMENT} for arm in arms}
     for text in instruments:
-        arm, _, tool = text.partition("=")
-        if arm not in tools or not tool:
-            problem = (
-                f"'{text}' is not ARM=N with an arm of this model: {', '.join(tools)}; write for instance"
-                f" {arms[0]}=400006"
-            )
-            raise typer.BadParameter(problem, param_hint="--instrument")
-        tools[_cart_arm(arm)] = {"endoscope" if arm == "ECM" else "instrument": tool}
+        arm, tool = _of_arm(text, arms, "--instrument", "400006")
+        tools[arm] = {"endoscope" if arm == "ECM" else "instrument": tool}
+    for text in own:
+        arm, file = _of_arm(text, arms, "--dynamics", "my_psm.yaml")
+        tools[arm] |= {"dynamics": file}
     if mounting == "free" and len(tools) > 1:
         raise typer.BadParameter(
             f"{len(tools)} arms would be at the same place; name one with --arms, or mount them on the cart",
@@ -218,6 +237,18 @@ def _scene(arms: list[CartArm], instruments: list[str], mounting: str) -> SceneP
         )
     with _refusing():
         return SceneParams.model_validate({"arms": tools, "mounting": mounting})
+
+
+def _of_arm(text: str, arms: list[CartArm], option: str, example: str) -> tuple[CartArm, str]:
+    """Return the arm and the value of `text`, which is ARM=VALUE with one of `arms`."""
+    arm, _, value = text.partition("=")
+    if arm not in arms or not value:
+        problem = (
+            f"'{text}' is not ARM={example} with an arm of this model: {', '.join(arms)}; write for instance"
+            f" {arms[0]}={example}"
+        )
+        raise typer.BadParameter(problem, param_hint=option)
+    return _cart_arm(arm), value
 
 
 def _cart_arm(arm: str) -> CartArm:

@@ -5,15 +5,27 @@ SI units, radians.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator, with_config
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+    with_config,
+)
 from typing_extensions import TypedDict  # pydantic needs this one before Python 3.12
 
-from robots.dvrk import ecm, psm
-from robots.dvrk.inertia import PROBE_RADIUS
+from robots.dvrk import drives, ecm, inertia, psm
+from robots.dvrk.drives import Disc, Drive
+from robots.dvrk.inertia import PROBE_RADIUS, Inertia
 from robots.dvrk.instruments import Instrument, instrument
+from robots.dvrk.own_dynamics import OwnDynamics
 from robots.dvrk.parameters import (
     FOLDED,
     EcmPositions,
@@ -25,6 +37,7 @@ from robots.dvrk.parameters import (
     home,
 )
 from robots.serial_chain import SerialChain
+from schemas.errors import MotionError
 from schemas.quantity import Angle, Length
 
 __all__ = ["DEFAULT_INSTRUMENT", "MountedArm", "MountedArms", "MountedEcm", "MountedPsm", "PsmTool"]
@@ -91,6 +104,55 @@ class MountedPsm(PsmTool, MountedArm):
         default=FOLDED,
         description="closings, then spreads, of a hand's fingers at time 0; default: folded",
     )
+    dynamics: Path | None = Field(
+        default=None,
+        description="file of `trocar identify`: masses, friction, springs of your own arm; null: published",
+    )
+
+    @field_validator("dynamics")
+    @classmethod
+    def _find(cls, file: Path | None, info: ValidationInfo) -> Path | None:
+        context: dict[str, Any] = info.context or {}
+        return None if file is None else (Path(context.get("directory", Path.cwd())) / file).resolve()
+
+    @model_validator(mode="after")
+    def _has_these_dynamics(self) -> Self:
+        if (own := self._own) is None:
+            return self
+        joints = [joint.name for joint in self.chain.joints]
+        discs = len(drives.discs(self.tool))
+        if list(own.joints) != joints or len(own.discs) != discs:
+            raise ValueError(
+                f"dynamics: '{self.dynamics}' was identified with {own.instrument}, of joints"
+                f" {', '.join(own.joints)} and {len(own.discs)} discs; {self.instrument} has"
+                f" {', '.join(joints)} and {discs}: identify the arm with such an instrument"
+            )
+        return self
+
+    @cached_property
+    def _own(self) -> OwnDynamics | None:
+        try:
+            return None if self.dynamics is None else OwnDynamics.load(self.dynamics)
+        except MotionError as error:
+            raise ValueError(f"dynamics: {error}") from error
+
+    @cached_property
+    def bodies(self) -> Mapping[str, Inertia]:
+        """The inertia of its bodies by link, those of the instrument included."""
+        published = inertia.psm(self.tool, self.probe_radius)
+        return published if self._own is None else self._own.bodies_of(published)
+
+    @cached_property
+    def drives(self) -> Mapping[str, Drive]:
+        """The drives by joint, those of jaw or hand included."""
+        published = drives.psm(self.tool)
+        return published if self._own is None else self._own.drives_of(published)
+
+    @cached_property
+    def discs(self) -> tuple[Disc, ...]:
+        """The discs of the instrument."""
+        published = drives.discs(self.tool)
+        return published if self._own is None else self._own.discs_of(published)
 
     @property
     def fingers(self) -> HandPositions:

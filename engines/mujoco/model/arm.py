@@ -97,7 +97,7 @@ def _add_joint(spec: mujoco.MjSpec, body: mujoco.MjsBody, arm: str, link: Link) 
 def _add_drives(spec: mujoco.MjSpec, arm: str, params: MountedPsm | MountedEcm) -> None:
     """Give each independent joint its drive, and an instrument's discs the friction of wrist and jaw."""
     is_psm = isinstance(params, MountedPsm)
-    driven = drives.psm(params.tool) if is_psm else drives.ECM
+    driven = params.drives if is_psm else drives.ECM
     hand, roller = (params.tool.hand, params.tool.roller) if is_psm else (None, None)
     for name, drive in driven.items():
         if name != ROLLER and (hand is None or name not in (*hand.fingers, *hand.spreads)):
@@ -107,7 +107,7 @@ def _add_drives(spec: mujoco.MjSpec, arm: str, params: MountedPsm | MountedEcm) 
         hands.add_contacts(spec, arm, hand)
     if roller is not None:
         rollers.add_drive(spec, arm, roller, driven[ROLLER])
-    for i, disc in enumerate(drives.discs(params.tool) if is_psm else (), 1):
+    for i, disc in enumerate(params.discs if is_psm else (), 1):
         tendon = spec.add_tendon(
             name=f"{arm}/disc_{i}",
             damping=[disc.viscous_friction, 0.0, 0.0],
@@ -152,9 +152,7 @@ def _add_drive(spec: mujoco.MjSpec, name: str, drive: Drive) -> None:
 
 def _set_inertias(bodies: Bodies, params: MountedPsm | MountedEcm) -> None:
     """Carry the inertia of each link, given in the base frame with every joint at 0, to its body."""
-    masses = (
-        inertia.psm(params.tool, params.probe_radius) if isinstance(params, MountedPsm) else inertia.ecm()
-    )
+    masses = params.bodies if isinstance(params, MountedPsm) else inertia.ecm()
     for link, given in masses.items():
         body, pose = bodies[link]
         turn = pose[:3, :3]

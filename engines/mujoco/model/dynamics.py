@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -47,7 +48,9 @@ class JointDynamics:
     """Effort that holds the arm against its springs, shape (n,)."""
 
 
-def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -> JointDynamics:
+def dynamics(
+    arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float], own: Path | None = None
+) -> JointDynamics:
     """Return the dynamics of `arm`, alone with its base upright.
 
     Args:
@@ -55,8 +58,13 @@ def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -
         tool: instrument of a PSM, by name or number; endoscope of the ECM.
         q: joint positions (rad, m), one per joint, in range.
         dq: joint velocities (rad/s, m/s), one per joint.
+        own: file of `trocar identify` of a PSM; the published dynamics unless given.
+
+    Raises ValidationError if `own` cannot be read or does not fit the arm.
     """
-    what = {"endoscope" if arm == "ECM" else "instrument": tool}
+    what: dict[str, str | Path] = {"endoscope" if arm == "ECM" else "instrument": tool}
+    if own is not None:
+        what["dynamics"] = own
     scene = SceneParams.model_validate({"arms": {arm: what}, "looks": False})
     params = scene.arms[arm]
     model = build(scene)
@@ -71,11 +79,7 @@ def dynamics(arm: CartArm, tool: str, q: Sequence[float], dq: Sequence[float]) -
     mujoco.mj_forward(model, data)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
-    driven, wrist = (
-        (drives.psm(params.tool), drives.discs(params.tool))
-        if isinstance(params, MountedPsm)
-        else (drives.ECM, ())
-    )
+    driven, wrist = (params.drives, params.discs) if isinstance(params, MountedPsm) else (drives.ECM, ())
     at_rest = dict.fromkeys(driven, 0.0)
     moving = drives.friction(driven, {**at_rest, **dict(zip(joints, dq, strict=True))}, wrist)
     alone = [

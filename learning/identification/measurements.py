@@ -1,0 +1,75 @@
+"""Joint states of one arm from recordings: our MCAP, a ROS bag of either version, or a CSV file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hub.recording.ros_bag_reader import RosBag
+from robots.identification.signals import Measured
+from schemas.errors import RecordingError, did_you_mean
+
+__all__ = ["measurements"]
+
+_TOPIC = "measured_js"
+
+
+def measurements(path: Path, arm: str, joints: Sequence[str]) -> Measured:
+    """Return the states of the first n joints of `arm` as `path` records them, by receipt or message time.
+
+    A bag has `<arm>/measured_js` at the end of a topic. A CSV file has a line of names: `time` (s),
+    `position.<joint>` (rad, m) and `effort.<joint>` (N m, N), the joints in any order.
+
+    Raises RecordingError where the topic, a column or the effort is missing.
+    """
+    return _of_csv(path, joints) if path.suffix == ".csv" else _of_bag(path, arm, len(joints))
+
+
+def _of_csv(path: Path, joints: Sequence[str]) -> Measured:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = csv.reader(file)
+            names = [name.strip() for name in next(rows, list[str]())]
+            table = np.array([[float(cell) for cell in row] for row in rows if row], np.float64)
+    except OSError as error:
+        raise RecordingError(f"cannot read '{path}': {error.strerror}") from error
+    except ValueError as error:
+        raise RecordingError(f"'{path}' is not a table of numbers below a line of names: {error}") from error
+    wanted = ["time", *(f"{part}.{joint}" for part in ("position", "effort") for joint in joints)]
+    for name in wanted:
+        if name not in names:
+            raise RecordingError(f"'{path}' has no column '{name}'.{did_you_mean(name, names)}")
+    columns = table.reshape(len(table), -1)[:, [names.index(name) for name in wanted]]
+    return Measured(columns[:, 0], columns[:, 1 : 1 + len(joints)], columns[:, 1 + len(joints) :])
+
+
+def _of_bag(path: Path, arm: str, count: int) -> Measured:
+    times: list[float] = []
+    states: list[tuple[Any, Any]] = []
+    with RosBag(path) as bag:
+        ending = f"{arm}/{_TOPIC}"
+        found = [name for name in bag.topics if f"/{name}".endswith(f"/{ending}") and "jaw" not in name]
+        if len(found) != 1:
+            raise RecordingError(
+                f"'{path}' has {len(found) or 'no'} topics that end in '{ending}', one is needed."
+                f"{did_you_mean(ending, bag.topics)}"
+            )
+        for _, time_ns, message in bag.messages(found, bag.start_ns):
+            if isinstance(message, Exception):
+                raise RecordingError(
+                    f"'{path}': a message of '{found[0]}' is damaged: {message}"
+                ) from message
+            state: Any = message
+            if len(state.position) < count or len(state.effort) < count:
+                raise RecordingError(
+                    f"'{path}': '{found[0]}' has {len(state.position)} positions and {len(state.effort)}"
+                    f" efforts, {count} of each are needed"
+                )
+            times.append((time_ns - bag.start_ns) * 1e-9)
+            states.append((state.position[:count], state.effort[:count]))
+    values = np.array(states, np.float64).reshape(-1, 2, count)
+    return Measured(np.array(times), values[:, 0], values[:, 1])

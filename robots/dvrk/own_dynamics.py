@@ -1,0 +1,139 @@
+"""The dynamics of the reader's own PSM, as `trocar identify` writes them and a scenario names them.
+
+A file of YAML: the inertia of the arm's bodies, the losses of its joints and of the discs of its instrument,
+and how it was found. SI units, radians; bodies stand in the arm's base frame with every joint at 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import Annotated, Any, Self, cast
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from ruamel.yaml import YAML, YAMLError
+
+from robots.dvrk.drives import Disc, Drive
+from robots.dvrk.inertia import Inertia
+from schemas.errors import MotionError
+
+__all__ = ["BodyInertia", "DiscLosses", "JointLosses", "OwnDynamics"]
+
+_LARGEST = 2**20
+"""Bytes of a file; one has 4 KiB."""
+
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+_NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_Row = tuple[_Finite, _Finite, _Finite]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class BodyInertia(_Part):
+    """Mass (kg), centre (m) and inertia tensor about the centre (kg m^2) of one body."""
+
+    mass: _Positive
+    centre: _Row
+    tensor: tuple[_Row, _Row, _Row]
+
+    @property
+    def inertia(self) -> Inertia:
+        """The same as arrays."""
+        return Inertia(self.mass, np.array(self.centre), np.array(self.tensor))
+
+    @model_validator(mode="after")
+    def _is_of_a_body(self) -> Self:
+        tensor = np.array(self.tensor)
+        if not np.allclose(tensor, tensor.T) or np.linalg.eigvalsh(self.inertia.pseudo_inertia)[0] <= 0.0:
+            raise ValueError(
+                "no body has this inertia tensor: it must be symmetric, its moments positive, and the sum of"
+                " any two larger than the third"
+            )
+        return self
+
+
+class JointLosses(_Part):
+    """Of one joint: effort = armature ddq + stiffness q + offset + viscous dq + coulomb sign(dq)."""
+
+    armature: _NotNegative
+    stiffness: _Positive
+    offset: _Finite
+    viscous: _NotNegative = 0.0
+    coulomb: _NotNegative = 0.0
+
+
+class DiscLosses(_Part):
+    """Friction of one disc of the instrument."""
+
+    viscous: _NotNegative
+    coulomb: _NotNegative
+
+
+class OwnDynamics(_Part):
+    """The content of a file."""
+
+    instrument: str
+    """With which it was identified."""
+    bodies: dict[str, BodyInertia]
+    joints: dict[str, JointLosses]
+    discs: list[DiscLosses]
+    fit: dict[str, Any] = Field(default_factory=dict[str, Any])
+    """How it was found and how well it fits; for the reader."""
+
+    @classmethod
+    def load(cls, file: Path) -> Self:
+        """Return the content of `file`. Raises MotionError if it cannot be read or is not valid."""
+        try:
+            if file.stat().st_size > _LARGEST:
+                raise MotionError(
+                    f"'{file}' is larger than {_LARGEST} bytes: not a file of `trocar identify`"
+                )
+            yaml: Any = YAML(typ="safe")
+            return cls.model_validate(yaml.load(file.read_text(encoding="utf-8")))
+        except OSError as error:
+            raise MotionError(f"cannot read '{file}': {error.strerror}") from error
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(map(str, first["loc"]))
+            raise MotionError(f"'{file}': {where}: {first['msg']}; `trocar identify` writes it") from error
+        except (YAMLError, UnicodeDecodeError) as error:
+            raise MotionError(f"'{file}' is not YAML: {error}") from error
+
+    def text(self) -> str:
+        """Return the content as YAML."""
+        stream, yaml = StringIO(), cast("Any", YAML())
+        yaml.default_flow_style = None  # lists in one line
+        yaml.dump(self.model_dump(mode="json"), stream)
+        return stream.getvalue()
+
+    def bodies_of(self, published: Mapping[str, Inertia]) -> Mapping[str, Inertia]:
+        """Return `published` with the bodies that were identified."""
+        return {**published, **{name: body.inertia for name, body in self.bodies.items()}}
+
+    def drives_of(self, published: Mapping[str, Drive]) -> Mapping[str, Drive]:
+        """Return `published` with the losses that were identified."""
+        found = {
+            name: replace(
+                published[name],
+                viscous_friction=losses.viscous,
+                coulomb_friction=losses.coulomb,
+                elasticity=losses.stiffness,
+                offset=losses.offset,
+                armature=losses.armature,
+            )
+            for name, losses in self.joints.items()
+        }
+        return {**published, **found}
+
+    def discs_of(self, published: tuple[Disc, ...]) -> tuple[Disc, ...]:
+        """Return `published` with the friction that was identified."""
+        return tuple(
+            replace(disc, viscous_friction=own.viscous, coulomb_friction=own.coulomb)
+            for disc, own in zip(published, self.discs, strict=True)
+        )

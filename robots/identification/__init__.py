@@ -1,0 +1,1 @@
+"""The dynamics of an arm from measured joint positions, velocities and efforts."""

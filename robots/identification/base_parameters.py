@@ -1,0 +1,60 @@
+"""Base parameters: the combinations of an arm's parameters that its efforts depend on.
+
+Measurements tell combinations only. QR with column pivoting picks independent columns W1 of a regressor W;
+the others are W2 = W1 K, so that W p = W1 (p1 + K p2) (Gautier, "Numerical calculation of the base inertial
+parameters of robots", ICRA 1990).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from robots.dvrk import psm
+from robots.dvrk.instruments import Instrument
+from robots.identification.linear_model import LinearModel
+from schemas.vectors import Vector
+
+__all__ = ["BaseParameters", "base_parameters"]
+
+_STATES = 300
+_TOLERANCE = 1e-8
+"""Of the largest diagonal element of R, columns scaled to length 1: what is smaller is the error of the
+central difference.
+"""
+
+
+class BaseParameters(NamedTuple):
+    """How P parameters combine to B base parameters."""
+
+    columns: NDArray[np.intp]
+    """Of the regressor, which stand for the base parameters, shape (B,)."""
+    combination: Vector
+    """From all parameters to the base parameters, shape (B, P)."""
+
+
+def base_parameters(model: LinearModel, tool: Instrument) -> BaseParameters:
+    """Return the base parameters of `model`: of all motions within the joints' limits.
+
+    The motions are random, with a fixed seed; the result depends on the structure of the arm alone.
+    """
+    joints, random = psm.chain(tool).joints, np.random.default_rng(0)
+    lower, upper = np.array([[joint.lower, joint.upper] for joint in joints]).T
+    speed = np.array([joint.velocity for joint in joints])
+    shape = (_STATES, len(joints))
+    q = random.uniform(lower, upper, shape)
+    dq, ddq = random.uniform(-speed, speed, shape), 5.0 * random.uniform(-speed, speed, shape)
+    stacked = model.regressor(q, dq, ddq).reshape(-1, len(model.nominal))
+    lengths = np.linalg.norm(stacked, axis=0)
+    lengths[lengths < _TOLERANCE * lengths.max()] = 1.0
+    triangle, order = qr(stacked / lengths, mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(triangle))
+    rank = int((diagonal > _TOLERANCE * diagonal[0]).sum())
+    shared = np.linalg.solve(triangle[:rank, :rank], triangle[:rank, rank:])
+    combination = np.zeros((rank, len(order)))
+    combination[:, order[:rank]] = np.eye(rank)
+    combination[:, order[rank:]] = shared * lengths[order[rank:]] / lengths[order[:rank], None]
+    return BaseParameters(order[:rank], combination)

@@ -1,0 +1,1 @@
+"""What Trocar uses of SciPy."""

@@ -1,0 +1,17 @@
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+class OptimizeResult:
+    x: NDArray[np.float64]
+
+def least_squares(
+    fun: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    x0: NDArray[np.float64],
+    *,
+    bounds: tuple[ArrayLike, ArrayLike],
+    x_scale: Literal["jac"],
+    max_nfev: int,
+) -> OptimizeResult: ...
