@@ -103,6 +103,8 @@ class Lead(_Command):
 
     do: Literal["lead"]
     device: Name
+    beside: bool = False
+    """Go on leading what this page leads already: a head, and two hands."""
 
 
 class Leave(_Command):
@@ -127,6 +129,11 @@ class Hand(_Command):
     """1 opens, -1 closes."""
     dead_man: bool = False
     jaw: bool = False
+    device: Name | None = None
+    """Which one, where this page leads several."""
+    tracked: tuple[Finite, Finite, Finite, Finite, Finite, Finite, Finite] | None = None
+    """Where a headset has the head or a hand, in place of shares: position (m) and quaternion (x, y, z, w),
+    along the axes of WebXR (x right, y up, z towards the user)."""
 
 
 Command = Annotated[

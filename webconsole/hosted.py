@@ -9,11 +9,12 @@ from functools import partial
 
 from devices.browser import PageInput, hand_of
 from devices.keyboard.virtual_stylus import Wish
+from devices.vendor_axes import Quaternion, Vector3, quaternion, vector
 from hub.planning.plan import Plan
 from hub.remote.device_host import DeviceHost
 from hub.remote.hub_connection import reach
 from hub.transport.control_messages import JoinRequest
-from schemas.errors import TrocarError
+from schemas.errors import MessageError, TrocarError
 from schemas.keys import Keys
 from webconsole.commands import Hand
 from webconsole.pilot import Pilots
@@ -79,9 +80,19 @@ class HostedDevices:
 
 
 def _give(device: str, hand: Hand | None) -> None:
-    """Hand what a page asks to the device; None: no page leads."""
+    """Hand what a page asks to the device; None: no page leads. Raises MessageError if it is no pose."""
     if hand is None:
         hand_of(device).release()
         return
     wish = Wish(hand.linear, hand.angular, hand.gripper, hand.dead_man, hand.jaw)
-    hand_of(device).give(PageInput(wish, hand.drag))
+    hand_of(device).give(PageInput(wish, hand.drag, _tracked(hand)))
+
+
+def _tracked(hand: Hand) -> tuple[Vector3, Quaternion] | None:
+    """Return where a headset has the head or hand, in the axes of REP 103."""
+    if hand.tracked is None:
+        return None
+    try:
+        return vector(*hand.tracked[:3]), quaternion(*hand.tracked[3:])
+    except ValueError as error:
+        raise MessageError(f"not a pose: {error}") from error

@@ -142,7 +142,7 @@ class Page:
                 self._console.pilots.take(self, order)
                 return None
             case Lead():
-                self._console.pilots.lead(self, order.device)
+                self._console.pilots.lead(self, order.device, beside=order.beside)
                 return {"device": order.device}
             case Leave():
                 self._console.pilots.leave(self)

@@ -36,8 +36,11 @@ class Pilots:
                 self._release(device)
             del self._devices[device]
 
-    def lead(self, page: object, device: str) -> None:
-        """Make `page` the pilot of `device`; raises MessageError if there is none, or it has a pilot."""
+    def lead(self, page: object, device: str, *, beside: bool = False) -> None:
+        """Make `page` the pilot of `device`, and of no other unless `beside` is true.
+
+        Raises MessageError if there is no such device, or it has a pilot.
+        """
         if device not in self._devices:
             raise MessageError(
                 f"no device '{device:.80}' can be led from a page.{did_you_mean(device, self._devices)}"
@@ -46,7 +49,8 @@ class Pilots:
         holder = self._pages.get(device)
         if holder is not None and holder is not page:
             raise MessageError(f"page {self._number_of(holder)} leads '{device}': it must leave first")
-        self.leave(page)
+        if not beside:
+            self.leave(page)
         self._pages[device], self._heard_s[device], self._numbers[device] = page, monotonic(), -1
 
     def leave(self, page: object) -> None:
@@ -55,14 +59,17 @@ class Pilots:
             self._release(device)
 
     def take(self, page: object, hand: Hand) -> None:
-        """Hand what a page asks to the device that it leads; raises MessageError if it leads none."""
-        device = next((name for name, holder in self._pages.items() if holder is page), None)
-        if device is None:
+        """Hand what a page asks to the device that it leads; raises MessageError if it does not lead it."""
+        led = [name for name, holder in self._pages.items() if holder is page]
+        if not led:
             raise MessageError("this page leads no device")
+        device = hand.device or led[0]
+        if device not in led:
+            raise MessageError(f"this page does not lead '{device:.80}'; it leads {', '.join(led)}")
         if hand.number <= self._numbers[device]:
             raise MessageError(f"input {hand.number} is old: {self._numbers[device]} was here")
-        self._numbers[device], self._heard_s[device] = hand.number, monotonic()
         self._devices[device](hand)
+        self._numbers[device], self._heard_s[device] = hand.number, monotonic()
 
     def state(self, page: object) -> list[dict[str, Any]]:
         """Return each device and who leads it, as `page` sees it, ready for JSON."""

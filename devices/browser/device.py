@@ -98,7 +98,12 @@ class Browser(Device):
                 "the page that leads is silent or not in front: the arm holds; click into it",
             )
         samples = self._press(t, asked.wish) + self._diagnosis.report(Level.OK, "a page leads")
-        self._stylus.advance(self._with_drag(asked, lead, elapsed_ns * 1e-9), elapsed_ns * 1e-9)
+        if asked.tracked is None:
+            self._stylus.advance(self._with_drag(asked, lead, elapsed_ns * 1e-9), elapsed_ns * 1e-9)
+        elif asked.wish.dead_man:
+            self._stylus.follow(*asked.tracked, asked.wish.gripper, elapsed_ns * 1e-9)
+        else:  # the clutch is open: hand and stylus meet, and the arm holds
+            self._stylus.place(*asked.tracked)
         return [
             *samples,
             pose_sample(self._pose, t, *self._stylus.pose),

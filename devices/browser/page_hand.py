@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from time import monotonic_ns
 
 from devices.keyboard.virtual_stylus import Wish
-from devices.vendor_axes import Vector3
+from devices.vendor_axes import Quaternion, Vector3
 
 __all__ = ["PageHand", "PageInput", "hand_of"]
 
@@ -20,6 +20,9 @@ class PageInput:
     wish: Wish
     drag: Vector3 = (0.0, 0.0, 0.0)
     """Way of the pointer since the page leads, m: ahead, left, up; a message that is lost is in the next."""
+    tracked: tuple[Vector3, Quaternion] | None = None
+    """Where a headset has the head or hand, in the base frame, in place of shares and way. Its own
+    axes, too, are x ahead, y left, z up."""
 
 
 class PageHand:

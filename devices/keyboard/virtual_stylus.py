@@ -90,6 +90,22 @@ class VirtualStylus:
             max(self.gripper + dt * _GRIPPER_SPEED * min(max(wish.gripper, -1.0), 1.0), 0.0), 1.0
         )
 
+    def follow(self, position: Vector3, orientation: Quaternion, gripper: float, dt: float) -> None:
+        """Move for `dt` seconds towards a tracked frame (x ahead, y left, z up), at most at its speed."""
+        if dt <= 0.0:
+            return
+        goal = rotation.product(np.array(orientation), _LEVEL)
+        own = rotation.log(rotation.product(rotation.conjugate(self._orientation), goal)) / dt
+        ahead, left, up = ((np.array(position) - self._position) / (dt * self._speed)).tolist()
+        x, y, z = (own / self._turn_speed).tolist()
+        self.advance(Wish(linear=(ahead, left, up), angular=(x, y, z), gripper=gripper), dt)
+
+    def place(self, position: Vector3, orientation: Quaternion) -> None:
+        """Stand where a tracked frame (x ahead, y left, z up) is, at rest."""
+        self._position = np.array(position)
+        self._orientation = rotation.product(np.array(orientation), _LEVEL)
+        self._linear, self._angular = np.zeros(3), np.zeros(3)
+
     @property
     def pose(self) -> tuple[Vector3, Quaternion]:
         """Position (m) and quaternion (x, y, z, w)."""

@@ -115,3 +115,33 @@ def test_it_is_never_faster_than_it_may_be(moves):
         now = position(samples)
         assert np.linalg.norm(now - before) <= 0.1 * (0.02 * count + 0.05) + 1e-9
         before = now
+
+
+def test_a_tracked_hand_is_met_by_the_stylus_while_the_clutch_is_open(page):
+    page.hand.give(PageInput(Wish(), tracked=((0.3, 0.2, 0.1), (0.0, 0.0, 0.0, 1.0))))
+    samples = page.read(20)
+    assert np.allclose(position(samples), [0.3, 0.2, 0.1])
+    assert samples["twist"].twist.linear.x == 0.0
+
+
+@given(
+    jump=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    turn=st.floats(-3.0, 3.0),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_tracked_hand_that_leaps_does_not_move_the_stylus_faster_than_allowed(jump, turn):
+    page = Page()
+    page.hand.give(PageInput(Wish(), tracked=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))))
+    page.read(20)
+    there = PageInput(
+        Wish(dead_man=True), tracked=(jump, (0.0, 0.0, float(np.sin(turn / 2)), float(np.cos(turn / 2))))
+    )
+    page.hand.give(there)
+    samples = page.read(80)
+    assert np.linalg.norm(position(samples)) <= 0.1 * 0.080 + 1e-9
+    twist = samples["twist"].twist
+    assert np.linalg.norm([twist.angular.x, twist.angular.y, twist.angular.z]) <= 1.0 + 1e-9
+    for _ in range(200):
+        page.hand.give(there)
+        samples = page.read(100)
+    assert np.allclose(position(samples), jump, atol=1e-6), "what was too fast is caught up"

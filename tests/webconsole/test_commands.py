@@ -101,3 +101,14 @@ def test_another_session_has_other_devices(pilots):
 def test_an_unknown_device_is_named(pilots):
     with pytest.raises(MessageError, match="Did you mean 'hand'"):
         pilots.lead("page", "hands")
+
+
+def test_a_headset_leads_several(pilots):
+    pilots.offer("head", pilots.given.append)
+    pilots.lead("page", "hand")
+    pilots.lead("page", "head", beside=True)
+    asked = hand(0, device="head", tracked=(0, 1, 0, 0, 0, 0, 1))
+    pilots.take("page", asked)
+    assert pilots.given == [asked]
+    with pytest.raises(MessageError, match="does not lead 'eyes'"):
+        pilots.take("page", hand(1, device="eyes"))

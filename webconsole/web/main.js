@@ -2,6 +2,7 @@
 
 import { ARROWS, Link, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
 import { Head } from "./head.js"
+import { Headset } from "./headset.js"
 import { Log } from "./log.js"
 import { Plots } from "./plots.js"
 import { Pilot } from "./pilot.js"
@@ -19,6 +20,7 @@ const link = new Link({
   opened() { head.banner("") },
   closed() {
     pilot.lost()
+    headset.lost()
     head.banner("The server of this page does not answer. The page comes back by itself.")
     waiting = []
   },
@@ -28,14 +30,15 @@ const link = new Link({
     head.show(state)
     log.add(state.log)
     showCard($("card"), state.card)
-    pilot.show(state.pilots, session?.role)
+    headset.show(state.pilots, session?.role)
+    pilot.show(state.pilots?.map((one) => headset.owns(one.device) ? { ...one, pilot: "the headset" } : one), session?.role)
     forks.show(state.started)
     if (session?.kind === "recording") timeline.begin(state.start, state.end)
   },
   answer(answer) {
     if (answer.error) log.add([{ time: lastTime, level: "warn", source: `page: ${answer.to || "message"}`, text: answer.error }])
     else if (answer.path) share(answer)
-    pilot.answered(answer)
+    if (!headset.owns(answer.device)) pilot.answered(answer)
     forks.answered(answer)
   },
   trouble({ text }) { log.add([{ time: lastTime, level: "warn", source: "page", text }]) },
@@ -43,6 +46,8 @@ const link = new Link({
 let lastTime = 0
 const head = new Head(link)
 const pilot = new Pilot($("lead"), link)
+const headset = new Headset($("headset"), link, { scene: () => scene, eyes: () => eyes, frames: takeFrames,
+  said: (text) => log.add([{ time: lastTime, level: "warn", source: "headset", text }]) })
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
 const forks = new Forks(link, timeline)
@@ -120,7 +125,7 @@ function showEyes(names) {
     canvas.setAttribute("role", "img")
     canvas.setAttribute("aria-label", `Picture of ${caption.textContent}`)
     figure.append(canvas, caption)
-    eyes.set(index, { canvas, busy: false, next: null })
+    eyes.set(index, { name, canvas, busy: false, next: null, drawn: 0 })
     return figure
   })
   $("pictures-row").replaceChildren(...figures)
@@ -134,6 +139,7 @@ async function showPicture(eye, bytes) {
     Object.assign(eye.canvas, { width: picture.width, height: picture.height })
     eye.canvas.getContext("2d").drawImage(picture, 0, 0)
     picture.close()
+    eye.drawn++
   } catch { log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]) }
   eye.busy = false
   const next = eye.next
@@ -161,26 +167,31 @@ function share({ path, role }) {
   $("lines").scrollTop = $("lines").scrollHeight
 }
 
+// A headset draws in frames of its own; those of the window may stand still meanwhile.
+function takeFrames() {
+  const frames = waiting
+  waiting = []
+  for (const frame of frames) apply(frame)
+  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length }
+}
+
 let counted = 0, since = performance.now(), last = since, moved = since, drawing = false
 function draw(now) {
   requestAnimationFrame(draw)
   timeline.tick(now)
-  const frames = waiting
-  waiting = []
-  for (const frame of frames) apply(frame)
-  if (dirty) {
+  if (!headset.worn) takeFrames()
+  if (dirty && !headset.worn) {
     dirty = false
     if (drawing) scene?.pace(now - last)
     scene?.draw()
     drawn++
     drawing = true
     moved = now
-  } else {
+  } else if (!headset.worn) {
     drawing = false
     if (now - moved > STILL_MS) scene?.settle()
   }
   last = now
-  if (frames.length) { link.acknowledge(frames.at(-1).number); counted += frames.length }
   if (now - refreshed > REFRESH_MS) { refreshed = now; plots.refresh() }
   if (now - since > 1000) {
     $("fps").textContent = String(Math.round((counted * 1000) / (now - since)))
@@ -192,4 +203,4 @@ requestAnimationFrame(draw)
 
 // For the tests and the benchmark: what this page has drawn.
 Object.defineProperty(window, "trocar", { value: { get drawn() { return drawn }, get time() { return lastTime },
-  get scene() { return scene }, get session() { return session } } })
+  get scene() { return scene }, get headset() { return headset }, get session() { return session } } })
