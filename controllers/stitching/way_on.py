@@ -1,4 +1,4 @@
-"""How a stitch goes on from where the needle is: who does what next, or why there is no way. SI units, world."""
+"""How a stitch goes on from where the needle is: who does what next, or why it cannot. SI units, world."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ The server of the page hosts the device (`host: remote`), so its samples go the 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -72,6 +73,7 @@ class Browser(Device):
         self._pressed = (False, False)
         self._timer, self._last_ns = SampleTimer(self.params.rate), 0
         self._lead, self._dragged = -1, np.zeros(3)
+        self._spent = False
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -90,13 +92,19 @@ class Browser(Device):
         elapsed_ns, self._last_ns = min(t - self._last_ns, _LONGEST_NS), t
         newest = self._hand.newest()
         if newest is None:
+            self._spent |= self._pressed[0]
             return self._press(t, Wish()) + self._diagnosis.report(Level.WARN, self._unled())
         asked, age_ns, lead = newest
         if age_ns > self.params.silence:
+            self._spent |= self._pressed[0]
             return self._press(t, Wish()) + self._diagnosis.report(
                 Level.WARN,
                 "the page that leads is silent or not in front: the arm holds; click into it",
             )
+        if self._spent and asked.wish.dead_man:  # what was held through a loss has to be pressed anew
+            asked = replace(asked, wish=Wish())
+        else:
+            self._spent = False
         samples = self._press(t, asked.wish) + self._diagnosis.report(Level.OK, "a page leads")
         if asked.tracked is None:
             self._stylus.advance(self._with_drag(asked, lead, elapsed_ns * 1e-9), elapsed_ns * 1e-9)

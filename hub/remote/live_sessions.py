@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -86,21 +86,30 @@ def ask_about(
         session: The name of the session, if several may have such a participant.
 
     Raises:
-        ConnectError: There is no such session on these endpoints.
+        ConnectError: There is no such session on these endpoints, or more than one.
         MessageError: The hub rejects the request.
     """
     seen: list[str] = []
-    for endpoint in endpoints:
-        client = _hub_at(endpoint)
-        if client is None:
-            continue
-        with client:
+    found: list[tuple[zenoh.Session, str]] = []
+    with ExitStack() as clients:
+        for endpoint in endpoints:
+            client = _hub_at(endpoint)
+            if client is None:
+                continue
+            clients.enter_context(client)
             for status in _statuses(client):
                 seen.append(status.session)
                 if session in (None, status.session) and any(
                     p.name == participant for p in status.participants
                 ):
-                    return ask(client, Keys(status.session).control(verb), request, reply_model)
+                    found.append((client, status.session))
+        if len(found) > 1:
+            raise ConnectError(
+                f"several sessions have a '{participant}': {', '.join(sorted(name for _, name in found))};"
+                " choose one by --session, or by --connect where the names are the same"
+            )
+        for client, name in found:
+            return ask(client, Keys(name).control(verb), request, reply_model)
     where = f"session '{session}'" if session else "any session"
     raise ConnectError(
         f"there is no '{participant}' in {where} of these hubs; running: {', '.join(sorted(seen)) or 'none'}"

@@ -27,6 +27,6 @@ def write_figure(file: Path, found: Fit, joints: Sequence[str]) -> None:
         axes.plot(found.time, found.measured[:, i], color="0.6", lw=3.0, label="measured")
         axes.plot(found.time, found.predicted[:, i], color="tab:blue", lw=1.0, label="predicted")
         axes.set_ylabel(f"{joint}, {'N' if joint == 'insertion' else 'N m'}")
-    figure.axes[0].legend(loc="upper right", ncols=3, fontsize="small")
-    figure.axes[-1].set_xlabel("time, s")
+    figure.axes[0].legend(loc="upper right", ncols=3, fontsize="small")  # pyright: ignore[reportUnknownMemberType]
+    figure.axes[-1].set_xlabel("time, s")  # pyright: ignore[reportUnknownMemberType]
     figure.savefig(file, dpi=_DPI)  # pyright: ignore[reportUnknownMemberType]

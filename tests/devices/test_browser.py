@@ -89,6 +89,19 @@ def test_it_lets_go_when_nobody_leads(page):
     assert "pose" not in samples
 
 
+@pytest.mark.parametrize(
+    "lost", [lambda page: page.read(200), lambda page: (page.hand.release(), page.read(4))]
+)
+def test_what_is_held_through_a_loss_has_to_be_pressed_anew(page, lost):
+    here = position(page.ask(100, linear=(1.0, 0.0, 0.0), dead_man=True))
+    lost(page)
+    held = page.ask(100, linear=(1.0, 0.0, 0.0), dead_man=True)
+    assert "buttons" not in held
+    assert np.linalg.norm(position(held) - here) < 0.1 * 0.1 + 1e-9, "what was asked until the loss"
+    page.ask(20)
+    assert page.ask(20, dead_man=True)["buttons"].buttons.tolist() == [1, 0]
+
+
 def test_it_never_leaps_after_a_pause(page):
     here = position(page.ask(100, linear=(1.0, 0.0, 0.0)))
     page.t += 3_000_000_000
