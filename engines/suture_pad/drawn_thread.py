@@ -79,13 +79,17 @@ class DrawnThread:
         return on_pad[0]
 
     def _draw(self, channel: ChannelState) -> None:
-        """Open a passage once the base of a needle that is through has gone into its channel."""
-        inside = channel.phase is Phase.THROUGH and channel.length > self._needle.length
-        if inside and not self._state.drawn:
+        """Open a passage once the base of a needle that is through has gone well into its channel.
+
+        Less deep, a base that is a little behind where the needle's mean is would be outside of it again.
+        """
+        through = channel.length - self._needle.length
+        if channel.phase is not Phase.THROUGH:
+            self._state.drawn = False
+        elif through > 2.0 * APART and not self._state.drawn:
+            self._state.drawn = True
             every = round(APART / SPACING)
-            through = channel.length - self._needle.length
             self._passages.open(channel.points[: channel.count : every], through)
-        self._state.drawn = inside
 
     def result(self) -> dict[str, Vector]:
         """Return the reaction of the step."""

@@ -92,7 +92,7 @@ class Passages:
         share = (nodes - before)[:, None]
         away = (1.0 - share) * line[before] + share * line[before + 1] - self._points
         along = (away * self._tangents).sum(axis=1)
-        covered = np.bincount(which, weights, MOST)
+        covered: Vector = np.bincount(which, weights, MOST).astype(np.float64)
         moved = np.bincount(which, weights * along, MOST)
         state.through += np.divide(moved, covered, out=np.zeros(MOST), where=covered > 0.0)
         pull = self._rub()[which, None] * self._tangents

@@ -32,7 +32,7 @@ class ThreadParams(BaseModel):
         default=1e8,
         gt=0.0,
         description=(
-            "modulus in bending. Assumed: a tenth of a solid fibre's, as the filaments of a braid slide; along"
+            "modulus in bending. Assumed: a tenth of a solid fibre's, as a braid's filaments slide; along"
             " its length it does not stretch"
         ),
     )

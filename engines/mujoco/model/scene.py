@@ -60,7 +60,7 @@ def spec(scene: SceneParams) -> mujoco.MjSpec:
 
 
 def _level(scene: SceneParams) -> float:
-    """Return the height (m) at which a thread lies: of a phantom's skin, else of the table, else far below."""
+    """Return the height (m) at which a thread lies: of a phantom's skin, else of the table."""
     heights = [one.position[2] for one in scene.fixtures.values() if isinstance(one, PhantomParams)]
     if scene.table is not None:
         heights.append(scene.table.position[2])

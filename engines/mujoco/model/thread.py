@@ -43,9 +43,7 @@ def add(
     forward = rotation.matrix(turn) @ frame[:3, 1]
     bodies, vertices = [name], frame[:3, 3].tolist()
     for node in range(1, thread.segments + 1):
-        body = spec.worldbody.add_body(
-            name=node_body(name, node), pos=base - node * thread.segment * forward
-        )
+        body = spec.worldbody.add_body(name=node_body(name, node), pos=base - node * thread.segment * forward)
         body.mass, body.explicitinertial = thread.node_mass, True
         body.inertia = [thread.node_mass * thread.radius**2] * 3
         for axis, along in zip("xyz", np.eye(3), strict=True):
