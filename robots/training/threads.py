@@ -6,7 +6,7 @@ from math import pi
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from schemas.quantity import Damping, Density, Length, Pressure
+from schemas.quantity import Damping, Density, Length, Mass, Pressure
 
 __all__ = ["ThreadParams"]
 
@@ -28,6 +28,14 @@ class ThreadParams(BaseModel):
         default=20, ge=4, le=60, description="equal in length; the cost grows with their number"
     )
     density: Density = Field(default=1400.0, gt=0.0, description="about that of polyglactin; assumed")
+    node_mass: Mass = Field(
+        default=5e-5,
+        gt=0.0,
+        description=(
+            "inertia of each node; its weight is by density. Assumed, and far more than that: a tension up to"
+            " node_mass segment / timestep^2, here 1 N, does not make it tremble"
+        ),
+    )
     young: Pressure = Field(
         default=1e8,
         gt=0.0,
@@ -51,6 +59,6 @@ class ThreadParams(BaseModel):
         return self.length / self.segments
 
     @property
-    def node_mass(self) -> float:
-        """Mass of a segment, kg, which is in the node at its far end."""
+    def true_mass(self) -> float:
+        """Mass of a segment, kg, whose weight is that of the node at its far end."""
         return self.density * pi * self.radius**2 * self.segment

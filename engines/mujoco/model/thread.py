@@ -45,6 +45,7 @@ def add(
     for node in range(1, thread.segments + 1):
         body = spec.worldbody.add_body(name=node_body(name, node), pos=base - node * thread.segment * forward)
         body.mass, body.explicitinertial = thread.node_mass, True
+        body.gravcomp = 1.0 - thread.true_mass / thread.node_mass  # it weighs what it is, and no more
         body.inertia = [thread.node_mass * thread.radius**2] * 3
         for axis, along in zip("xyz", np.eye(3), strict=True):
             body.add_joint(name=f"{body.name}/{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=along)
