@@ -1,8 +1,8 @@
 """The bond at a thread: its nodes, which tissue pushes on where the thread runs through it.
 
-A node weighs a third of a milligram and moves as 50, and tissue is stiff. As with a needle (`wire`), the tissue's viscosity
-acts in MuJoCo's implicit step on every node that a force comes to. Such a node is in the tissue, so the level
-that the thread lies on does not hold it up.
+A node moves as 50 mg, and tissue is stiff. As with a needle (`wire`), the tissue's viscosity acts in MuJoCo's
+implicit step on every node that a force comes to. Such a node is in the tissue, so the level that the thread
+lies on does not hold it up.
 """
 
 from __future__ import annotations

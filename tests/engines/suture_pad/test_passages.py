@@ -1,4 +1,6 @@
-"""A thread in the channels that it was drawn through: it stays there, rubs, and leaves; nothing gives energy."""
+"""A thread in the channels that it was drawn through: it stays there, rubs, leaves, and gives no energy."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -57,7 +59,7 @@ def test_moved_about_and_back_it_never_gives_energy():
     start = line(40e-3)
     ends = [start, *(start + rng.normal(0.0, 0.3e-3, start.shape) for _ in range(6)), start]
     work, before = 0.0, start
-    for a, b in zip(ends, ends[1:], strict=False):
+    for a, b in pairwise(ends):
         for share in np.linspace(0.0, 1.0, 200)[1:]:
             now = a + share * (b - a)
             work += float((passages.advance((now + before) / 2.0) * (now - before)).sum())
