@@ -13,6 +13,7 @@ from robots.dvrk.parameters import UnitQuaternion
 from robots.training.boards import BOARDS, Ring
 from robots.training.fixtures import BoardName
 from robots.training.needles import DEFAULT, NEEDLES, NeedleName
+from robots.training.threads import ThreadParams
 from schemas.quantity import Angle, Damping, Density, Length
 
 __all__ = [
@@ -104,6 +105,8 @@ class NeedleParams(_Wire):
             " 6 mm/s. A needle that no jaw holds is at rest in tissue as stiff as this over four steps"
         ),
     )
+
+    thread: ThreadParams | None = Field(default=None, description="swaged into its base; null: none")
 
     @model_validator(mode="before")
     @classmethod

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from engines.suture_pad.channel import Channel, Phase
+from engines.suture_pad.drawn_thread import DrawnThread
 from engines.suture_pad.params import SuturePadParams
-from engines.suture_pad.ports import BOND, SKIN, bond_side, pad_ports
+from engines.suture_pad.ports import BOND, SKIN, THREAD, THREAD_NUMBERS, bond_side, pad_ports, thread_side
 from engines.suture_pad.skin import Skin
 from engines.suture_pad.three_points import ThreePoints
 from hub.participant import (
@@ -49,7 +50,7 @@ class PadState(Record):
 
 
 class SuturePad(Stepped):
-    """Soft tissue for one needle."""
+    """Soft tissue for one needle and its thread."""
 
     params_model: ClassVar[type[Params]] = SuturePadParams
     params: SuturePadParams
@@ -64,16 +65,18 @@ class SuturePad(Stepped):
         self._frame_of = ThreePoints(self._shape.bonded)
         self._state = PadState()
         self._side: ForceSide | None = None
+        self._thread = None if needle.thread is None else DrawnThread(needle.thread, self._shape, params)
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """What happens to tissue and needle, and the skin."""
-        return pad_ports(self.params.node_period)
+        return pad_ports(self.params.node_period, thread=self._thread is not None)
 
     @property
     def bonds(self) -> tuple[BondSide, ...]:
-        """The needle."""
-        return (bond_side(),)
+        """The needle, and its thread where it has one."""
+        thread = self.params.needle[1].thread
+        return (bond_side(), *(() if thread is None else (thread_side(thread.segments),)))
 
     def configure(self, setup: Setup) -> Outputs:
         """Prepare the skin.
@@ -96,7 +99,11 @@ class SuturePad(Stepped):
         self._skin = Skin(phantom.skin, phantom.holes[:, :3, 3])
         if plan := setup.bonds.get(BOND):
             self._side = ForceSide(bond_side(), plan)
-        numbers = ("phase", "insertion", "depth", "resistance", "tip_force", "trauma")
+        if self._thread is not None:
+            self._thread.couple(setup.bonds.get(THREAD))
+        numbers = ["phase", "insertion", "depth", "resistance", "tip_force", "trauma"]
+        if self._thread is not None:
+            numbers += THREAD_NUMBERS
         self._numbers = {name: np.zeros(1) for name in numbers}
         self._outputs: dict[str, Any] = {
             **self._numbers,
@@ -109,6 +116,8 @@ class SuturePad(Stepped):
         if self._side is not None:
             still = {self._side.force_port: np.zeros(9), self._side.work_port: np.zeros(1)}
             self._outputs |= still
+        if self._thread is not None:
+            self._outputs |= self._thread.outputs
         return self._outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:
@@ -129,13 +138,23 @@ class SuturePad(Stepped):
     def _react(self, side: ForceSide, inputs: Inputs, h: int) -> dict[str, Vector]:
         """Take the sub-steps of a step, and return the reaction."""
         side.begin(inputs, h * 1e-9)
+        thread = self._thread
+        if thread is not None:
+            thread.begin(inputs, h)
         dt, no_damper, pushed = self.params.timestep * 1e-9, np.zeros(9), np.zeros(9)
         for i in range(h // self.params.timestep):
             tau = (i + 0.5) * dt
-            pushed = self._push(side.position(tau))
+            position = side.position(tau)
+            pushed = self._push(position)
+            if thread is not None:  # what it does to its first point, the needle's base, acts on the needle
+                pushed[:3] += thread.push(position[:3], self._channel.state, tau, dt)
             side.add(pushed, no_damper, tau, dt)
         self._numbers["resistance"][0] = self._size
-        return side.result(pushed, no_damper)
+        result = side.result(pushed, no_damper)
+        if thread is not None:
+            result |= thread.result()
+            self._numbers["thread_pull"][0], self._numbers["passages"][0] = thread.pull, thread.count
+        return result
 
     def _push(self, position: Vector) -> Vector:
         """Return the forces (N) of the needle on the pad at its points (m), both in the world, shape (9,)."""
@@ -206,7 +225,8 @@ class SuturePad(Stepped):
 
     def _parts(self) -> tuple[Vector, ...]:
         side = () if self._side is None else (self._side.state,)
-        return (self._state.values, self._channel.state.values, *side)
+        thread = () if self._thread is None else self._thread.parts
+        return (self._state.values, self._channel.state.values, *side, *thread)
 
     def state_hash(self) -> int:
         """Return 64 bits of the channel, what is remembered, and the bond."""
@@ -224,6 +244,8 @@ class SuturePad(Stepped):
         self._state.values[:], self._channel.state.values[:] = parts[0], parts[1]
         if self._side is not None:
             self._side.state = parts[2]
+        if self._thread is not None:
+            self._thread.restore(parts[2 + (self._side is not None) :])
 
     def close(self) -> None:
         """Do nothing: there is nothing to give back."""

@@ -7,9 +7,10 @@ from schemas.ports import BondSide, Port
 from schemas.ros import Float64Message
 from schemas.trocar_msgs import SoftBodyState, TaskEvent
 
-__all__ = ["BOND", "EVENTS", "SKIN", "bond_side", "pad_ports"]
+__all__ = ["BOND", "EVENTS", "SKIN", "THREAD", "THREAD_NUMBERS", "bond_side", "pad_ports", "thread_side"]
 
 BOND = "needle"
+THREAD = "thread"
 SKIN = "skin"
 EVENTS = ("entered", "exited", "withdrawn", "pulled out")
 """The tip has broken through the skin; has come out again; the needle is out the way it came, or all through.
@@ -23,15 +24,21 @@ _NUMBERS = (
     ("trauma", "m^2", "area between needle and channel now: by how much it pushes the tissue aside"),
     ("stitches", "", "how many needles have been pulled all through"),
 )
+_OF_THREAD = (
+    ("thread_pull", "N", "size of the force of all channels on the thread"),
+    ("passages", "", "how many channels the thread runs through"),
+)
+THREAD_NUMBERS = tuple(name for name, _, _ in _OF_THREAD)
+"""Outputs that only a pad has whose needle has a thread."""
 
 
-def pad_ports(node_period_ns: int) -> tuple[Port, ...]:
+def pad_ports(node_period_ns: int, *, thread: bool) -> tuple[Port, ...]:
     """Return all ports but those of the bond."""
     number = Float64Message.ros_type
     return (
         *(
             Port(name=name, causality="output", type=number, unit=unit, description=meaning)
-            for name, unit, meaning in _NUMBERS
+            for name, unit, meaning in _NUMBERS + (_OF_THREAD if thread else ())
         ),
         *(
             Port(
@@ -64,3 +71,8 @@ def pad_ports(node_period_ns: int) -> tuple[Port, ...]:
 def bond_side() -> BondSide:
     """Return the bond: base, middle and tip of the needle, in the world."""
     return BondSide(name=BOND, side="force", dof=3, points=3, frame="world")
+
+
+def thread_side(nodes: int) -> BondSide:
+    """Return the bond: the nodes of the thread from the first behind the needle's base, in the world."""
+    return BondSide(name=THREAD, side="force", dof=3, points=nodes, frame="world")

@@ -51,6 +51,10 @@ class TissueParams(Params):
         default=20.0,
         description="along the embedded arc, N/m: the lower end of 0.02 to 0.1 N/mm, assumed",
     )
+    thread_friction: _Positive = Field(
+        default=10.0,
+        description="along a thread in its channel, N/m; assumed: half of the needle's",
+    )
     compression: _Positive = Field(
         default=6e4,
         description=(

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from robots.training.needles import DEFAULT, NEEDLES, NeedleName, NeedleShape
+from robots.training.threads import ThreadParams
 from schemas.quantity import Angle, Length
 
 __all__ = ["NeedleObject", "needles_of"]
@@ -22,6 +23,7 @@ class NeedleObject(BaseModel):
     radius: Length | None = Field(default=None, gt=0.0, description="of the centre line")
     wire_radius: Length | None = Field(default=None, gt=0.0, description="of the cross-section")
     arc: Angle | None = Field(default=None, gt=0.0, description="from end to end")
+    thread: ThreadParams | None = Field(default=None, description="behind its base; null: none")
 
     @property
     def shape(self) -> NeedleShape:
