@@ -51,6 +51,10 @@ class mjtCtrlInput(IntEnum):
 class mjtEq(IntEnum):
     mjEQ_WELD = ...
     mjEQ_JOINT = ...
+    mjEQ_FLEX = ...
+
+class mjtFlexSection(IntEnum):
+    mjFLEXSECTION_CIRCLE = ...
 
 class mjtDisableBit(IntEnum):
     mjDSBL_ISLAND = ...
@@ -96,6 +100,7 @@ class MjsElement:
     name: str
 
 class MjsJoint(MjsElement):
+    limited: int
     armature: float
     axis: _Array
     damping: _Numbers
@@ -150,6 +155,8 @@ class MjsGeom(MjsElement):
     conaffinity: int
 
 class MjsBody(MjsElement):
+    pos: _Array
+    gravcomp: float
     parent: MjsBody
     joints: list[MjsJoint]
     geoms: list[MjsGeom]
@@ -185,6 +192,7 @@ class MjSpec:
     def add_key(self, **fields: Any) -> MjsKey: ...
     def add_material(self, **fields: Any) -> MjsMaterial: ...
     def add_mesh(self, **fields: Any) -> MjsMesh: ...
+    def add_flex(self, **fields: Any) -> MjsElement: ...
     def add_skin(self, **fields: Any) -> MjsElement: ...
     def add_sensor(self, **fields: Any) -> MjsSensor: ...
     def add_pair(self, **fields: Any) -> None: ...
@@ -272,6 +280,8 @@ class MjModel:
     eq_type: NDArray[np.int32]
     jnt_dofadr: NDArray[np.int32]
     jnt_qposadr: NDArray[np.int32]
+    jnt_range: _Array
+    body_jntadr: NDArray[np.int32]
     dof_damping: _Array
     dof_frictionloss: _Array
     jnt_stiffness: _Array
