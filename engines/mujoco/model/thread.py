@@ -50,7 +50,8 @@ def add(
         for axis, along in zip("xyz", np.eye(3), strict=True):
             body.add_joint(name=f"{body.name}/{axis}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=along)
         upright = spec.joint(f"{body.name}/z")
-        upright.limited, upright.range = True, [level + thread.radius - body.pos[2], _HIGHEST]
+        upright.limited = True
+        upright.range = np.array([level + thread.radius - body.pos[2], _HIGHEST])
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[thread.radius, 0.0, 0.0],
