@@ -15,6 +15,9 @@ from schemas.errors import ConnectError, ScenarioError
 
 __all__ = ["LoopbackPort", "listening_ports"]
 
+_TRIES = 5
+"""How many free ports are tried, each of which another process may take just before the hub listens."""
+
 
 class LoopbackPort:
     """A port that is given, or a free one that no other process can take before the hub listens there.
@@ -63,6 +66,7 @@ class LoopbackPort:
         `connect` and `security` are those of `open_session`. Raises ConnectError if a port that was given is
         taken.
         """
+        tries = _TRIES
         while True:
             self.release()
             try:
@@ -70,9 +74,10 @@ class LoopbackPort:
                     "router", listen=[self.endpoint, *listen], connect=connect, security=security
                 )
             except ConnectError:
-                if not self._ports or _bound(address(self.endpoint)[1]) is not None:
+                tries -= 1
+                if not self._ports or not tries:
                     raise
-                self._hold()  # another process has taken it in the moment between
+                self._hold()  # a listener or a connection of another process took it in the moment between
 
     def release(self) -> None:
         """Hold the port no longer."""

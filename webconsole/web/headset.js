@@ -2,7 +2,7 @@
 //
 // The primary button of a controller (A or X) held: the head leads its device. The grip held: the hand leads its
 // device; the trigger closes the jaw, the thumbstick to the front opens it. Let go, each is a clutch: nothing follows.
-// Buttons: https://www.w3.org/TR/webxr-gamepads-module-1/#xr-standard-gamepad-mapping
+// Buttons and axes of https://www.w3.org/TR/webxr-gamepads-module-1/#xr-standard-gamepad-mapping
 
 const TRIGGER = 0, GRIP = 1, PRIMARY = 4, STICK_Y = 3
 const PERIOD_MS = 15

@@ -55,7 +55,7 @@ class Console:
             state for state in told if isinstance(state, OperatingState) and state.header.stamp.ns > since
         ]
 
-    def until(self, holds: Callable[[], bool], seconds: float = 10.0) -> None:
+    def until(self, holds: Callable[[], bool], seconds: float = 30.0) -> None:
         end = monotonic() + seconds
         while not holds():
             assert monotonic() < end, f"still waiting; states: {self.states()[-3:]}"

@@ -276,7 +276,7 @@ def test_dynamics_for_a_person():
             "not all joint velocities are finite",
         ),
         (("export", "x", "--arms", "PSM1,PSM2", "--mounting", "free"), "same place"),
-        (("export", "x", "--instrument", "PSM1"), "ARM=N"),
+        (("export", "x", "--instrument", "PSM1"), "write for instance PSM1=400006"),
         (("export", "x", "--arms", "PSM7"), "no arm 'PSM7'"),
         (("export", "x", "--arms", ""), "at least one of PSM1, PSM2, PSM3, ECM"),
         (("export", "/dev/null/x"), "Invalid value for PATH: cannot write there"),
