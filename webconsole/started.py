@@ -11,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import sleep
 from typing import IO, Any
 
 from hub.remote.live_sessions import live_sessions
@@ -85,12 +86,11 @@ class StartedSession:
 
     def _follow(self) -> None:
         """Open the session's page once its hub listens, and watch it to its end."""
-        stopping = threading.Event()
         while not self.ended:
             hub = next((one for one in running_hubs() if one.pid == self._hub.pid), None)
             if hub is not None:
                 self._look(hub.endpoint)
-            stopping.wait(_LOOK_S)
+            sleep(_LOOK_S)
         if self._hub.returncode and not self._asked_to_end:
             said = self._said("hub").read_text(encoding="utf-8", errors="replace")[-_MOST_SAID:]
             self.error = said.partition("error: ")[2].strip() or said.strip() or "it ended without a word"

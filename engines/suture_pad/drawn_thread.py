@@ -31,7 +31,8 @@ class DrawnThread:
         self._thread, self._needle = thread, needle
         self._passages, self._state = Passages(thread, params.tissue), DrawnState()
         self._world_in_pad = inverse_pose(params.phantom.pose)
-        self._size = 3 * thread.segments
+        self._nothing = np.zeros(3 * thread.segments)
+        self._pushed = self._nothing
         self._side: ForceSide | None = None
         self.pull = 0.0
         """Size of the force of all channels on the thread in the last step, N."""
@@ -49,11 +50,11 @@ class DrawnThread:
     def outputs(self) -> dict[str, Vector]:
         """What the bond's outputs are before the first step."""
         side = self._side
-        return {} if side is None else {side.force_port: np.zeros(self._size), side.work_port: np.zeros(1)}
+        return {} if side is None else {side.force_port: self._nothing.copy(), side.work_port: np.zeros(1)}
 
     def begin(self, inputs: Inputs, h: int) -> None:
         """Begin a step of `h` nanoseconds."""
-        self._pushed = self._no_damper = np.zeros(self._size)
+        self._pushed = self._nothing
         if self._side is not None:
             self._side.begin(inputs, h * 1e-9)
 
@@ -75,7 +76,7 @@ class DrawnThread:
         self.pull = float(np.linalg.norm(forces.sum(axis=0)))
         on_pad: Vector = -forces @ rotation
         self._pushed = on_pad[1:].ravel()
-        self._side.add(self._pushed, self._no_damper, tau, dt)
+        self._side.add(self._pushed, self._nothing, tau, dt)
         return on_pad[0]
 
     def _draw(self, channel: ChannelState) -> None:
@@ -93,7 +94,7 @@ class DrawnThread:
 
     def result(self) -> dict[str, Vector]:
         """Return the reaction of the step."""
-        return {} if self._side is None else self._side.result(self._pushed, self._no_damper)
+        return {} if self._side is None else self._side.result(self._pushed, self._nothing)
 
     @property
     def parts(self) -> tuple[Vector, ...]:
