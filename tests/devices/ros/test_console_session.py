@@ -47,8 +47,10 @@ def play(
         while not hasattr(gateway, "transport"):
             assert not run.done(), run.result()
             sleep(0.01)
-        programs(gateway.transport)
-        run.result()
+        try:
+            programs(gateway.transport)
+        finally:
+            run.result()  # the session's own error says more than what was not heard
 
 
 def until(heard: Callable[[], list[Any]], holds: Callable[[Any], bool]) -> None:
