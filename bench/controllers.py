@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-sys.path.remove(str(Path(__file__).parent))  # else this very file is the package `controllers`
+if str(Path(__file__).parent) in sys.path:  # not if run as a module
+    sys.path.remove(str(Path(__file__).parent))  # else this very file is the package `controllers`
 
 from controllers.dvrk_console.controller import DvrkConsole
 from controllers.dvrk_console.params import DvrkConsoleParams

@@ -27,14 +27,13 @@ from hub.transport.refusals import Refusals
 from schemas.codec import encode
 from schemas.errors import MessageError
 from schemas.keys import Keys, topic
-from schemas.lockstep import Ack, Entering, Grant, pack_ack
+from schemas.lockstep import Ack, Grant, pack_ack
 from schemas.message import Message
 from schemas.ports import Port
 from schemas.trocar_msgs import (
     AckMessage,
     CouplingEnergy,
     GrantMessage,
-    InletSample,
     Profile,
     SessionStatus,
 )
@@ -71,7 +70,10 @@ class Monitor:
         self._keys = keys
         self._recorder = recorder
         self._watched: dict[str, _Watched] = {}
+        self._by_port: dict[tuple[str, str], _Watched] = {}
+        """The same, by participant and port: to make a key takes as long as to record a message."""
         self._channels: dict[str, int] = {}
+        self._ack_channels: dict[str, int] = {}
         self._acks: list[Queued] = []
         """Acks that are not yet given to the recorder."""
         self._values: list[Queued] = []
@@ -81,9 +83,8 @@ class Monitor:
             for port in planned.ports:
                 if port.causality == "output":
                     key = keys.output(planned.key_role, planned.name, port.name)
-                    self._watched[key] = _Watched(
-                        planned, port, PortCodec(port), self._channel(key, port.type)
-                    )
+                    watched = _Watched(planned, port, PortCodec(port), self._channel(key, port.type))
+                    self._watched[key] = self._by_port[planned.name, port.name] = watched
 
     def _channel(self, key: str, type_name: str) -> int:
         if self._recorder is None:
@@ -182,7 +183,7 @@ class Monitor:
         return receive if recorded or is_measured else None
 
     def _output(self, planned: PlannedParticipant, port: Port) -> _Watched:
-        return self._watched[self._keys.output(planned.key_role, planned.name, port.name)]
+        return self._by_port[planned.name, port.name]
 
     def received(self, end: int) -> bool:
         """Return whether all values of the steps before `end` have arrived from other processes.
@@ -233,7 +234,7 @@ class Monitor:
 
         Raises MessageError if it is no message of the port.
         """
-        watched = self._watched[self._keys.output("device", device, port)]
+        watched = self._by_port[device, port]
         measured = (device, port) in self.measures.by_port
         if measured or not enters:
             value = watched.codec.accept(payload)
@@ -246,20 +247,19 @@ class Monitor:
         """Receive a grant and the device samples in it."""
         if self._recorder is None:
             return
-        self._recorder.write(self._channel(self._keys.grant, GrantMessage.ros_type), grant.start_ns, payload)
-        for sample in grant.inlets:
-            self._inlet(sample, grant.start_ns)
-
-    def _inlet(self, sample: InletSample | Entering, time_ns: int) -> None:
-        watched = self._watched.get(self._keys.output("device", sample.participant, sample.port))
-        if watched is not None and sample.payload.size and self._recorder is not None:
-            self._recorder.write(watched.channel, time_ns, sample.payload.tobytes())
+        time_ns, channel = grant.start_ns, self._channel(self._keys.grant, GrantMessage.ros_type)
+        inlets = [(self._by_port.get((one.participant, one.port)), one.payload) for one in grant.inlets]
+        entering = [(to.channel, time_ns, held.tobytes()) for to, held in inlets if to and held.size]
+        self._recorder.write_all([(channel, time_ns, payload), *entering])
 
     def ack(self, planned: PlannedParticipant, ack: Ack, time_ns: int, payload: bytes | None) -> None:
         """Receive an ack; `payload` are its bytes if it is from the wire."""
         self.energy.take(planned.name, ack)
         if self._recorder is not None:
-            channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
+            channel = self._ack_channels.get(planned.name)
+            if channel is None:  # declared by the first ack: channels have the order of their first message
+                channel = self._channel(self._keys.ack(planned.name), AckMessage.ros_type)
+                self._ack_channels[planned.name] = channel
             self._acks.append((channel, time_ns, pack_ack(ack) if payload is None else payload))
 
     def flush(self) -> None:
