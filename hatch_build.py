@@ -15,7 +15,7 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 # A product and a sum that become one instruction are rounded once instead of twice. MSVC does not fuse them.
-_FLAGS = [] if sys.platform == "win32" else ["-O2", "-ffp-contract=off", "-fno-fast-math"]
+_FLAGS = [] if sys.platform == "win32" else ["-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden"]
 
 
 class CompileKinematics(BuildHookInterface[Any]):
@@ -25,7 +25,8 @@ class CompileKinematics(BuildHookInterface[Any]):
         """Compile, and add what came of it to the wheel."""
         extension = Extension(
             "robots._kinematics",
-            ["robots/_kinematics.c"],
+            ["robots/_kinematics.c", "robots/_closed_form.c"],
+            depends=["robots/_kinematics.h"],
             include_dirs=[np.get_include()],
             extra_compile_args=_FLAGS,
         )

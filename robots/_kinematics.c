@@ -9,31 +9,18 @@ Only the usual case is here. A function returns None wherever an argument is not
 number is not finite, or a joint would leave its range; the Python code then does all, and raises what is to be raised.
 */
 
-#define PY_SSIZE_T_CLEAN
-#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
-#include <Python.h>
-#include <numpy/arrayobject.h>
-#include <numpy/ufuncobject.h>
-#include <math.h>
-#include <string.h>
+#define TROCAR_KINEMATICS_MODULE
+#include "_kinematics.h"
 
-#define MOST 8 /* joints of a chain */
-#define DOUBLE ((npy_intp)sizeof(double))
+Loops loops;
+const npy_intp SQUARE[3] = {0, 4, 1};
 
-/* Inner loops of numpy for doubles. */
-
-typedef struct {
-    PyUFuncGenericFunction call;
-    void *data;
-} Loop;
-
-static Loop cosine, sine, matmul, vecdot, solve;
-
+/* Find the loop of doubles of a ufunc; return 0, with an ImportError, if there is none. */
 static int find(PyObject *module, const char *name, Loop *loop)
 {
     PyObject *found = PyObject_GetAttrString(module, name);
     if (found == NULL)
-        return -1;
+        return 0;
     loop->call = NULL;
     if (PyObject_TypeCheck(found, &PyUFunc_Type)) {
         PyUFuncObject *ufunc = (PyUFuncObject *)found;
@@ -49,43 +36,31 @@ static int find(PyObject *module, const char *name, Loop *loop)
     }
     Py_DECREF(found); /* numpy keeps it */
     if (loop->call != NULL)
-        return 0;
+        return 1;
     PyErr_Format(PyExc_ImportError, "numpy has no loop of doubles for %s; the Python code is used instead", name);
-    return -1;
+    return 0;
 }
 
-/* c (m, p) = a (m, n) b (n, p), `times` times; strides in numbers, the first of each for the next of many. */
-static void multiply(npy_intp times, npy_intp m, npy_intp n, npy_intp p, const double *a, const npy_intp *as,
-                     const double *b, const npy_intp *bs, double *c, const npy_intp *cs)
+void multiply(npy_intp times, npy_intp m, npy_intp n, npy_intp p, const double *a, const npy_intp *as, const double *b,
+              const npy_intp *bs, double *c, const npy_intp *cs)
 {
     char *args[3] = {(char *)a, (char *)b, (char *)c};
     npy_intp dimensions[4] = {times, m, n, p};
     npy_intp steps[9] = {as[0] * DOUBLE, bs[0] * DOUBLE, cs[0] * DOUBLE, as[1] * DOUBLE, as[2] * DOUBLE,
                          bs[1] * DOUBLE, bs[2] * DOUBLE, cs[1] * DOUBLE, cs[2] * DOUBLE};
-    matmul.call(args, dimensions, steps, matmul.data);
+    loops.matmul.call(args, dimensions, steps, loops.matmul.data);
 }
 
-static double dot(npy_intp n, const double *a, const double *b)
+double dot(npy_intp n, const double *a, npy_intp as, const double *b, npy_intp bs)
 {
     double result;
     char *args[3] = {(char *)a, (char *)b, (char *)&result};
-    npy_intp dimensions[2] = {1, n}, steps[5] = {0, 0, 0, DOUBLE, DOUBLE};
-    vecdot.call(args, dimensions, steps, vecdot.data);
+    npy_intp dimensions[2] = {1, n}, steps[5] = {0, 0, 0, as * DOUBLE, bs * DOUBLE};
+    loops.vecdot.call(args, dimensions, steps, loops.vecdot.data);
     return result;
 }
 
-/* A chain, as `SerialChain.numbers` has it. */
-
-typedef struct {
-    npy_intp n;
-    const double *basis;        /* (n, 3, 16) */
-    const double *tip;          /* (4, 4) */
-    const double *lower, *upper; /* (n,) */
-    const double *slides;       /* (n,): 1 of a prismatic joint */
-} Chain;
-
-/* Return the numbers of a contiguous array of doubles of this size; NULL if `object` is none. */
-static const double *numbers(PyObject *object, npy_intp size)
+const double *numbers(PyObject *object, npy_intp size)
 {
     if (!PyArray_Check(object))
         return NULL;
@@ -95,13 +70,12 @@ static const double *numbers(PyObject *object, npy_intp size)
     return PyArray_DATA(array);
 }
 
-/* The same of an array of one dimension. */
-static const double *vector(PyObject *object, npy_intp size)
+const double *vector(PyObject *object, npy_intp size)
 {
     return PyArray_Check(object) && PyArray_NDIM((PyArrayObject *)object) == 1 ? numbers(object, size) : NULL;
 }
 
-static int read_chain(PyObject *object, Chain *chain)
+int read_chain(PyObject *object, Chain *chain)
 {
     if (!PyTuple_Check(object) || PyTuple_GET_SIZE(object) != 5 || !PyArray_Check(PyTuple_GET_ITEM(object, 2)))
         return 0;
@@ -113,15 +87,14 @@ static int read_chain(PyObject *object, Chain *chain)
            (chain->slides = numbers(PyTuple_GET_ITEM(object, 4), n)) != NULL;
 }
 
-/* Write the poses of all links and the tip, (n + 1, 4, 4): `_Workspace.frames` of serial_chain.py. */
-static void find_frames(const Chain *chain, const double *q, double *poses)
+void find_frames(const Chain *chain, const double *q, double *poses)
 {
     npy_intp n = chain->n, steps[2] = {DOUBLE, 3 * DOUBLE};
     double factors[MOST][3], links[MOST][16];
-    const npy_intp row[3] = {3, 3, 1}, table[3] = {48, 16, 1}, link[3] = {16, 16, 1}, square[3] = {0, 4, 1};
+    const npy_intp row[3] = {3, 3, 1}, table[3] = {48, 16, 1}, link[3] = {16, 16, 1};
     char *cosines[2] = {(char *)q, (char *)&factors[0][1]}, *sines[2] = {(char *)q, (char *)&factors[0][2]};
-    cosine.call(cosines, &n, steps, cosine.data);
-    sine.call(sines, &n, steps, sine.data);
+    loops.cosine.call(cosines, &n, steps, loops.cosine.data);
+    loops.sine.call(sines, &n, steps, loops.sine.data);
     for (npy_intp i = 0; i < n; i++) {
         factors[i][0] = 1.0;
         if (chain->slides[i] != 0.0)
@@ -130,8 +103,8 @@ static void find_frames(const Chain *chain, const double *q, double *poses)
     multiply(n, 1, 3, 16, factors[0], row, chain->basis, table, links[0], link);
     memcpy(poses, links[0], sizeof links[0]);
     for (npy_intp i = 0; i < n; i++)
-        multiply(1, 4, 4, 4, poses + 16 * i, square, i + 1 < n ? links[i + 1] : chain->tip, square,
-                 poses + 16 * (i + 1), square);
+        multiply(1, 4, 4, 4, poses + 16 * i, SQUARE, i + 1 < n ? links[i + 1] : chain->tip, SQUARE,
+                 poses + 16 * (i + 1), SQUARE);
 }
 
 /* Write the unit quaternion of the matrix in the corner of a pose: `_from_rows` of rotation.py. */
@@ -200,7 +173,7 @@ static int correct(const Chain *chain, const double *q, const double *poses, con
     multiply(1, n, 6, 1, jacobian, across, error, column, gradient, column);
     char *args[3] = {(char *)normal, (char *)gradient, (char *)move};
     npy_intp dimensions[2] = {1, n}, steps[7] = {0, 0, 0, n * DOUBLE, DOUBLE, DOUBLE, DOUBLE};
-    solve.call(args, dimensions, steps, solve.data);
+    loops.solve.call(args, dimensions, steps, loops.solve.data);
     for (npy_intp i = 0; i < n; i++) {
         double reached = q[i] + move[i];
         if (!(chain->lower[i] < reached && reached < chain->upper[i]))
@@ -210,7 +183,13 @@ static int correct(const Chain *chain, const double *q, const double *poses, con
     return 1;
 }
 
-static PyObject *new_array(int dimensions, npy_intp *shape) { return PyArray_SimpleNew(dimensions, shape, NPY_DOUBLE); }
+PyObject *array_of(npy_intp n, const double *values)
+{
+    PyObject *result = PyArray_SimpleNew(1, &n, NPY_DOUBLE);
+    if (result != NULL)
+        memcpy(PyArray_DATA((PyArrayObject *)result), values, n * sizeof(double));
+    return result;
+}
 
 PyDoc_STRVAR(frames_doc, "frames(chain, q): poses of all links and the tip, shape (n + 1, 4, 4), at q, shape (n,).");
 
@@ -221,7 +200,7 @@ static PyObject *frames(PyObject *module, PyObject *const *args, Py_ssize_t coun
     if (count != 2 || !read_chain(args[0], &chain) || (q = vector(args[1], chain.n)) == NULL)
         Py_RETURN_NONE;
     npy_intp shape[3] = {chain.n + 1, 4, 4};
-    PyObject *result = new_array(3, shape);
+    PyObject *result = PyArray_SimpleNew(3, shape, NPY_DOUBLE);
     if (result != NULL)
         find_frames(&chain, q, PyArray_DATA((PyArrayObject *)result));
     return result;
@@ -254,7 +233,7 @@ static PyObject *pursue(PyObject *module, PyObject *const *args, Py_ssize_t coun
             error[k] = position[k] - tip[4 * k + 3];
             error[k + 3] = length * error[k + 3];
         }
-        double squared = dot(6, error, error);
+        double squared = dot(6, error, 1, error, 1);
         if (squared < met)
             break;
         if (!isfinite(squared) || !correct(&chain, found, poses, error, 0.5 * squared + damping, length, move))
@@ -269,15 +248,13 @@ static PyObject *pursue(PyObject *module, PyObject *const *args, Py_ssize_t coun
         if (share >= 1.0)
             break;
     }
-    PyObject *result = new_array(1, &n);
-    if (result != NULL)
-        memcpy(PyArray_DATA((PyArrayObject *)result), found, n * sizeof(double));
-    return result;
+    return array_of(n, found);
 }
 
 static PyMethodDef functions[] = {
     {"frames", (PyCFunction)(void (*)(void))frames, METH_FASTCALL, frames_doc},
     {"pursue", (PyCFunction)(void (*)(void))pursue, METH_FASTCALL, pursue_doc},
+    {"inverse", (PyCFunction)(void (*)(void))inverse, METH_FASTCALL, inverse_doc},
     {NULL, NULL, 0, NULL},
 };
 
@@ -294,9 +271,10 @@ PyMODINIT_FUNC PyInit__kinematics(void)
     import_array();
     import_umath();
     PyObject *numpy = PyImport_ImportModule("numpy"), *linalg = PyImport_ImportModule("numpy.linalg._umath_linalg");
-    int found = numpy != NULL && linalg != NULL && find(numpy, "cos", &cosine) == 0 && find(numpy, "sin", &sine) == 0 &&
-                find(numpy, "matmul", &matmul) == 0 && find(numpy, "vecdot", &vecdot) == 0 &&
-                find(linalg, "solve1", &solve) == 0;
+    int found = numpy != NULL && linalg != NULL && find(numpy, "cos", &loops.cosine) && find(numpy, "sin", &loops.sine) &&
+                find(numpy, "arctan2", &loops.arctan2) && find(numpy, "hypot", &loops.hypot) &&
+                find(numpy, "add", &loops.add) && find(numpy, "matmul", &loops.matmul) &&
+                find(numpy, "vecdot", &loops.vecdot) && find(linalg, "solve1", &loops.solve);
     Py_XDECREF(numpy);
     Py_XDECREF(linalg);
     return found ? PyModule_Create(&definition) : NULL;

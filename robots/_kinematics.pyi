@@ -3,6 +3,9 @@ from schemas.vectors import Vector
 Numbers = tuple[Vector, Vector, Vector, Vector, Vector]
 """`SerialChain.numbers`."""
 
+Form = tuple[Vector, Vector, Vector, Vector]
+"""`robots.dvrk.inverse._Form.numbers`."""
+
 def frames(chain: Numbers, q: Vector, /) -> Vector | None: ...
 def pursue(
     chain: Numbers,
@@ -16,3 +19,4 @@ def pursue(
     corrections: int,
     /,
 ) -> Vector | None: ...
+def inverse(chain: Numbers, form: Form, pose: Vector, near: Vector, /) -> Vector | None: ...
