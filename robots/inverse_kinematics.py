@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from robots import rotation
-from robots.serial_chain import SerialChain
+from robots.serial_chain import SerialChain, compiled
 from schemas.vectors import Vector
 
 __all__ = ["LastFrames", "pursue"]
@@ -81,8 +81,22 @@ def pursue(
         straight.
         frames_at: `chain.frames`, or `LastFrames` of it.
     """
-    found: Vector = q
     length = _LENGTH if len(q) >= 6 else _LITTLE
+    if compiled is not None:
+        reached = compiled.pursue(
+            chain.numbers,
+            q,
+            position,
+            orientation,
+            largest_move,
+            length,
+            _LEAST_DAMPING,
+            _MET**2,
+            _CORRECTIONS,
+        )
+        if reached is not None:
+            return reached
+    found: Vector = q
     frames_at = frames_at or chain.frames
     for _ in range(_CORRECTIONS):
         frames = frames_at(found)

@@ -12,7 +12,7 @@ import numpy as np
 
 from schemas.vectors import Vector
 
-__all__ = ["conjugate", "exp", "from_matrices", "from_matrix", "log", "matrix", "product", "turn_to"]
+__all__ = ["conjugate", "exp", "from_matrices", "from_matrix", "log", "matrix", "product", "rows", "turn_to"]
 
 _SMALL_ANGLE = 1e-6
 """Below this (rad) the next term of the sine's series is under the rounding error of a double."""
@@ -70,13 +70,15 @@ def _log(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
 
 def matrix(q: Vector) -> Vector:
     """Return the rotation matrix, shape (3, 3), of the unit quaternion `q`."""
-    x, y, z, w = q.tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
+    return np.array(rows(*q.tolist()))
+
+
+def rows(x: float, y: float, z: float, w: float) -> tuple[tuple[float, float, float], ...]:
+    """Return the three rows of the rotation matrix of a unit quaternion, in numbers."""
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
     )
 
 

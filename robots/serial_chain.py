@@ -20,7 +20,12 @@ from robots.limits import ANGLE_TOLERANCE, TOLERANCE, distinct
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Joint", "SerialChain", "SerialChains", "jerk_limit"]
+try:
+    from robots import _kinematics as compiled
+except ImportError:  # there was no compiler, or numpy's inner loops are not where they were
+    compiled = None
+
+__all__ = ["Joint", "SerialChain", "SerialChains", "compiled", "jerk_limit"]
 
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Whose products are those of a cross product."""
@@ -131,6 +136,9 @@ class SerialChain:
             basis[0] = base @ basis[0]
         self.basis = basis.reshape(len(self.joints), 3, 16)
         """Of the links' transforms, whose factors are 1, cos q or 0, and sin q or q."""
+        slides = np.array([joint.kind == "prismatic" for joint in joints], np.float64)
+        self.numbers = self.basis, np.ascontiguousarray(tip), self.lower, self.upper, slides
+        """What the compiled functions take."""
         self._free: list[_Workspace] = []
         """Workspaces of `frames` that no thread uses now."""
         # Where the factors of the Jacobian's cross products are in the numbers of `frames`, (2, 3, n) each.
@@ -168,6 +176,8 @@ class SerialChain:
             self.check_form(q)
         if q.ndim > 1:
             return _frames(q, self.basis, self.tip, self.prismatic)
+        if compiled is not None and (found := compiled.frames(self.numbers, q)) is not None:
+            return found
         try:
             workspace = self._free.pop()
         except IndexError:  # the first call, or another thread is in the midst of one

@@ -18,7 +18,6 @@ from controllers.motion.messages import Messages
 from controllers.motion.operating_state import State
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import EQUIPMENT_COMMANDS, event_names
-from controllers.motion.poses_ahead import PoseAhead
 from controllers.motion.setpoint import Setpoint
 from controllers.motion.telemetry import KnownWeight, TelemetryRow
 from hub.participant import Inputs, Record, flag
@@ -28,7 +27,6 @@ from robots.serial_chain import SerialChain
 from schemas.crtk import StringStamped
 from schemas.errors import MotionError
 from schemas.message import Message
-from schemas.ros import PoseStamped
 from schemas.vectors import Vector
 
 __all__ = ["Arm"]
@@ -66,7 +64,7 @@ class Arm:
             outputs: those of the controller; the arm puts its own among them, whose arrays stay the same.
         """
         arm = params.arms.driven[name]
-        self._period, self._servo_cp = period, f"{name}/servo_cp"
+        self._period = period
         held = arm.equipment
         self._messages = Messages(name, event_names(arm), outputs)
         self._equipment = Equipment(*held, self._messages)
@@ -146,17 +144,6 @@ class Arm:
         if not self._now.started:
             for axes in self._drives.groups:
                 axes.setpoint.reset(axes.position)
-
-    def prepare(self, inputs: Inputs) -> PoseAhead | None:
-        """Return what the newest `servo_cp` of a step asks for, if there is one that the arm executes."""
-        commands = inputs.events(self._servo_cp)
-        if not commands or self._lifecycle.not_ready():
-            return None
-        return self._cartesian.prepare(cast("PoseStamped", commands[-1]))
-
-    def accept(self, ahead: PoseAhead) -> None:
-        """Keep joint positions for the command that they were found for."""
-        self._cartesian.ahead = ahead
 
     def step(self, t: int, h: int, inputs: Inputs) -> list[Setpoint]:
         """Execute the commands that have arrived, and advance from `t` to `t + h` (ns).

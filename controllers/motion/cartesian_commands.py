@@ -13,7 +13,6 @@ import numpy as np
 from controllers.motion import goals
 from controllers.motion.drives import Drives, WrenchFrame
 from controllers.motion.frames import BaseFrame, turned
-from controllers.motion.poses_ahead import PoseAhead
 from robots.dvrk.cannula import Cannula
 from robots.dvrk.cart import inverse_pose
 from robots.dvrk.crtk import tip_frame
@@ -47,8 +46,6 @@ class CartesianCommands:
         self._arm, self._drives, self._base, self._ratio, self._period = arm, drives, base, ratio, period
         self._joints, self._chain = drives.joints, drives.joints.chain
         self._cannula = Cannula.of(self._chain)
-        self.ahead: PoseAhead | None = None
-        """What was solved together with other arms."""
         self.handlers: Mapping[str, Callable[[Any], None]] = {
             "body/set_cf_orientation_absolute": self._set_cf_orientation_absolute,
             "set_base_frame": self._set_base_frame,
@@ -126,29 +123,8 @@ class CartesianCommands:
         self._drives.move(self._joints, self._solve(message), self._ratio)
 
     def _solve(self, message: PoseStamped) -> Vector:
-        """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame.
-
-        They were found ahead where all that they depend on is as it was then.
-        """
-        ahead = self.ahead
-        if ahead is None or not ahead.is_for(message, self._base.pose, self._joints.setpoint.position):
-            return self._inverse(self._tip(message))
-        self._cannula.check(ahead.goal, self._joints.position)
-        return ahead.goal
-
-    def prepare(self, message: PoseStamped) -> PoseAhead | None:
-        """Return what a `servo_cp` asks of the inverse kinematics; None if its message is refused."""
-        try:
-            tip = self._tip(message)
-        except MotionError:
-            return None
-        self.ahead = None
-        return PoseAhead(message, self._base.pose, self._joints.setpoint.position, tip)
-
-    def _tip(self, message: PoseStamped) -> Vector:
-        """Return the pose that a message asks for in the arm's base frame, shape (4, 4)."""
-        frame = self._from(message.header.frame_id)
-        return frame.dot(goals.frame(message.pose))
+        """Return the joint positions, shape (n,), of a pose in the reference or in the arm's base frame."""
+        return self._inverse(self._from(message.header.frame_id).dot(goals.frame(message.pose)))
 
     def _from(self, frame_id: str) -> Vector:
         """Return the pose of the frame that a message names in the arm's base frame, shape (4, 4).

@@ -11,7 +11,6 @@ from controllers.motion.following import Followers
 from controllers.motion.frames import base_in_world, reference_frame
 from controllers.motion.params import MotionParams
 from controllers.motion.ports import arm_ports, setup_joint_ports
-from controllers.motion.poses_ahead import alike, solve_ahead
 from controllers.motion.setup_joints import SetupJoints
 from controllers.motion.telemetry import Telemetry
 from hub.participant import Controller, Inputs, Outputs, Params, Setup
@@ -39,8 +38,6 @@ class MotionController(Controller):
     def __init__(self, name: str, params: MotionParams) -> None:
         super().__init__(name, params)
         self._arms: dict[str, Arm] = {}
-        self._alike: list[list[Arm]] = []
-        """Arms whose inverse kinematics are found together."""
         self._telemetry: Telemetry | None = None
         self._followers: Followers | None = None
         self._period = 0.0
@@ -79,7 +76,6 @@ class MotionController(Controller):
             name: Arm(name, self.params, self._camera, period, self._outputs)
             for name in self.params.arms.driven
         }
-        self._alike = alike(self._arms.values())
         self._telemetry = Telemetry([(name, arm.chain, arm.weight) for name, arm in self._arms.items()])
         self._publish(self._telemetry)
         self._outputs |= self._telemetry.outputs
@@ -104,9 +100,6 @@ class MotionController(Controller):
         arms = self._arms.values()
         for arm in arms:
             arm.sense(inputs)
-        if not inputs.quiet:
-            for group in self._alike:
-                solve_ahead(group, inputs)
         following = [setpoint for arm in arms for setpoint in arm.step(t, h, inputs)]
         if following:
             if self._followers is None or self._followers.setpoints != following:
@@ -133,6 +126,5 @@ class MotionController(Controller):
     def close(self) -> None:
         """Release the arms."""
         self._arms.clear()
-        self._alike.clear()
         self._telemetry = self._followers = None
         self._outputs.clear()

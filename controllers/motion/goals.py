@@ -5,6 +5,7 @@ An invalid message raises MotionError, which states what is allowed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot, isfinite
 from typing import Literal
 
@@ -31,7 +32,6 @@ __all__ = [
 
 _QUATERNION_TOLERANCE = 1e-3
 """Of a unit quaternion's norm, as for the values of signals (schemas.vectors)."""
-_IDENTITY = np.eye(4)
 _MOST = 1e9
 """SI units; what is computed from numbers up to this stays finite, and no force, gain or place is larger."""
 
@@ -51,7 +51,7 @@ def joint_values(
         if sorted(message.name) != sorted(names):
             raise MotionError(f"joints {', '.join(message.name)}, expected {', '.join(names)}")
         values = values[[message.name.index(name) for name in names]]
-    _check_finite(values, part)
+    _check_finite(values.tolist(), part)
     return values
 
 
@@ -93,21 +93,26 @@ def check_frame(frame_id: str, *allowed: str) -> str:
 
 def frame(pose: Pose) -> Vector:
     """Return the pose as (4, 4) matrix."""
-    matrix = _IDENTITY.copy()  # an eighth of the cost of np.eye
-    matrix[:3, 3], matrix[:3, :3] = vector(pose.position, "position"), rotation_matrix(pose.orientation)
-    return matrix
+    x, y, z = _numbers(pose.position, "position")
+    first, second, third = rotation.rows(*_unit(pose.orientation))
+    return np.array([(*first, x), (*second, y), (*third, z), (0.0, 0.0, 0.0, 1.0)])
 
 
 def rotation_matrix(q: Quaternion) -> Vector:
     """Return the orientation as (3, 3) matrix."""
-    quaternion = np.array([q.x, q.y, q.z, q.w])
-    _check_finite(quaternion, "orientation")
-    norm = hypot(*quaternion.tolist())
+    return np.array(rotation.rows(*_unit(q)))
+
+
+def _unit(q: Quaternion) -> tuple[float, float, float, float]:
+    """Return the quaternion (x, y, z, w) of a message with a norm of 1."""
+    x, y, z, w = numbers = q.x, q.y, q.z, q.w
+    _check_finite(numbers, "orientation")
+    norm = hypot(x, y, z, w)
     if abs(norm - 1.0) > _QUATERNION_TOLERANCE:
         raise MotionError(
             f"quaternion (x, y, z, w) has norm {norm:.6g}, allowed is 1 within {_QUATERNION_TOLERANCE:g}"
         )
-    return rotation.matrix(quaternion / norm)
+    return x / norm, y / norm, z / norm, w / norm
 
 
 def twist(message: Twist) -> Vector:
@@ -122,13 +127,17 @@ def wrench(message: Wrench) -> Vector:
 
 def vector(message: Point | Vector3, part: str) -> Vector:
     """Return the vector, shape (3,); `part` names it in the error if it is not finite or too large."""
-    values = np.array([message.x, message.y, message.z])
-    _check_finite(values, part)
-    if max(abs(message.x), abs(message.y), abs(message.z)) > _MOST:
-        raise MotionError(f"{part} {values.tolist()}: allowed are numbers up to {_MOST:g}")
-    return values
+    return np.array(_numbers(message, part))
 
 
-def _check_finite(values: Vector, part: str) -> None:
-    if not all(map(isfinite, values.tolist())):
-        raise MotionError(f"{part} {values.tolist()}: every number must be finite")
+def _numbers(message: Point | Vector3, part: str) -> tuple[float, float, float]:
+    x, y, z = numbers = message.x, message.y, message.z
+    _check_finite(numbers, part)
+    if not -_MOST <= min(x, y, z) <= max(x, y, z) <= _MOST:
+        raise MotionError(f"{part} {[x, y, z]}: allowed are numbers up to {_MOST:g}")
+    return numbers
+
+
+def _check_finite(values: Sequence[float], part: str) -> None:
+    if not all(map(isfinite, values)):
+        raise MotionError(f"{part} {[*values]}: every number must be finite")

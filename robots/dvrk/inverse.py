@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from robots.dvrk import ecm, psm
 from robots.dvrk.cart import inverse_pose
 from robots.limits import ANGLE_TOLERANCE, distinct
-from robots.serial_chain import Joint, SerialChain
+from robots.serial_chain import Joint, SerialChain, compiled
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
@@ -80,18 +80,20 @@ class _Form:
     """Ends of the joint ranges, widened by `ANGLE_TOLERANCE`, shape (n,)."""
     middle: Vector
     """Of the joint ranges, shape (n,)."""
+    numbers: tuple[Vector, Vector, Vector, Vector]
+    """What the compiled function takes, with the offsets of roll, insertion and wrist yaw."""
 
 
 @lru_cache(maxsize=_CHAINS)
 def _form(chain: SerialChain) -> _Form:
     _require(chain, ecm.JOINTS[3:] if len(chain.joints) == len(ecm.JOINTS) else chain.joints[3:])
-    return _Form(
-        inverse_pose(chain.tip),
-        np.array([joint.theta for joint in chain.joints[3:]]),
-        chain.lower - ANGLE_TOLERANCE,
-        chain.upper + ANGLE_TOLERANCE,
-        (chain.lower + chain.upper) / 2,
-    )
+    from_tip, theta = inverse_pose(chain.tip), np.array([joint.theta for joint in chain.joints[3:]])
+    lowest, highest = chain.lower - ANGLE_TOLERANCE, chain.upper + ANGLE_TOLERANCE
+    middle = (chain.lower + chain.upper) / 2
+    offsets = np.array([chain.joints[3].d, chain.joints[2].d, chain.joints[-1].a])
+    limits = np.array([lowest, highest, middle, chain.tolerance, chain.velocity])
+    numbers = np.ascontiguousarray(from_tip), theta, offsets, limits
+    return _Form(from_tip, theta, lowest, highest, middle, numbers)
 
 
 def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
@@ -108,9 +110,14 @@ def inverse(chain: SerialChain, pose: Vector, near: Vector) -> Vector:
         MotionError: wrong shape, not finite, no rigid transform, or not reachable; the message names the
             joints, the positions they would need and their ranges, for the first of many poses that fails.
     """
+    form = _form(chain)
+    if compiled is not None:
+        found = compiled.inverse(chain.numbers, form.numbers, pose, near)
+        if found is not None:
+            return found
     n = len(chain.joints)
     poses, start = _goals(chain, pose, near)
-    ends = poses @ _form(chain).from_tip
+    ends = poses @ form.from_tip
     if n == len(ecm.JOINTS):
         branches = _branches_without_wrist(chain, poses[:, :3, 3], ends[:, :3, :3])
     else:

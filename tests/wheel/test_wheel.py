@@ -5,6 +5,7 @@ import importlib.metadata
 import json
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from base64 import urlsafe_b64encode
@@ -75,6 +76,18 @@ def test_it_holds_the_packages_and_the_scenarios_and_nothing_else(wheel):
         "configs/scenario.schema.json",
         "configs/data/palpation_hand/palpation_hand.mcap",
     } <= set(names)
+
+
+def test_kinematics_are_compiled_where_there_is_a_compiler(wheel, tmp_path):
+    assert any(Path(name).match("robots/_kinematics.*.so") for name in zipfile.ZipFile(wheel).namelist())
+    build = [sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path / "dist", "sources"]
+    with tarfile.open(next(wheel.parent.glob("*.tar.gz"))) as sources:
+        sources.extractall(tmp_path, filter="data")
+        (tmp_path / sources.getnames()[0].partition("/")[0]).rename(tmp_path / "sources")
+    lacking = {**CLEAN, "CC": str(tmp_path / "no-compiler")}
+    done = subprocess.run(build, cwd=tmp_path, env=lacking, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert [path.name.endswith("-py3-none-any.whl") for path in (tmp_path / "dist").iterdir()] == [True]
 
 
 def test_without_extras_the_command_line_works(base, findings, tmp_path):
