@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -22,6 +23,7 @@ from statistics import median
 from typing import Any, NamedTuple
 
 import trocar
+from hub.hosting.end_with_parent import NEEDS_INPUT, end_with_parent
 
 TASKS = {
     "pick-and-place": {},
@@ -142,7 +144,7 @@ def main() -> None:
     tasks = asked.task or list(TASKS)
     found = _known(asked.trials)
     jobs = [(task, seed) for seed in range(asked.first, asked.first + asked.seeds) for task in tasks]
-    with ProcessPoolExecutor(asked.workers) as pool:
+    with ProcessPoolExecutor(asked.workers, initializer=_begin, initargs=(os.getpid(),)) as pool:
         running = [pool.submit(trial, *job) for job in jobs if job not in found]
         for future in as_completed(running):
             each = future.result()
@@ -159,6 +161,12 @@ def main() -> None:
         return
     for task, row in table.items():
         print(f"{task:28} " + "  ".join(f"{name} {value}" for name, value in row.items()))
+
+
+def _begin(parent: int) -> None:
+    """Let a worker end with the process that has started it, also when that is killed; only on Linux."""
+    if not NEEDS_INPUT:
+        end_with_parent(parent)
 
 
 def _known(file: Path | None) -> dict[tuple[str, int], Trial]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Protocol
 
 from controllers.expert.grasps import Grasps
@@ -70,6 +71,9 @@ class Chore(Protocol):
         """Return the height of a thing's middle, just over `place`, at which it is brought in line, m."""
         ...
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Grasps:
-        """Return how a thing with `pose`, shape (4, 4), can be taken by fingers as long as `reach`, m."""
+    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:
+        """Yield how a thing with `pose`, shape (4, 4), can be taken by fingers as long as `reach`, m.
+
+        Those that come later are for where an arm reaches none of those before.
+        """
         ...

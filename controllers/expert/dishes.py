@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import cos, pi, sin
 
 import numpy as np
@@ -67,6 +67,6 @@ class PickAndPlace:
         """Return the height over the rim."""
         return self.travel
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Grasps:  # noqa: ARG002
-        """Return its grasps."""
-        return of_piece(pose, reach)
+    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:  # noqa: ARG002
+        """Yield its grasps."""
+        yield of_piece(pose, reach)

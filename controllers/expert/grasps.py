@@ -7,6 +7,7 @@ poses in the world.
 
 from __future__ import annotations
 
+from itertools import product
 from math import asin, atan2, cos, pi, sin, sqrt, tan
 from typing import NamedTuple
 
@@ -34,6 +35,8 @@ FINGER = (1.4e-3, 2.1e-3)
 """Thickness and half the width of a finger of a needle driver near its end, m (engines.mujoco.looks)."""
 FREE = 0.3e-3
 """Between the finger in a ring and the post, m."""
+_SAMPLES = 5
+"""Points of the finger in a ring that are held against the post."""
 UPRIGHT = cos(0.35)
 """Height of the axis of a thing that need not be put upright, over its length."""
 _STEEP = 0.5
@@ -79,12 +82,20 @@ def of_piece(pose: Vector, reach: float) -> Grasps:
     return _grasps(poses, openings, [(0.0, 0.0)] * len(poses), ups)
 
 
-def of_ring(ring: Ring, pose: Vector, reach: float, post: tuple[Vector, float] | None) -> Grasps:
+def of_ring(
+    ring: Ring, pose: Vector, reach: float, post: tuple[Vector, float] | None, lean: float = 0.0
+) -> Grasps:
     """Return the grasps of an upright ring with `pose`, shape (4, 4): one finger in the hole, one outside.
 
     None of a ring that leans by more than `UPRIGHT`: see controllers.expert.fallen_rings.
 
-    `post`: the one it is around, if any: where it stands (x, y), m, and its radius, m.
+    Args:
+        ring: its measures.
+        pose: its pose, m.
+        reach: length of the fingers, m.
+        post: the one it is around, if any: where it stands (x, y), m, and its radius, m.
+        lean: of the fingers from the vertical, along the wall and to either side, rad: so a wrist comes
+            nearer to its arm by `reach` times the sine.
     """
     poses, outwards = list[Vector](), list[tuple[float, float]]()
     if abs(float(pose[2, 2])) < UPRIGHT:
@@ -92,21 +103,36 @@ def of_ring(ring: Ring, pose: Vector, reach: float, post: tuple[Vector, float] |
     up = pose[:3, 2] * (1.0 if pose[2, 2] > 0.0 else -1.0)
     centre = pose[:3, 3] + ring.height / 2.0 * (up - [0.0, 0.0, 1.0])  # below the middle of its upper rim
     spin = atan2(pose[1, 1], pose[0, 1])  # of the corner on y
-    middle, over = ring.inradius + ring.thickness / 2.0, ring.height / 2.0 + reach - _DEPTH
-    for k in range(3):
+    middle, over = ring.inradius + ring.thickness / 2.0, ring.height / 2.0 + reach * cos(lean) - _DEPTH
+    for k, side, leant in product(range(3), (-1.0, 1.0), (lean, -lean) if lean else (0.0,)):
         turn = spin + (2.0 * k + 1.0) * pi / 3.0  # opposite to a corner: the outward normal of a wall
         axes = np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
-        for aside in (-_ASIDE, _ASIDE):
-            if post is not None:
-                inner = middle - reach * sin(AJAR / 2.0) - FINGER[0] / 2.0
-                off = np.abs(axes @ (post[0] - centre[:2]) - [inner, aside]) - [FINGER[0] / 2.0, FINGER[1]]
-                if np.linalg.norm(np.maximum(off, 0.0)) < post[1] + FREE:
-                    continue
-            away = np.array([middle, aside]) @ axes
-            for way in (0.0, pi):
-                poses.append(_downwards(centre + np.append(away, 0.0), over, turn + way))
-                outwards.append(tuple(away / sqrt(float(away @ away))))
+        # where the fingers end, along the wall: nowhere within the ring are they further aside than `_ASIDE`
+        aside = side * (_ASIDE + _DEPTH * min(0.0, side * tan(leant)))
+        if post is not None and not _is_beside(
+            axes @ (post[0] - centre[:2]), post[1], middle, aside, leant, reach
+        ):
+            continue
+        away = np.array([middle, aside]) @ axes
+        wrist = np.array([middle, aside - reach * sin(leant)]) @ axes
+        for way in (0.0, pi):
+            poses.append(_downwards(centre + np.append(wrist, 0.0), over, turn + way, leant * cos(way)))
+            outwards.append(tuple(away / sqrt(float(away @ away))))
     return _grasps(poses, [AJAR] * len(poses), outwards, [up] * len(poses))
+
+
+def _is_beside(post: Vector, radius: float, middle: float, aside: float, lean: float, reach: float) -> bool:
+    """Say whether the open finger in a ring, all along, keeps clear of a post that is higher than the ring.
+
+    `post` is where it stands, `middle` and `aside` where the closed fingers end, from the ring's axis along
+    the normal of the wall and along the wall; m.
+    """
+    for along in np.linspace(0.0, reach, _SAMPLES):
+        inner = middle - (reach - along) * sin(AJAR / 2.0) - FINGER[0] / 2.0
+        off = np.abs(post - [inner, aside - along * sin(lean)]) - [FINGER[0] / 2.0, FINGER[1] / cos(lean)]
+        if np.linalg.norm(np.maximum(off, 0.0)) < radius + FREE:
+            return False
+    return True
 
 
 def _grasps(
@@ -128,11 +154,15 @@ def _reaching(origin: Vector, fingers: Vector, opening: Vector) -> Vector:
     return pose
 
 
-def _downwards(point: Vector, over: float, turn: float) -> Vector:
-    """Return the tip's pose `over` (m) a point, with the fingers down, opening at `turn` (rad) from x."""
+def _downwards(point: Vector, over: float, turn: float, lean: float) -> Vector:
+    """Return the tip's pose `over` (m) a point, with the fingers down, opening at `turn` (rad) from x.
+
+    They lean by `lean` (rad) about the way they open: their ends to the left of it.
+    """
     pose = np.eye(4)
-    c, s = cos(turn), sin(turn)
-    pose[:3, :3] = [[-s, c, 0.0], [c, s, 0.0], [0.0, 0.0, -1.0]]
+    c, s, up, along = cos(turn), sin(turn), cos(lean), sin(lean)
+    axes = np.array([[-s * up, c, -s * along], [c * up, s, c * along], [along, 0.0, -up]])
+    pose[:3, :3] = axes + 0.0  # without -0.0, which a state hash would tell from 0.0
     pose[:3, 3] = point
     pose[2, 3] += over
     return pose

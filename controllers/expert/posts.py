@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from controllers.expert.chores import DROP, SLACK
@@ -14,6 +16,8 @@ __all__ = ["PegBoard"]
 
 _GONE = 0.05
 """Below the board, m: what is so low has fallen off the table."""
+_LEANS = tuple(np.radians([0.0, 15.0, 30.0]).tolist())
+"""Of the fingers from the vertical, rad: with the last one an arm reaches 5 mm further."""
 _GRID = 4.0e-3
 """Between the points of the board among which one is chosen to put a ring upright, m."""
 _ENOUGH = 8.0e-3
@@ -115,15 +119,20 @@ class PegBoard:
         """Return the height just over the posts."""
         return self.clear + self._board.ring.height / 2.0 - SLACK / 2.0
 
-    def grasps(self, thing: int, pose: Vector, reach: float) -> Grasps:  # noqa: ARG002
-        """Return its grasps, clear of the post that it is around, or of all that is about a fallen one."""
+    def grasps(self, thing: int, pose: Vector, reach: float) -> Iterator[Grasps]:  # noqa: ARG002
+        """Yield its grasps, clear of the post that it is around, or of all that is about a fallen one.
+
+        From straight above, then from a hand that leans.
+        """
         if abs(float(pose[2, 2])) < UPRIGHT:
-            return of_fallen_ring(self._board.ring, pose, reach, self._surroundings(pose[:3, 3]))
+            yield of_fallen_ring(self._board.ring, pose, reach, self._surroundings(pose[:3, 3]))
+            return
         off = self._posts - pose[:3, 3]
         near = int((off[:, :2] ** 2).sum(axis=1).argmin())
         within = -off[near, 2] < self._board.post_height
         post = (self._posts[near, :2], self._board.post_radius) if within else None
-        return of_ring(self._board.ring, pose, reach, post)
+        for lean in _LEANS:
+            yield of_ring(self._board.ring, pose, reach, post, lean)
 
     def _surroundings(self, middle: Vector) -> Around:
         local = np.abs((middle - self._pose[:3, 3]) @ self._pose[:3, :2])

@@ -8,12 +8,12 @@ units, poses in the world.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import acos, hypot
+from math import acos, cos, hypot
 
 import numpy as np
 
 from controllers.expert.fallen_rings import BESIDE
-from controllers.expert.grasps import AJAR, UPRIGHT
+from controllers.expert.grasps import AJAR, UPRIGHT, Grasps
 from controllers.expert.hand import Hand, Phase, Role
 from controllers.expert.plans import Plan, plan, plan_leaning, upright
 from controllers.expert.team import Refusals, Team
@@ -50,6 +50,8 @@ _OFFERED = 20.0
 """s: for the other hand to take what is offered; it may have to put something down before."""
 _TURNING = 0.015
 """m: so much higher than it travels a thing is put upright, as it swings about the tip."""
+_SAME = cos(0.05)
+"""Of half the turn between two plans for the same grasp."""
 _STRAIGHT, _TURNS = 0.05, 3
 """rad: of a thing that is upright; how often a hand turns to bring it there."""
 _APPROACHING = {Phase.RISE, Phase.ACROSS, Phase.DESCEND, Phase.REACH}
@@ -228,12 +230,17 @@ class Transfer:
             if self._is_there:
                 self._enter(Phase.REACH, self.state.grasp, _GENTLE)
             return
-        if self.state.waited < _PATIENCE and (found := self._plan(self.state.thing)) and not found.leans:
+        if self.state.waited < _PATIENCE and (found := self._plan(self.state.thing)) and self._goes_on(found):
             self._follow(found)
             self.state.goal[:] = self.state.grasp  # the other hand may still bring it to rest
             if not self.hand.has_settled:
                 return
         self._shut()
+
+    def _goes_on(self, found: Plan) -> bool:
+        """Say whether a plan is that of this hand, but for what the thing has moved: fingers are in it."""
+        same = abs(float(found.grasp[3:] @ self.state.grasp[3:])) > _SAME
+        return same and not found.leans
 
     def _reach(self) -> None:
         if self._is_there:
@@ -358,8 +365,11 @@ class Transfer:
 
     def _plan(self, thing: int) -> Plan | None:
         """Return how to take hold of a thing; None: it cannot be taken."""
+        ways = self._chore.grasps(thing, self._seen.poses[thing], self.hand.jaw.length)
+        return next((found for found in (self._best(thing, each) for each in ways) if found), None)
+
+    def _best(self, thing: int, found: Grasps) -> Plan | None:
         poses, hand = self._seen.poses, self.hand
-        found = self._chore.grasps(thing, poses[thing], hand.jaw.length)
         middle, role = poses[thing, :3, 3], self.state.role
         lift = self._chore.travel - middle[2]
         if len(found.ups) and found.ups[0, 2] < UPRIGHT:

@@ -158,6 +158,16 @@ def test_rings_go_there_and_back():
     assert world.outputs["attempts"][0] == 4
 
 
+def test_a_ring_at_the_end_of_an_arms_reach_is_taken_by_a_hand_that_leans():
+    pose = np.eye(4)
+    c, s = np.cos(0.497), np.sin(0.497)
+    pose[:2, :2], pose[:3, 3] = [[c, -s], [s, c]], (0.1262, 1.1074, 0.8122)
+    world = one_ring("peg-board-surrol", pose)
+    world.run(20, until=lambda _: world.grips)
+    assert 0.5 < -world.tips["PSM1"][2, 2] < 0.99
+    assert world.run(20).expert.ended == "the task is done"
+
+
 @pytest.mark.parametrize(
     ("pose", "why", "count"),
     [

@@ -57,12 +57,34 @@ def test_a_ring_around_its_post_can_be_taken_and_no_finger_comes_down_on_the_pos
         assert np.linalg.norm(np.maximum(off_axes - [0.7e-3, 2.1e-3], 0)) > board.post_radius
 
 
-@given(ANGLES)
-def test_the_wall_of_a_ring_lies_in_the_plane_between_the_fingers(angle):
+@given(ANGLES, st.floats(0, 0.55))
+def test_the_wall_of_a_ring_lies_in_the_plane_between_the_fingers(angle, lean):
     ring, pose = BOARDS["icra2026"].ring, turned(angle)
-    for tip in of_ring(ring, pose, DRIVER, None).poses:
+    found = of_ring(ring, pose, DRIVER, None, lean).poses
+    assert len(found) == (24 if lean else 12)
+    for tip in found:
+        assert tip[:3, :3].T @ tip[:3, :3] == pytest.approx(np.eye(3), abs=1e-12)
         across = abs(tip[:2, 1] @ (tip[:2, 3] - pose[:2, 3]))
         assert across == pytest.approx(ring.inradius + ring.thickness / 2)
+        ends = tip[:3, 3] + DRIVER * tip[:3, 2]
+        rim = ends - 5e-3 / np.cos(lean) * tip[:3, 2]
+        aside = [abs(np.cross(tip[:3, 1], point - pose[:3, 3])[2]) for point in (ends, rim)]
+        assert max(aside) == pytest.approx(3.5e-3)
+        assert rim[2] == pytest.approx(pose[2, 3] + ring.height / 2)
+
+
+@given(ANGLES, st.sampled_from(sorted(BOARDS)), st.floats(0, 0.55))
+def test_the_finger_of_a_leaning_hand_passes_a_post_that_is_higher_than_the_ring(angle, name, lean):
+    board = BOARDS[name]
+    pose = turned(angle)
+    for tip in of_ring(board.ring, pose, DRIVER, (pose[:2, 3], board.post_radius), lean).poses:
+        inwards = np.sign(tip[:2, 1] @ (pose[:2, 3] - tip[:2, 3])) * tip[:2, 1]
+        for along in np.linspace(0.0, DRIVER, 5):  # from the end of the finger, its inner face and edges
+            middle = tip[:3, 3] + (DRIVER - along) * (np.append(inwards, 0) * np.sin(0.1) + tip[:3, 2])
+            post = (pose[:3, 3] - middle)[:2] - 0.7e-3 * inwards
+            off = np.abs([inwards @ post, np.array([-inwards[1], inwards[0]]) @ post])
+            gap = np.linalg.norm(np.maximum(off - [0.7e-3, 2.1e-3 / np.cos(lean)], 0))
+            assert gap > board.post_radius
 
 
 def test_a_ring_on_its_side_is_not_taken_from_above():
