@@ -8,14 +8,16 @@ from controllers.expert.hand import Hand
 from controllers.expert.ports import EVENTS
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams, PsmParams
+from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.ports import stitching_ports
+from controllers.stitching.sight import Sight
 from controllers.stitching.surgeon import Surgeon
 from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array
 from robots.dvrk.parameters import ArmName
 from schemas.errors import SessionError
 from schemas.ports import Port
-from schemas.ros import StringMessage
+from schemas.ros import PoseWithCovarianceStamped, StringMessage
 
 __all__ = ["Stitching"]
 
@@ -37,7 +39,12 @@ class Stitching(Controller):
         self._surgeon = self._make_surgeon()
         self._needle = params.needle[0]
         state, self._shown = self._surgeon.state, _Shown()
-        self.keep(state, self._shown, *(hand.state for hand in self._hands))
+        self._sights = tuple(Sight(hand.chain, hand.base) for hand in self._hands)
+        self._looks = False
+        """Whether a tracker reports the tips."""
+        self._looking = Looking(self._hands, self._sights, params.phantom.pose)
+        kept = (*self._hands, *self._sights, self._looking)
+        self.keep(state, self._shown, *(each.state for each in kept))
         self._outputs: dict[str, Any] = {
             **{each: state.part(each) for each in ("made", "angle", "deviation", "done", "failed")},
             "phase": self._shown.phase,
@@ -59,7 +66,7 @@ class Stitching(Controller):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Measured tips and jaws and the needle's pose and holder in; commands and progress out."""
-        return stitching_ports(self.params.driver, self.params.puller, self._needle)
+        return stitching_ports(self._hands, self._needle)
 
     @property
     def ended(self) -> str:
@@ -73,6 +80,11 @@ class Stitching(Controller):
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""
+        seen = {f"{hand.arm}/seen" for hand in self._hands} & setup.connected
+        if len(seen) == 1:
+            raise SessionError(f"stitching '{self.name}': of its hands only {seen.pop()} is connected")
+        if seen:
+            self._looks, self._surgeon.looking = True, self._looking
         for hand in self._hands:
             hand.period = setup.period_ns * 1e-9
             self._outputs |= {f"{hand.arm}/servo_cp": (), f"{hand.arm}/jaw/move_jp": ()}
@@ -83,23 +95,34 @@ class Stitching(Controller):
 
         Raises SessionError if a command is refused.
         """
-        for hand in self._hands:
-            self._refuse(hand.arm, inputs)
-            jaw = float(inputs[f"{hand.arm}/jaw/measured_js"][0])
-            hand.sense(inputs[f"{hand.arm}/local/measured_cp"], jaw)
-            if t == 0:
+        self._sense(inputs)
+        if t == 0:
+            for hand in self._hands:
                 hand.stay()
         surgeon = self._surgeon
-        surgeon.sense(
-            inputs[f"objects/{self._needle}/pose"], float(inputs[f"objects/{self._needle}/held_by"][0])
-        )
         surgeon.step()
         for hand, settles in zip(self._hands, surgeon.settles, strict=True):
-            self._outputs[f"{hand.arm}/servo_cp"] = (hand.advance(settle=settles),)
+            rests = surgeon.looks and hand.has_arrived
+            self._outputs[f"{hand.arm}/servo_cp"] = () if rests else (hand.advance(settle=settles),)
             self._outputs[f"{hand.arm}/jaw/move_jp"] = hand.jaw_commands()
         self._shown.phase[0], self._shown.stitch[0] = surgeon.state.phase, surgeon.state.stitch
         self._outputs["status"] = tuple(StringMessage(data=text) for text in surgeon.statuses())
         return self._outputs
+
+    def _sense(self, inputs: Inputs) -> bool:
+        """Read what is measured and seen; return whether it is known where the tips are."""
+        for hand, sight in zip(self._hands, self._sights, strict=True):
+            arm = hand.arm
+            self._refuse(arm, inputs)
+            if self._looks:
+                q = inputs[f"{arm}/measured_js"][: len(hand.chain.joints)]
+                seen = cast("tuple[PoseWithCovarianceStamped, ...]", inputs.events(f"{arm}/seen"))
+                hand.stand(sight.see(q, seen, hand.period))
+            jaw = float(inputs[f"{arm}/jaw/measured_js"][0])
+            hand.sense(inputs[f"{arm}/local/measured_cp"], jaw)
+        needle = f"objects/{self._needle}"
+        self._surgeon.sense(inputs[f"{needle}/pose"], float(inputs[f"{needle}/held_by"][0]))
+        return not self._looks or all(sight.is_known for sight in self._sights)
 
     def _refuse(self, arm: str, inputs: Inputs) -> None:
         for event in EVENTS:

@@ -72,8 +72,7 @@ class GuidedStitching(Stitching):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Those of the expert; setpoints, points and words in; stage and markers out."""
-        params = self.params
-        return (*guided_ports(params.driver, params.puller, self._needle), *self._frames.ports)
+        return (*guided_ports(self._hands, self._needle), *self._frames.ports)
 
     @property
     def ended(self) -> str:
@@ -92,17 +91,13 @@ class GuidedStitching(Stitching):
         """
         surgeon, seen = self._surgeon, self._seen
         setpoints = np.zeros((2, 7))
-        for number, hand in enumerate(self._hands):
+        for hand in self._hands:
             hand.period = self._period
-            self._refuse(hand.arm, inputs)
-            hand.sense(
-                inputs[f"{hand.arm}/local/measured_cp"], float(inputs[f"{hand.arm}/jaw/measured_js"][0])
-            )
+        surgeon.sure = self._sense(inputs)
+        for number, hand in enumerate(self._hands):
             setpoints[number] = pose_of(hand.base @ framed(inputs[f"{hand.arm}/local/setpoint_cp"]))
             for message in cast("tuple[BoolMessage, ...]", inputs.events(f"{hand.arm}/following")):
                 seen.led[number] = message.data
-        needle = f"objects/{self._needle}"
-        surgeon.sense(inputs[f"{needle}/pose"], float(inputs[f"{needle}/held_by"][0]))
         surgeon.measure(setpoints, led=bool(seen.led.any()))
         said = [*self._hear(inputs)]
         surgeon.step()

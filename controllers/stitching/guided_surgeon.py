@@ -75,6 +75,8 @@ class GuidedSurgeon(Surgeon):
         self._hands, self._setpoints = (driver, puller), np.zeros((2, 7))
         self.led = False
         """Whether a person's hand leads an arm now."""
+        self.sure = True
+        """Whether it is known where the tips are."""
 
     @property
     def stitch(self) -> Stitch:
@@ -172,6 +174,8 @@ class GuidedSurgeon(Surgeon):
     def _way_on(self) -> WayOn:
         if self.guided.picked < len(self.guided.points):
             raise MotionError("no stitch is picked: entry and exit are needed")
+        if not self.sure:
+            raise MotionError("the cameras have not yet seen well enough where the tips are")
         return way_on(
             self.params, self.driver, self.puller, self.stitch, self.state.needle, self.state.holder
         )

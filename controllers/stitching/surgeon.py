@@ -14,6 +14,7 @@ import numpy as np
 
 from controllers.expert.hand import Hand, framed, pose_of
 from controllers.stitching.geometry import Stitch
+from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import BEFORE, BEYOND, make_plan, make_stitch
@@ -84,6 +85,8 @@ class Surgeon:
         self.params, self.driver, self.puller = params, driver, puller
         self.state = SurgeonState()
         self.state.stitch = params.first
+        self.looking: Looking | None = None
+        """How the hands look before they go to work; None: there is no tracker."""
         self._needle = params.needle[1].shape
         self._status: list[str] = []
         self._steps: dict[Phase, Callable[[], None]] = {
@@ -125,6 +128,11 @@ class Surgeon:
         driver = phase in (Phase.HOVER, Phase.DESCEND, Phase.ALIGN, Phase.DRIVE, Phase.COME_BACK)
         puller = phase in (Phase.COME, Phase.TAKE, Phase.PULL)
         return driver or phase is Phase.TAKE_BACK, puller
+
+    @property
+    def looks(self) -> bool:
+        """Whether the hands are looked at; one that has arrived then keeps its last command."""
+        return self.looking is not None and self.state.phase is Phase.BEGIN
 
     def statuses(self) -> tuple[str, ...]:
         """Return what was said in this step, and forget it."""
@@ -206,8 +214,12 @@ class Surgeon:
         state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
 
     def _begin(self) -> None:
+        if self.looking is not None and not self.looking.step():
+            return
         params, state = self.params, self.state
         phantom = params.phantom
+        for hand in (self.driver, self.puller):
+            hand.stay()
         state.park[0], state.park[1] = self.driver.measured, self.puller.measured
         stitches = [
             make_stitch(phantom.measures, phantom.pose, params.first + i, self._needle)

@@ -46,6 +46,7 @@ class World:
         for hand in self.lead._hands:
             arm = hand.arm
             values[f"{arm}/local/measured_cp"] = pose_of(inverse_pose(hand.base) @ self.tips[arm])
+            values[f"{arm}/measured_js"] = np.zeros(18)
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
             values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
         values["objects/needle/pose"] = pose_of(self.needle)
