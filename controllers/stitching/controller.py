@@ -43,7 +43,7 @@ class Stitching(Controller):
         self._looks = False
         """Whether a tracker reports the tips."""
         self._looking = Looking(self._hands, self._sights, params.phantom.pose)
-        kept = (*self._hands, *self._sights, self._looking)
+        kept = (*self._hands, *self._sights, self._looking, self._surgeon.rejoin)
         self.keep(state, self._shown, *(each.state for each in kept))
         self._outputs: dict[str, Any] = {
             **{each: state.part(each) for each in ("made", "angle", "deviation", "done", "failed")},

@@ -13,30 +13,28 @@ from math import radians
 import numpy as np
 
 from controllers.expert.hand import Hand, framed, pose_of
-from controllers.stitching.geometry import Stitch
+from controllers.stitching.geometry import Stitch, before
 from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import BEFORE, BEYOND, make_plan, make_stitch
-from hub.participant import Record, array, choice, integer, number
+from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
+from controllers.stitching.way_on import WayOn, is_inside, way_on
+from hub.participant import Record, array, choice, flag, integer, number
 from robots import rotation
 from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["BACK", "OPEN", "OPENED", "SHUT", "Surgeon", "SurgeonState", "before"]
+__all__ = ["Surgeon", "SurgeonState"]
 
-OPEN, SHUT = 0.70, -0.30
-"""Of the jaw, rad: around a wire, and while it holds."""
-BACK = 0.016
-"""From where a jaw takes hold, m, against its fingers: clear of the wire."""
 _HOVER = 0.020
 _ACCURATE, _ALIGNED = 0.15e-3, 0.20e-3
 """m: of a tip where it takes hold; of the needle before it goes in."""
 _PATIENCE = 1.5
 """s: for these; then it goes on with what has been reached."""
-_PRESSED, OPENED = 0.5, 0.3
-"""s: for a jaw to close, and to let go."""
+_PRESSED = 0.5
+"""s: for a jaw to close."""
 _HELD_OPEN = 0.02
 """rad: a jaw commanded to shut that stays this far open has something between its fingers."""
 _UNHELD = 0.3
@@ -57,6 +55,12 @@ class SurgeonState(Record):
     """Number of the pair of holes at work."""
     attempts = integer()
     """To take hold of the needle, in succession."""
+    recoveries = integer()
+    """Of a needle that was lost, in this stitch."""
+    free = flag()
+    """Whether no jaw is to hold the needle, though the phase is one in which a hand does."""
+    picked_for = choice(Phase.LIFT)
+    """The phase that follows when the driver has taken the needle up."""
     waited = number()
     """s since the hand at work has arrived."""
     unheld = number()
@@ -87,6 +91,7 @@ class Surgeon:
         self.state.stitch = params.first
         self.looking: Looking | None = None
         """How the hands look before they go to work; None: there is no tracker."""
+        self.rejoin = Rejoin(driver, puller)
         self._needle = params.needle[1].shape
         self._status: list[str] = []
         self._steps: dict[Phase, Callable[[], None]] = {
@@ -151,9 +156,54 @@ class Surgeon:
         state = self.state
         try:
             self._watch()
-            self._steps[state.phase]()
+            if self.rejoin.is_under_way:
+                self._come_back()
+            else:
+                self._steps[state.phase]()
         except MotionError as error:
-            self._fail(str(error))
+            self._recover(str(error))
+
+    def _recover(self, why: str) -> None:
+        """Go on from where the needle is now, if that can be done, and has not been done too often."""
+        state = self.state
+        if state.phase is Phase.BEGIN or state.recoveries == _ATTEMPTS:
+            self._fail(why)
+            return
+        state.recoveries += 1
+        try:
+            is_out = state.phase in (Phase.PULL, Phase.RAISE) and not is_inside(self.params, state.needle)
+            if is_out and self._made_the_last():
+                return
+            plan = self._way_on()
+        except MotionError as error:
+            self._fail(f"{why}; it cannot go on: {error}")
+            return
+        self._status.append(f"{why}; it is taken again")
+        for hand in (self.driver, self.puller):
+            hand.stay()
+        self._follow(plan)
+
+    def _way_on(self) -> WayOn:
+        return way_on(
+            self.params, self.driver, self.puller, self.stitch, self.state.needle, self.state.holder
+        )
+
+    def _follow(self, plan: WayOn) -> None:
+        """Let the hands go to where a plan goes on."""
+        state = self.state
+        state.planned[0], state.planned[1] = plan.driver, plan.puller
+        state.angle[0], state.attempts, state.failed[0] = plan.angle, 0, 0.0
+        state.picked_for, state.free = plan.picked_for, plan.holder is None
+        if plan.holder is not None:
+            self._grasped(plan.holder)
+        self.rejoin.begin(plan, state.grip, state.park)
+        self._enter(Phase.BEGIN)
+
+    def _come_back(self) -> None:
+        """Let the hands go on to where the stitch goes on."""
+        self.rejoin.step(self.state.needle)
+        if not self.rejoin.is_under_way:
+            self._enter(self.rejoin.state.then)
 
     def _watch(self) -> None:
         """Learn how the needle lies in the jaw; notice if it does not lie there any more."""
@@ -177,6 +227,8 @@ class Surgeon:
     @property
     def _holding(self) -> Hand | None:
         phase = self.state.phase
+        if self.state.free:
+            return None
         if Phase.LIFT <= phase <= Phase.HOLD or phase is Phase.LEAVE_BACK:
             return self.driver
         return self.puller if Phase.LEAVE <= phase <= Phase.HOLD_BACK else None
@@ -266,10 +318,13 @@ class Surgeon:
         if state.holder and self.driver.angle > _HELD_OPEN:
             state.attempts = 0
             self._grasped(self.driver)
-            goal = self.driver.line()
-            goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
-            self.driver.go(goal)
-            self._enter(Phase.LIFT)
+            if state.picked_for is Phase.LIFT:
+                goal = self.driver.line()
+                goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
+                self.driver.go(goal)
+            else:  # in the tissue: back to its way
+                self._lead(self.driver, self.stitch.pose(state.angle[0]), _GENTLE)
+            self._enter(state.picked_for)
         elif state.attempts >= _ATTEMPTS:
             raise MotionError(f"{self.driver.arm} could not take the needle up in {_ATTEMPTS} attempts")
         else:
@@ -280,6 +335,7 @@ class Surgeon:
     def _grasped(self, hand: Hand) -> None:
         """Take how the needle lies in the jaw of a hand for how it holds it."""
         self.state.grip[:] = inverse_pose(self.state.needle) @ framed(hand.measured)
+        self.state.free = False
 
     def _lift(self) -> None:
         if self._arrived(self.driver):
@@ -293,14 +349,13 @@ class Surgeon:
 
     def _approach(self) -> None:
         if self._arrived(self.driver):
-            stitch = self.stitch
-            self._lead(self.driver, stitch.pose(stitch.entry - BEFORE), _GENTLE)
+            self.state.angle[0] = self.stitch.entry - BEFORE
+            self._lead(self.driver, self.stitch.pose(self.state.angle[0]), _GENTLE)
             self._enter(Phase.ALIGN)
 
     def _align(self) -> None:
         if self.driver.has_arrived:
-            stitch = self.stitch
-            self._track(self.driver, stitch.entry - BEFORE)
+            self._track(self.driver, self.state.angle[0])
             self.state.waited += self.driver.period
             aligned = self.state.deviation[0] < _ALIGNED and self.state.waited > 0.2
             if aligned or self.state.waited > _PATIENCE:
@@ -379,18 +434,22 @@ class Surgeon:
             self._enter(Phase.RAISE)
 
     def _raise(self) -> None:
-        state, params = self.state, self.params
-        if not self._arrived(self.puller):
-            return
+        if self._arrived(self.puller) and not self._made_the_last():
+            stitch = self.stitch
+            self._lead(self.puller, stitch.pose(stitch.exit + self.params.emerge, self.params.lift))
+            self._enter(Phase.PRESENT)
+
+    def _made_the_last(self) -> bool:
+        """Count a stitch, and return whether it was the last one."""
+        state = self.state
         state.made[0] += 1.0
-        if state.made[0] >= params.stitches:
+        state.recoveries = 0
+        if state.made[0] >= self.params.stitches:
             state.done[0] = 1.0
             self._enter(Phase.DONE)
-            return
+            return True
         state.stitch += 1
-        stitch = self.stitch
-        self._lead(self.puller, stitch.pose(stitch.exit + params.emerge, params.lift))
-        self._enter(Phase.PRESENT)
+        return False
 
     def _present(self) -> None:
         if self._arrived(self.puller):
@@ -402,10 +461,3 @@ class Surgeon:
         if self._arrived(self.puller):
             self.puller.go(self.state.park[1])
             self._to_approach()
-
-
-def before(tip: Vector, away: float) -> Vector:
-    """Return a pose of the tip, shape (7,), `away` metres against its fingers from `tip`, shape (4, 4)."""
-    pose = pose_of(tip)
-    pose[:3] -= away * tip[:3, 2]
-    return pose
