@@ -1,4 +1,4 @@
-"""The surgeon of `surgeon`, led by a person, who picks where to stitch and consents before anything moves.
+"""The procedure of a stitch, led by a person, who picks where to stitch and consents before anything moves.
 
 Pause and resume are a pace between 0 and 1 at which the procedure's own time passes. After a take-over, and
 after a failure, the stitch is planned anew from where needle and hands are: the free hand opens and goes
@@ -11,11 +11,11 @@ import numpy as np
 
 from controllers.expert.hand import Hand
 from controllers.stitching.geometry import Stitch
-from controllers.stitching.params import StitchingParams
+from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import stitch_through
+from controllers.stitching.procedure import Procedure
 from controllers.stitching.stage import COMMANDS, Stage
-from controllers.stitching.surgeon import Surgeon
 from controllers.stitching.way_on import WayOn
 from hub.participant import Record, array, choice, flag, integer, number
 from robots.dvrk.cart import inverse_pose
@@ -47,10 +47,10 @@ class GuidedState(Record):
     begun = flag()
 
 
-class GuidedSurgeon(Surgeon):
+class GuidedSurgeon(Procedure):
     """Two hands, a needle and a person."""
 
-    def __init__(self, params: StitchingParams, driver: Hand, puller: Hand) -> None:
+    def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
         super().__init__(params, driver, puller)
         self.guided = GuidedState()
         self._hands, self._setpoints = (driver, puller), np.zeros((2, 7))
@@ -181,6 +181,9 @@ class GuidedSurgeon(Surgeon):
             hand.period *= guided.pace
         if guided.pace > 0.0:
             super().step()
+
+    def _begin(self) -> None:
+        """Do nothing: what a person picks is the beginning."""
 
     def _raise(self) -> None:
         """Let the puller hold the needle over the skin until the next stitch is picked."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from controllers.expert.hand import Hand, framed
 from controllers.stitching.geometry import Stitch
-from controllers.stitching.params import StitchingParams
+from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import (
     BEFORE,
@@ -53,12 +53,12 @@ class WayOn:
     """What follows when the driver has taken the needle up: it is in the tissue, or it is not."""
 
 
-def is_inside(params: StitchingParams, needle: Vector) -> bool:
+def is_inside(params: StitchParams, needle: Vector) -> bool:
     """Return whether a needle, at a pose of shape (4, 4), is in the tissue."""
     return _lowest(params, needle) < -_UNDER
 
 
-def _lowest(params: StitchingParams, needle: Vector) -> float:
+def _lowest(params: StitchParams, needle: Vector) -> float:
     """Return the height of its lowest point over the skin, m."""
     shape, pad = params.needle[1].shape, params.phantom.pose
     wire = shape.points(np.linspace(-shape.arc / 2.0, shape.arc / 2.0, 60))
@@ -67,7 +67,7 @@ def _lowest(params: StitchingParams, needle: Vector) -> float:
 
 
 def way_on(
-    params: StitchingParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, holder: float
+    params: StitchParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, holder: float
 ) -> WayOn:
     """Plan `stitch` from where the needle is, shape (4, 4), in the jaw of arm number `holder` (0: none).
 
@@ -112,7 +112,7 @@ def way_on(
 
 
 def _taken_again(
-    params: StitchingParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, angle: float
+    params: StitchParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, angle: float
 ) -> WayOn:
     """Plan how a needle that the tissue alone holds, its tip at `angle` (rad), is taken hold of."""
     emerge, lift = params.emerge, params.lift

@@ -211,3 +211,9 @@ def test_a_saved_stitch_goes_on_with_the_same_bits():
 def test_words_that_are_none_are_refused():
     world = Guided().say("go")
     assert "'go' is no command, allowed: consent, pause, resume" in world.said[-1]
+
+
+@pytest.mark.parametrize("name", ["stitches", "first", "end"])
+def test_what_only_the_expert_obeys_is_no_parameter(name):
+    with pytest.raises(ValueError, match=name):
+        Guided(**{name: 1})
