@@ -1,6 +1,6 @@
-"""Before a stitch, each hand in turn comes over the pad, until a tracker has told where its tip is, and back.
+"""Before a stitch, each hand in turn comes over the pad, until a tracker has shown where its tip is.
 
-The way there is blind: as far off as the joints are. One at a time, so they do not meet. SI units, world.
+The way there is blind: as far off as the joints are. Then it goes back, so hands do not meet. SI units, world.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ class Looking:
             self._send(state.back, Going.BACK)
         elif state.waited > _PATIENCE:
             raise MotionError(
-                f"{hand.arm} has been over the pad for {_PATIENCE:.0f} s, and no tracker has told well enough"
-                " where its tip is: is it in the endoscope's view?"
+                f"{hand.arm} has been over the pad for {_PATIENCE:.0f} s, and no tracker has shown well"
+                " enough where its tip is: is it in the endoscope's view?"
             )
         return False
 
