@@ -1,6 +1,6 @@
 """Before a stitch, each hand in turn comes over the pad, until a tracker has shown where its tip is.
 
-The way there is blind: as far off as the joints are. Then it goes back, so hands do not meet. SI units, world.
+The way there is blind, as far off as the joints are. The hands go in turn, so they do not meet. SI units.
 """
 
 from __future__ import annotations
