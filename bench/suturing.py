@@ -5,6 +5,9 @@ order of its plan. `force` turns a needle through the pad alone, by hand. Result
 docs/decisions/0062-needle-in-tissue.md and 0063-stitches.md.
 
     python -m bench.suturing stitches --seeds 10 --set participants.lead.stitches=1
+    python -m bench.suturing success --rows one.jsonl --seeds 40
+    python -m bench.suturing success --rows one-off.jsonl --seeds 40 --errors
+    python -m bench.suturing success --rows four.jsonl --seeds 20 --stitches 4
     python -m bench.suturing force --picture force.png
 """
 
@@ -154,6 +157,50 @@ def stitches(args: argparse.Namespace) -> None:
         print(f"{name}: {sum(row[name] or 0.0 for row in rows):.0f} of {len(rows)}")
 
 
+ERRORS = "{within: [5 deg, 5 deg, 5 mm], seed: %d}"
+"""As the Surgical Robotics Challenge has them."""
+CLASSES = (
+    "could not take the needle up",
+    "has not taken hold",
+    "has lost the needle",
+    "is not feasible",
+    "cannot be picked up",
+    "tracker",
+)
+"""What a message of a failure contains."""
+
+
+def success(args: argparse.Namespace) -> None:
+    """Run the seeds that a file of rows does not have yet, append them, and print its table.
+
+    A seed places the needle, chooses the pair of holes of a single stitch, and draws joint errors and noise.
+    """
+    file = Path(args.rows)
+    rows: list[dict[str, Any]] = []
+    if file.exists():
+        rows = [json.loads(line) for line in file.read_text().splitlines()]
+    for seed in sorted(set(range(args.first, args.first + args.seeds)) - {row["seed"] for row in rows}):
+        first = 1 + seed % 4 if args.stitches == 1 else 1
+        given = [f"scene.seed={seed}", f"participants.lead.stitches={args.stitches}"]
+        given.append(f"participants.lead.first={first}")
+        if args.errors:
+            given.append(f"participants.motion.joint_errors={ERRORS % seed}")
+        row = {"seed": seed, "first": first, **Trial("suturing", given).run()}
+        rows.append(row)
+        with file.open("a") as out:
+            out.write(json.dumps(row) + "\n")
+    succeeded = {"script": "four_script", "rules": "four_rules"} if args.stitches == 4 else {}
+    for name in ("script", "rules"):
+        print(f"{name}: {sum(row[succeeded.get(name, name)] or 0.0 for row in rows):.0f} of {len(rows)}")
+    failed = [row for row in rows if row["failed"] or row["made"] != args.stitches]
+    for row in failed:
+        kind = next((each for each in CLASSES if each in row["failed"]), "out of time")
+        print(f"seed {row['seed']}: {kind}: {row['failed']}")
+    for name in ("entry_error_mean", "exit_error_mean", "simulated_s", "cpu_s"):
+        found = [row[name] for row in rows if row[name] is not None]
+        print(f"{name}: median {np.median(found):.4g}, 90th {np.percentile(found, 90):.4g}")
+
+
 def force(args: argparse.Namespace) -> None:
     """Turn a needle through the pad alone, and compare what it feels along the arc with the model's sum."""
     needle, tissue = NEEDLES["sh-plus"], TissueParams()
@@ -198,6 +245,13 @@ def main() -> None:
     one.add_argument("--first", type=int, default=0)
     one.add_argument("--set", action="append", default=[])
     one.set_defaults(run=stitches)
+    many = commands.add_parser("success")
+    many.add_argument("--rows", required=True, help="file that the rows are appended to")
+    many.add_argument("--seeds", type=int, default=40)
+    many.add_argument("--first", type=int, default=0)
+    many.add_argument("--stitches", type=int, choices=(1, 4), default=1)
+    many.add_argument("--errors", action="store_true", help="with joint errors")
+    many.set_defaults(run=success)
     two = commands.add_parser("force")
     two.add_argument("--picture")
     two.set_defaults(run=force)

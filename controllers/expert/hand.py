@@ -141,6 +141,10 @@ class Hand:
         off = self.state.goal[:3] - self.measured[:3]
         return sqrt(float(off @ off))
 
+    def stand(self, base: Vector) -> None:
+        """Take that the arm's base is at `base`, shape (4, 4), in the world."""
+        self.base, self._into_base = base, inverse_pose(base)
+
     def sense(self, tip: Vector, angle: float) -> None:
         """Take what is measured: the tip in its base frame, shape (7,), and the jaw's angle, rad."""
         self.measured[:] = pose_of(self.base @ framed(tip))

@@ -114,11 +114,18 @@ class Arm:
             (f"sense/{prefix}/measured_js", axes)
             for prefix, axes in zip(prefixes, self._drives.groups, strict=True)
         ]
+        self._offsets = params.joint_errors.of(name, len(arm.chain.joints))
+        self._is_off = bool(self._offsets.any())
+        self._driven = self._drives.joints.setpoint.position
+        if self._is_off:
+            self._driven = self._driven.copy()
         self._gripper_setpoint = np.zeros(0) if gripper is None else np.zeros(3 * len(gripper.joints))
         outputs[f"drive/{name}/control_mode"] = self._modes
         for prefix, axes in zip(prefixes, self._drives.groups, strict=True):
             outputs |= {
-                f"drive/{prefix}/servo_jp": axes.setpoint.position,
+                f"drive/{prefix}/servo_jp": (
+                    self._driven if axes is self._drives.joints else axes.setpoint.position
+                ),
                 f"drive/{prefix}/servo_jf": axes.effort,
             }
         if self._drives.gripper is not None:
@@ -141,6 +148,8 @@ class Arm:
         """Read what is measured; the setpoint starts from there."""
         for port, axes in self._sensed:
             axes.measured[:] = inputs[port]
+        if self._is_off:
+            self._drives.joints.position -= self._offsets
         if not self._now.started:
             for axes in self._drives.groups:
                 axes.setpoint.reset(axes.position)
@@ -171,6 +180,11 @@ class Arm:
         self._rests = not busy
         return following
 
+    def drive(self) -> None:
+        """Command the setpoints that the step has ended with, by encoders that may be off."""
+        if self._is_off:
+            np.add(self._drives.joints.setpoint.position, self._offsets, out=self._driven)
+
     def publish(self, row: TelemetryRow) -> None:
         """Write to `row` what the states are computed from that are not published at every step."""
         drives, settings = self._drives, self._commands.settings
@@ -190,6 +204,7 @@ class Arm:
         self._condition = self._lifecycle.condition if self._now.started else None
         self._update_modes()
         self._rests = False
+        self.drive()
 
     def _update_modes(self) -> None:
         self._modes[:] = self._drives.modes

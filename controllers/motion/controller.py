@@ -105,6 +105,8 @@ class MotionController(Controller):
             if self._followers is None or self._followers.setpoints != following:
                 self._followers = Followers(following, self._period)
             self._followers.step()
+        for arm in arms:
+            arm.drive()
         if self._telemetry is not None and not (t + h) % self.params.publish_period:
             self._publish(self._telemetry)
         self._setup_joints.step(t, h, inputs)

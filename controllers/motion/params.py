@@ -8,6 +8,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 from pydantic import Field, model_validator
 
 from controllers.motion.equipment import endoscope_type, tool_type
+from controllers.motion.joint_errors import JointErrors
 from hub.participant import Params
 from robots.dvrk import ecm, psm
 from robots.dvrk.crtk import Mounting, Reference
@@ -119,6 +120,9 @@ class MotionParams(Params):
         ),
     )
     setup_joints: SetupJoints = SetupJoints()
+    joint_errors: JointErrors = Field(
+        default=JointErrors(), description="of the arms' encoders, of which the controller knows nothing"
+    )
     reference: Reference = Field(
         default="camera",
         description=(

@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, cast
+from typing import ClassVar
 
-from controllers.expert.hand import Hand
-from controllers.expert.ports import EVENTS
-from controllers.motion.frames import base_in_world
-from controllers.motion.params import MotionParams, PsmParams
+from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.ports import stitching_ports
 from controllers.stitching.surgeon import Surgeon
-from hub.participant import Controller, Inputs, Outputs, Params, Record, Setup, array
-from robots.dvrk.parameters import ArmName
-from schemas.errors import SessionError
+from controllers.stitching.two_hands import TwoHands
+from hub.participant import Inputs, Outputs, Params, Setup
 from schemas.ports import Port
 from schemas.ros import StringMessage
 
 __all__ = ["Stitching"]
 
 
-class _Shown(Record):
-    phase = array(1)
-    stitch = array(1)
-
-
-class Stitching(Controller):
+class Stitching(TwoHands):
     """Makes stitches: picks the needle up, drives it in, hands it over, pulls it out."""
 
     params_model: ClassVar[type[Params]] = StitchingParams
@@ -33,33 +24,15 @@ class Stitching(Controller):
 
     def __init__(self, name: str, params: StitchingParams) -> None:
         super().__init__(name, params)
-        self._hands = (self._hand(params.driver), self._hand(params.puller))
-        self._surgeon = self._make_surgeon()
-        self._needle = params.needle[0]
-        state, self._shown = self._surgeon.state, _Shown()
-        self.keep(state, self._shown, *(hand.state for hand in self._hands))
-        self._outputs: dict[str, Any] = {
-            **{each: state.part(each) for each in ("made", "angle", "deviation", "done", "failed")},
-            "phase": self._shown.phase,
-            "stitch": self._shown.stitch,
-            "status": (),
-        }
-
-    def _make_surgeon(self) -> Surgeon:
-        return Surgeon(self.params, *self._hands)
-
-    def _hand(self, arm: ArmName) -> Hand:
-        params = self.params
-        stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
-        held = cast("PsmParams", params.arms.driven[arm])
-        if held.tool.jaw is None:
-            raise SessionError(f"stitching '{self.name}': {arm} holds {held.tool.name}, which has no jaw")
-        return Hand(arm, base_in_world(arm, stands), held.chain, held.tool.jaw)
+        self._surgeon = Surgeon(params, *self._hands)
+        self._looking = Looking(self._hands, self._sights, params.phantom.pose)
+        self.publish(self._surgeon)
+        self.keep(self._looking.state)
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Measured tips and jaws and the needle's pose and holder in; commands and progress out."""
-        return stitching_ports(self.params.driver, self.params.puller, self._needle)
+        return stitching_ports(self._hands, self._needle)
 
     @property
     def ended(self) -> str:
@@ -73,36 +46,26 @@ class Stitching(Controller):
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""
-        for hand in self._hands:
-            hand.period = setup.period_ns * 1e-9
-            self._outputs |= {f"{hand.arm}/servo_cp": (), f"{hand.arm}/jaw/move_jp": ()}
-        return self._outputs
+        outputs = super().configure(setup)
+        if self._looks:
+            self._surgeon.looking = self._looking
+        return outputs
 
     def step(self, t: int, h: int, inputs: Inputs) -> Outputs:  # noqa: ARG002
         """Read what is measured, do what comes next, and send the commands.
 
         Raises SessionError if a command is refused.
         """
-        for hand in self._hands:
-            self._refuse(hand.arm, inputs)
-            jaw = float(inputs[f"{hand.arm}/jaw/measured_js"][0])
-            hand.sense(inputs[f"{hand.arm}/local/measured_cp"], jaw)
-            if t == 0:
+        self._sense(self._surgeon, inputs)
+        if t == 0:
+            for hand in self._hands:
                 hand.stay()
         surgeon = self._surgeon
-        surgeon.sense(
-            inputs[f"objects/{self._needle}/pose"], float(inputs[f"objects/{self._needle}/held_by"][0])
-        )
         surgeon.step()
         for hand, settles in zip(self._hands, surgeon.settles, strict=True):
-            self._outputs[f"{hand.arm}/servo_cp"] = (hand.advance(settle=settles),)
+            rests = surgeon.looks and hand.has_arrived
+            self._outputs[f"{hand.arm}/servo_cp"] = () if rests else (hand.advance(settle=settles),)
             self._outputs[f"{hand.arm}/jaw/move_jp"] = hand.jaw_commands()
         self._shown.phase[0], self._shown.stitch[0] = surgeon.state.phase, surgeon.state.stitch
         self._outputs["status"] = tuple(StringMessage(data=text) for text in surgeon.statuses())
         return self._outputs
-
-    def _refuse(self, arm: str, inputs: Inputs) -> None:
-        for event in EVENTS:
-            for message in inputs.events(f"{arm}/{event}"):
-                phase, text = self._surgeon.state.phase.name.lower(), cast("StringMessage", message).data
-                raise SessionError(f"stitching '{self.name}', {arm} in phase '{phase}': {text}")

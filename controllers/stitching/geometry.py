@@ -15,11 +15,12 @@ from math import asin, cos, hypot, pi, sin, sqrt
 
 import numpy as np
 
+from controllers.expert.hand import pose_of
 from robots.training.needles import NeedleShape
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["Grip", "Stitch", "grip_pose", "stitch_between"]
+__all__ = ["Grip", "Stitch", "before", "grip_pose", "stitch_between"]
 
 
 @dataclass(frozen=True)
@@ -110,4 +111,11 @@ def grip_pose(grip: Grip, needle: NeedleShape, reach: float) -> Vector:
     pose[:3, 1] = outwards if grip.left_outside else -outwards
     pose[:3, 0] = np.cross(pose[:3, 1], pose[:3, 2])
     pose[:3, 3] = needle.radius * outwards - reach * pose[:3, 2]
+    return pose
+
+
+def before(tip: Vector, away: float) -> Vector:
+    """Return a pose of the tip, shape (7,), `away` metres against its fingers from `tip`, shape (4, 4)."""
+    pose = pose_of(tip)
+    pose[:3] -= away * tip[:3, 2]
     return pose

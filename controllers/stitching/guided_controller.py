@@ -10,12 +10,12 @@ from pydantic import Field
 
 from controllers.expert.hand import framed, pose_of
 from controllers.stitching import path_markers
-from controllers.stitching.controller import Stitching
 from controllers.stitching.guided_ports import SOURCES, guided_ports
 from controllers.stitching.guided_surgeon import GuidedSurgeon
-from controllers.stitching.params import StitchingParams
+from controllers.stitching.params import StitchParams
 from controllers.stitching.scene_frames import SceneFrames
 from controllers.stitching.stage import Stage
+from controllers.stitching.two_hands import TwoHands
 from hub.participant import Inputs, Outputs, Params, Record, Setup, array, integer
 from robots.dvrk.endoscope import BASELINE
 from schemas.errors import MotionError
@@ -29,11 +29,8 @@ __all__ = ["GuidedStitching", "GuidedStitchingParams"]
 _FIRST_WORDS = "Pick entry and exit"
 
 
-class GuidedStitchingParams(StitchingParams):
-    """The scene, the two hands, and the camera in whose pictures the stitch is shown.
-
-    `stitches`, `first` and `end` have no effect: a person picks every stitch, and ends the session.
-    """
+class GuidedStitchingParams(StitchParams):
+    """The scene, the two hands, and the camera in whose pictures the stitch is shown."""
 
     camera: str = Field(default="endoscope", description="whose pictures the banner is in")
     banner: tuple[Length, Length, Length] = Field(
@@ -52,33 +49,26 @@ class _Shown(Record):
     """Whether a person's hand leads driver and puller."""
 
 
-class GuidedStitching(Stitching):
+class GuidedStitching(TwoHands):
     """Makes the stitches that a person picks, one after the other, each with the person's consent."""
 
     params_model: ClassVar[type[Params]] = GuidedStitchingParams
-    _surgeon: GuidedSurgeon
+    params: GuidedStitchingParams
 
     def __init__(self, name: str, params: GuidedStitchingParams) -> None:
         super().__init__(name, params)
+        self._surgeon = GuidedSurgeon(params, *self._hands)
+        self.publish(self._surgeon)
         self._camera, self._banner = params.camera, params.banner
         self._frames = SceneFrames(params, params.camera)
         self._seen = _Shown()
         self.keep(self._seen, self._surgeon.guided)
         self._outputs |= {"stage": self._seen.stage, "state": (), "markers": ()}
 
-    def _make_surgeon(self) -> GuidedSurgeon:
-        return GuidedSurgeon(self.params, *self._hands)
-
     @property
     def ports(self) -> tuple[Port, ...]:
         """Those of the expert; setpoints, points and words in; stage and markers out."""
-        params = self.params
-        return (*guided_ports(params.driver, params.puller, self._needle), *self._frames.ports)
-
-    @property
-    def ended(self) -> str:
-        """Never: the person ends the session."""
-        return ""
+        return (*guided_ports(self._hands, self._needle), *self._frames.ports)
 
     def configure(self, setup: Setup) -> Outputs:
         """Start with idle hands."""
@@ -92,17 +82,13 @@ class GuidedStitching(Stitching):
         """
         surgeon, seen = self._surgeon, self._seen
         setpoints = np.zeros((2, 7))
-        for number, hand in enumerate(self._hands):
+        for hand in self._hands:
             hand.period = self._period
-            self._refuse(hand.arm, inputs)
-            hand.sense(
-                inputs[f"{hand.arm}/local/measured_cp"], float(inputs[f"{hand.arm}/jaw/measured_js"][0])
-            )
+        surgeon.sure = self._sense(self._surgeon, inputs)
+        for number, hand in enumerate(self._hands):
             setpoints[number] = pose_of(hand.base @ framed(inputs[f"{hand.arm}/local/setpoint_cp"]))
             for message in cast("tuple[BoolMessage, ...]", inputs.events(f"{hand.arm}/following")):
                 seen.led[number] = message.data
-        needle = f"objects/{self._needle}"
-        surgeon.sense(inputs[f"{needle}/pose"], float(inputs[f"{needle}/held_by"][0]))
         surgeon.measure(setpoints, led=bool(seen.led.any()))
         said = [*self._hear(inputs)]
         surgeon.step()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from controllers.expert.hand import Hand
 from controllers.stitching.ports import stitching_ports
 from controllers.stitching.stage import COMMANDS, Stage
 from robots.dvrk.crtk import base_frame
@@ -17,10 +18,10 @@ SOURCES = ("", "operator/")
 """Prefixes of what a person says: by a program that is connected, and by hand, with `trocar stitch`."""
 
 
-def guided_ports(driver: str, puller: str, needle: str) -> Iterator[Port]:
-    """Yield the ports for these arms and this needle."""
-    yield from stitching_ports(driver, puller, needle)
-    for arm in (driver, puller):
+def guided_ports(hands: tuple[Hand, Hand], needle: str) -> Iterator[Port]:
+    """Yield the ports for these hands and this needle."""
+    yield from stitching_ports(hands, needle)
+    for arm in (hand.arm for hand in hands):
         yield Port(
             name=f"{arm}/local/setpoint_cp",
             causality="input",

@@ -1,4 +1,4 @@
-"""The surgeon of `surgeon`, led by a person, who picks where to stitch and consents before anything moves.
+"""The procedure of a stitch, led by a person, who picks where to stitch and consents before anything moves.
 
 Pause and resume are a pace between 0 and 1 at which the procedure's own time passes. After a take-over, and
 after a failure, the stitch is planned anew from where needle and hands are: the free hand opens and goes
@@ -7,18 +7,16 @@ clear, then each hand goes on a line from its present setpoint to where the proc
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 
-from controllers.expert.hand import Hand, framed, pose_of
+from controllers.expert.hand import Hand
 from controllers.stitching.geometry import Stitch
-from controllers.stitching.params import StitchingParams
+from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import stitch_through
+from controllers.stitching.procedure import Procedure
 from controllers.stitching.stage import COMMANDS, Stage
-from controllers.stitching.surgeon import BACK, OPEN, OPENED, SHUT, Surgeon, before
-from controllers.stitching.way_on import WayOn, way_on
+from controllers.stitching.way_on import WayOn
 from hub.participant import Record, array, choice, flag, integer, number
 from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
@@ -34,17 +32,6 @@ _RAMP = 0.2
 """s in which a pause stops all motion."""
 _MOVED, _TURNED = 0.5e-3, 0.01
 """m, and of a quaternion's parts: a hand this far from where it paused was moved by somebody."""
-_CLEAR = 0.04
-"""m; a free hand that is nearer to the needle goes back before it goes elsewhere."""
-
-
-class Rejoin(IntEnum):
-    """How the hands come to where the procedure goes on."""
-
-    NONE = 0
-    OPEN = 1
-    CLEAR = 2
-    GO = 3
 
 
 class GuidedState(Record):
@@ -57,24 +44,20 @@ class GuidedState(Record):
     """Entry and exit on the skin, in the phantom's frame."""
     pace = number()
     """At which the procedure's time passes, 0 to 1."""
-    rejoin = choice(Rejoin.NONE)
-    then = choice(Phase.BEGIN)
-    """The phase that the hands rejoin."""
-    goals = array(2, 7)
-    """Of driver and puller, where they rejoin it."""
-    holder = number()
     begun = flag()
 
 
-class GuidedSurgeon(Surgeon):
+class GuidedSurgeon(Procedure):
     """Two hands, a needle and a person."""
 
-    def __init__(self, params: StitchingParams, driver: Hand, puller: Hand) -> None:
+    def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
         super().__init__(params, driver, puller)
         self.guided = GuidedState()
         self._hands, self._setpoints = (driver, puller), np.zeros((2, 7))
         self.led = False
         """Whether a person's hand leads an arm now."""
+        self.sure = True
+        """Whether it is known where the tips are."""
 
     @property
     def stitch(self) -> Stitch:
@@ -140,7 +123,8 @@ class GuidedSurgeon(Surgeon):
         elif word == "take over":
             self.take_over()
         elif word == "cancel":
-            guided.picked, guided.rejoin = 0, Rejoin.NONE
+            guided.picked = 0
+            self.rejoin.give_up()
             self._enter(Phase.DONE)
             self._stage(Stage.PICKING)
         elif self.led:
@@ -172,31 +156,18 @@ class GuidedSurgeon(Surgeon):
     def _way_on(self) -> WayOn:
         if self.guided.picked < len(self.guided.points):
             raise MotionError("no stitch is picked: entry and exit are needed")
-        return way_on(
-            self.params, self.driver, self.puller, self.stitch, self.state.needle, self.state.holder
-        )
+        if not self.sure:
+            raise MotionError("the cameras have not yet seen well enough where the tips are")
+        return super()._way_on()
 
     def _go_on(self) -> None:
         """Plan anew, and let the hands go to where the procedure goes on, each from its setpoint."""
-        plan, state, guided = self._way_on(), self.state, self.guided
-        state.planned[0], state.planned[1] = plan.driver, plan.puller
-        state.angle[0], state.attempts, state.waited, state.failed[0] = plan.angle, 0, 0.0, 0.0
+        plan = self._way_on()
         for hand, setpoint in zip(self._hands, self._setpoints, strict=True):
             hand.state.correction[:] = 0.0
             hand.state.start[:] = hand.state.goal[:] = setpoint
             hand.state.duration = hand.state.elapsed = 0.0
-            hand.move_jaw(SHUT if hand is plan.holder else OPEN)
-        guided.goals[:] = state.park
-        if plan.holder is not None:
-            self._grasped(plan.holder)
-            guided.goals[self._hands.index(plan.holder)] = pose_of(plan.needle @ state.grip)
-        if plan.phase is Phase.HOVER:
-            guided.goals[0] = before(plan.needle @ plan.driver, BACK)
-        elif plan.phase is Phase.COME:
-            guided.goals[1] = before(plan.needle @ plan.puller, BACK)
-        guided.rejoin, guided.then = Rejoin.OPEN, plan.phase
-        guided.holder = 0.0 if plan.holder is None else plan.holder.number
-        self._enter(Phase.BEGIN)
+        self._follow(plan)
         self._stage(Stage.RUNNING)
 
     def step(self) -> None:
@@ -208,29 +179,11 @@ class GuidedSurgeon(Surgeon):
         guided.pace += min(max(wanted - guided.pace, -share), share)
         for hand in self._hands:
             hand.period *= guided.pace
-        if guided.pace == 0.0:
-            return
-        if guided.rejoin is Rejoin.NONE:
+        if guided.pace > 0.0:
             super().step()
-        else:
-            self._rejoin()
 
-    def _rejoin(self) -> None:
-        guided, state = self.guided, self.state
-        state.waited += self.driver.period
-        if guided.rejoin is Rejoin.OPEN and state.waited >= OPENED:
-            for hand in self._hands:
-                near = float(np.linalg.norm(hand.measured[:3] - state.needle[:3, 3])) < _CLEAR
-                if hand.number != guided.holder and near:
-                    hand.go(before(framed(hand.line()), BACK))
-            guided.rejoin = Rejoin.CLEAR
-        elif guided.rejoin is Rejoin.CLEAR and all(hand.has_arrived for hand in self._hands):
-            for hand, goal in zip(self._hands, guided.goals, strict=True):
-                hand.go(goal, 0.35 if hand.number == guided.holder else 1.0)
-            guided.rejoin = Rejoin.GO
-        elif guided.rejoin is Rejoin.GO and all(hand.has_arrived for hand in self._hands):
-            guided.rejoin = Rejoin.NONE
-            self._enter(guided.then)
+    def _begin(self) -> None:
+        """Do nothing: what a person picks is the beginning."""
 
     def _raise(self) -> None:
         """Let the puller hold the needle over the skin until the next stitch is picked."""
@@ -239,6 +192,10 @@ class GuidedSurgeon(Surgeon):
             self.guided.picked = 0
             self._enter(Phase.DONE)
             self._stage(Stage.PICKING)
+
+    def _recover(self, why: str) -> None:
+        """Stop: a person decides whether it goes on."""
+        self._fail(f"{why}; say 'resume' to let it go on from there")
 
     def _fail(self, why: str) -> None:
         self.state.failed[0], self.guided.stage = 1.0, Stage.STOPPED

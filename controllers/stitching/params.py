@@ -16,11 +16,11 @@ from robots.training.needle_object import NeedleObject, needles_of
 from schemas.quantity import Angle, Length
 from schemas.scenario import Name
 
-__all__ = ["StitchingParams"]
+__all__ = ["StitchParams", "StitchingParams"]
 
 
-class StitchingParams(Params):
-    """The scene, the two hands, and the stitches."""
+class StitchParams(Params):
+    """The scene, the two hands, and how a stitch is made."""
 
     arms: Arms
     mounting: Mounting = "free"
@@ -29,10 +29,6 @@ class StitchingParams(Params):
     objects: dict[Name, dict[str, Any]] = Field(description="as in the scene: one of them is the needle")
     driver: ArmName = Field(default="PSM1", description="the arm that drives the needle in: the right hand")
     puller: ArmName = Field(default="PSM2", description="the arm that pulls it out: the left hand")
-    stitches: int = Field(
-        default=4, ge=1, le=4, description="how many, from the phantom's first pair of holes"
-    )
-    first: int = Field(default=1, ge=1, le=4, description="number of the pair of holes to begin with")
     held: Angle | None = Field(
         default=None,
         gt=0.0,
@@ -48,7 +44,6 @@ class StitchingParams(Params):
         default=radians(25.0), gt=0.0, description="how fast the needle is turned through tissue, per second"
     )
     lift: Length = Field(default=0.025, gt=0.0, description="how high over the skin the needle is carried")
-    end: bool = Field(default=True, description="whether the session ends when the last stitch is made")
 
     @model_validator(mode="after")
     def _is_a_scene(self) -> Self:
@@ -61,10 +56,6 @@ class StitchingParams(Params):
             raise ValueError(f"the scene has {len(phantoms)} phantoms, one is needed")
         if len(needles_of(self.objects)) != 1:
             raise ValueError(f"the scene has {len(needles_of(self.objects))} needles, one is needed")
-        if self.first + self.stitches - 1 > (pairs := len(phantoms[0].measures.entries)):
-            raise ValueError(
-                f"stitches {self.first} to {self.first + self.stitches - 1}: the phantom has {pairs} pairs"
-            )
         return self
 
     @property
@@ -82,3 +73,22 @@ class StitchingParams(Params):
     def needle(self) -> tuple[str, NeedleObject]:
         """Name and wire of the needle."""
         return next(iter(needles_of(self.objects).items()))
+
+
+class StitchingParams(StitchParams):
+    """Which stitches are made, one after the other."""
+
+    stitches: int = Field(
+        default=4, ge=1, le=4, description="how many, from the phantom's first pair of holes"
+    )
+    first: int = Field(default=1, ge=1, le=4, description="number of the pair of holes to begin with")
+    end: bool = Field(default=True, description="whether the session ends when the last stitch is made")
+
+    @model_validator(mode="after")
+    def _has_the_holes(self) -> Self:
+        pairs = len(self.phantom.measures.entries)
+        if self.first + self.stitches - 1 > pairs:
+            raise ValueError(
+                f"stitches {self.first} to {self.first + self.stitches - 1}: the phantom has {pairs} pairs"
+            )
+        return self

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from controllers.expert.hand import Hand
 from controllers.expert.ports import hand_ports
 from controllers.stitching.phase import Phase
+from robots.dvrk import crtk
 from schemas.ports import Port
-from schemas.ros import Float64Message, PoseStamped, StringMessage
+from schemas.ros import (
+    Float64Message,
+    JointState,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    StringMessage,
+)
 
 __all__ = ["stitching_ports"]
 
@@ -22,10 +30,10 @@ _NUMBERS = (
 )
 
 
-def stitching_ports(driver: str, puller: str, needle: str) -> tuple[Port, ...]:
-    """Return the ports for these arms and this needle."""
+def stitching_ports(hands: tuple[Hand, Hand], needle: str) -> tuple[Port, ...]:
+    """Return the ports for these hands and this needle."""
     return (
-        *(port for arm in (driver, puller) for port in hand_ports(arm)),
+        *(port for hand in hands for port in (*hand_ports(hand.arm), *_sight_ports(hand))),
         *_needle_ports(needle),
         *(
             Port(name=name, causality="output", type=Float64Message.ros_type, unit=unit, description=meaning)
@@ -48,4 +56,22 @@ def _needle_ports(needle: str) -> Iterator[Port]:
         causality="input",
         type=Float64Message.ros_type,
         description="number of the PSM that holds it, 0: none",
+    )
+
+
+def _sight_ports(hand: Hand) -> Iterator[Port]:
+    yield Port(
+        name=f"{hand.arm}/measured_js",
+        causality="input",
+        type=JointState.ros_type,
+        names=tuple(joint.name for joint in hand.chain.joints),
+        fields=crtk.MEASURED,
+    )
+    yield Port(
+        name=f"{hand.arm}/seen",
+        causality="input",
+        type=PoseWithCovarianceStamped.ros_type,
+        variability="event",
+        frame=crtk.WORLD_FRAME,
+        description="where a tracker sees the tip; without a source, joints are taken at their word",
     )

@@ -9,7 +9,7 @@ import numpy as np
 from controllers.expert.hand import framed
 from controllers.motion.frames import base_in_world
 from controllers.motion.params import MotionParams
-from controllers.stitching.params import StitchingParams
+from controllers.stitching.params import StitchParams
 from hub.participant import Inputs
 from robots.dvrk import crtk
 from robots.dvrk.cart import inverse_pose
@@ -27,7 +27,7 @@ __all__ = ["SceneFrames"]
 class SceneFrames:
     """Where the frames are: those that stand fast, the tips of the arms, the camera and the needle."""
 
-    def __init__(self, params: StitchingParams, camera: str) -> None:
+    def __init__(self, params: StitchParams, camera: str) -> None:
         """`camera`: name of the endoscope, whose left optical frame is one of them."""
         stands = MotionParams(arms=params.arms, mounting=params.mounting, setup_joints=params.setup_joints)
         self._bases = {arm: base_in_world(arm, stands) for arm in params.arms.driven}

@@ -1,116 +1,30 @@
-"""What the two hands do, one thing after the other, and when it goes on: all by what is measured.
-
-The needle is led by its own measured pose: the tip of the hand that holds it goes where the needle will be
-where it should, by how that needle lies in the jaw now. So what slips in the jaw is made good. SI units,
-poses in the world.
-"""
+"""Stitches in a row, without a person: looked for, planned, counted, gone on with after a loss. SI units."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import radians
-
-import numpy as np
-
-from controllers.expert.hand import Hand, framed, pose_of
+from controllers.expert.hand import Hand
 from controllers.stitching.geometry import Stitch
+from controllers.stitching.looking import Looking
 from controllers.stitching.params import StitchingParams
 from controllers.stitching.phase import Phase
-from controllers.stitching.plan import BEFORE, BEYOND, make_plan, make_stitch
-from hub.participant import Record, array, choice, integer, number
-from robots import rotation
-from robots.dvrk.cart import inverse_pose
+from controllers.stitching.plan import make_plan, make_stitch
+from controllers.stitching.procedure import ATTEMPTS, HOVER, Procedure
+from controllers.stitching.rejoin import OPEN
+from controllers.stitching.way_on import is_inside
 from schemas.errors import MotionError
-from schemas.vectors import Vector
 
-__all__ = ["BACK", "OPEN", "OPENED", "SHUT", "Surgeon", "SurgeonState", "before"]
-
-OPEN, SHUT = 0.70, -0.30
-"""Of the jaw, rad: around a wire, and while it holds."""
-BACK = 0.016
-"""From where a jaw takes hold, m, against its fingers: clear of the wire."""
-_HOVER = 0.020
-_ACCURATE, _ALIGNED = 0.15e-3, 0.20e-3
-"""m: of a tip where it takes hold; of the needle before it goes in."""
-_PATIENCE = 1.5
-"""s: for these; then it goes on with what has been reached."""
-_PRESSED, OPENED = 0.5, 0.3
-"""s: for a jaw to close, and to let go."""
-_HELD_OPEN = 0.02
-"""rad: a jaw commanded to shut that stays this far open has something between its fingers."""
-_UNHELD = 0.3
-"""s without a holder after which the needle is lost."""
-_GENTLE = 0.35
-_LEARNING = 0.15
-"""Time constant (s) with which it is learnt how the needle lies in the jaw."""
-_PULL_SPEED = radians(45.0)
-"""rad/s."""
-_ATTEMPTS = 3
+__all__ = ["Surgeon"]
 
 
-class SurgeonState(Record):
-    """All of the procedure that changes."""
-
-    phase = choice(Phase.BEGIN)
-    stitch = integer(1)
-    """Number of the pair of holes at work."""
-    attempts = integer()
-    """To take hold of the needle, in succession."""
-    waited = number()
-    """s since the hand at work has arrived."""
-    unheld = number()
-    """s for which nothing has held the needle."""
-    needle = array(4, 4)
-    holder = number()
-    grip = array(4, 4)
-    """Pose of the holding hand's tip in the needle's frame."""
-    planned = array(2, 4, 4)
-    """Of driver and puller, as planned."""
-    park = array(2, 7)
-    """Where the hands stand when they have nothing to do."""
-    angle = array(1)
-    """Of the needle's tip on its way, commanded, rad."""
-    deviation = array(1)
-    """Of the measured needle from its way, m."""
-    made = array(1)
-    done = array(1)
-    failed = array(1)
-
-
-class Surgeon:
-    """Two hands and a needle."""
+class Surgeon(Procedure):
+    """Two hands, a needle, and pairs of holes."""
 
     def __init__(self, params: StitchingParams, driver: Hand, puller: Hand) -> None:
-        self.params, self.driver, self.puller = params, driver, puller
-        self.state = SurgeonState()
+        super().__init__(params, driver, puller)
+        self._row = params
         self.state.stitch = params.first
-        self._needle = params.needle[1].shape
-        self._status: list[str] = []
-        self._steps: dict[Phase, Callable[[], None]] = {
-            Phase.BEGIN: self._begin,
-            Phase.HOVER: self._hover,
-            Phase.DESCEND: self._descend,
-            Phase.CLOSE: self._close,
-            Phase.LIFT: self._lift,
-            Phase.APPROACH: self._approach,
-            Phase.ALIGN: self._align,
-            Phase.DRIVE: self._drive,
-            Phase.COME: lambda: self._come(Phase.TAKE),
-            Phase.TAKE: lambda: self._take(Phase.HOLD),
-            Phase.HOLD: lambda: self._hold(Phase.RELEASE),
-            Phase.RELEASE: lambda: self._release(Phase.LEAVE),
-            Phase.LEAVE: self._leave,
-            Phase.PULL: self._pull,
-            Phase.RAISE: self._raise,
-            Phase.PRESENT: self._present,
-            Phase.COME_BACK: lambda: self._come(Phase.TAKE_BACK),
-            Phase.TAKE_BACK: lambda: self._take(Phase.HOLD_BACK),
-            Phase.HOLD_BACK: lambda: self._hold(Phase.RELEASE_BACK),
-            Phase.RELEASE_BACK: lambda: self._release(Phase.LEAVE_BACK),
-            Phase.LEAVE_BACK: self._leave_back,
-            Phase.DONE: lambda: None,
-            Phase.FAILED: lambda: None,
-        }
+        self.looking: Looking | None = None
+        """How the hands look before they go to work; None: there is no tracker."""
 
     @property
     def stitch(self) -> Stitch:
@@ -119,95 +33,17 @@ class Surgeon:
         return make_stitch(phantom.measures, phantom.pose, self.state.stitch, self._needle)
 
     @property
-    def settles(self) -> tuple[bool, bool]:
-        """Whether the tips of driver and puller are to be brought exactly where they were sent."""
-        phase = self.state.phase
-        driver = phase in (Phase.HOVER, Phase.DESCEND, Phase.ALIGN, Phase.DRIVE, Phase.COME_BACK)
-        puller = phase in (Phase.COME, Phase.TAKE, Phase.PULL)
-        return driver or phase is Phase.TAKE_BACK, puller
-
-    def statuses(self) -> tuple[str, ...]:
-        """Return what was said in this step, and forget it."""
-        said = tuple(self._status)
-        self._status.clear()
-        return said
-
-    def sense(self, needle: Vector, holder: float) -> None:
-        """Take the measured pose of the needle, shape (7,), and the number of the arm that holds it."""
-        state = self.state
-        state.needle[:], state.holder = framed(needle), holder
-        state.unheld = 0.0 if holder else state.unheld + self.driver.period
-
-    def step(self) -> None:
-        """Do what comes next."""
-        state = self.state
-        try:
-            self._watch()
-            self._steps[state.phase]()
-        except MotionError as error:
-            self._fail(str(error))
-
-    def _watch(self) -> None:
-        """Learn how the needle lies in the jaw; notice if it does not lie there any more."""
-        state, hand = self.state, self._holding
-        if hand is None:
-            return
-        if state.unheld > _UNHELD:
-            place = ", ".join(f"{1e3 * each:.0f}" for each in state.needle[:3, 3])
-            tip = state.needle[:3, :3] @ self._needle.marks[2] + state.needle[:3, 3]
-            side = "in the tissue" if (tip - self.params.phantom.pose[:3, 3])[2] < 0.0 else "outside"
-            raise MotionError(
-                f"{hand.arm} has lost the needle while it was to {state.phase.name.lower()}: its middle is at"
-                f" {place} mm, its tip {side}"
-            )
-        now = inverse_pose(state.needle) @ framed(hand.measured)
-        share = hand.period / _LEARNING
-        state.grip[:3, 3] += share * (now[:3, 3] - state.grip[:3, 3])
-        turn = rotation.log(rotation.from_matrix(now[:3, :3] @ state.grip[:3, :3].T))
-        state.grip[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ state.grip[:3, :3]
-
-    @property
-    def _holding(self) -> Hand | None:
-        phase = self.state.phase
-        if Phase.LIFT <= phase <= Phase.HOLD or phase is Phase.LEAVE_BACK:
-            return self.driver
-        return self.puller if Phase.LEAVE <= phase <= Phase.HOLD_BACK else None
-
-    def _enter(self, phase: Phase) -> None:
-        self.state.phase, self.state.waited = phase, 0.0
-
-    def _fail(self, why: str) -> None:
-        self._status.append(why)
-        self.state.failed[0] = 1.0
-        for hand in (self.driver, self.puller):
-            hand.stay()
-        self._enter(Phase.FAILED)
-
-    def _arrived(self, hand: Hand, within: float | None = None) -> bool:
-        """Say whether a hand is where it was sent, as near as it gets."""
-        if not hand.has_arrived:
-            return False
-        self.state.waited += hand.period
-        return within is None or hand.error <= within or self.state.waited > _PATIENCE
-
-    def _lead(self, hand: Hand, needle: Vector, share: float = 1.0) -> None:
-        """Send a hand, on a line, where the needle that it holds comes to a pose, shape (4, 4)."""
-        hand.go(pose_of(needle @ self.state.grip), share)
-
-    def _track(self, hand: Hand, angle: float) -> None:
-        """Bring the needle to an angle of its way, at once."""
-        state, wanted = self.state, self.stitch.pose(angle)
-        goal = pose_of(wanted @ state.grip)
-        hand.state.start[:] = hand.state.goal[:] = goal
-        hand.state.duration = hand.state.elapsed = 0.0
-        state.angle[0] = angle
-        marks = self._needle.marks
-        off = marks @ (state.needle[:3, :3] - wanted[:3, :3]).T + state.needle[:3, 3] - wanted[:3, 3]
-        state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
+    def looks(self) -> bool:
+        """Whether the hands are looked at; one that has arrived then keeps its last command."""
+        return self.looking is not None and self.state.phase is Phase.BEGIN
 
     def _begin(self) -> None:
-        params, state = self.params, self.state
+        if self.looking is not None and not self.looking.step():
+            return
+        params, state = self._row, self.state
         phantom = params.phantom
+        for hand in (self.driver, self.puller):
+            hand.stay()
         state.park[0], state.park[1] = self.driver.measured, self.puller.measured
         stitches = [
             make_stitch(phantom.measures, phantom.pose, params.first + i, self._needle)
@@ -229,171 +65,43 @@ class Surgeon:
         )
         for hand in (self.driver, self.puller):
             hand.move_jaw(OPEN)
-        self.driver.go(self._pick(_HOVER))
+        self.driver.go(self._pick(HOVER))
         self._enter(Phase.HOVER)
 
-    def _pick(self, away: float) -> Vector:
-        """Return the tip's pose, shape (7,), where the driver takes the needle up, or so far before it."""
-        return before(self.state.needle @ self.state.planned[0], away)
-
-    def _hover(self) -> None:
-        if self._arrived(self.driver, _ACCURATE):
-            self.driver.go(self._pick(0.0), _GENTLE)
-            self._enter(Phase.DESCEND)
-
-    def _descend(self) -> None:
-        if self._arrived(self.driver, _ACCURATE):
-            self.driver.move_jaw(SHUT)
-            self.state.attempts += 1
-            self._enter(Phase.CLOSE)
-
-    def _close(self) -> None:
+    def _recover(self, why: str) -> None:
+        """Go on from where the needle is now, if that can be done, and has not been done too often."""
         state = self.state
-        if not self._arrived(self.driver) or state.waited < _PRESSED:
+        if state.phase is Phase.BEGIN or state.recoveries == ATTEMPTS:
+            self._fail(why)
             return
-        if state.holder and self.driver.angle > _HELD_OPEN:
-            state.attempts = 0
-            self._grasped(self.driver)
-            goal = self.driver.line()
-            goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
-            self.driver.go(goal)
-            self._enter(Phase.LIFT)
-        elif state.attempts >= _ATTEMPTS:
-            raise MotionError(f"{self.driver.arm} could not take the needle up in {_ATTEMPTS} attempts")
-        else:
-            self.driver.move_jaw(OPEN)
-            self.driver.go(self._pick(_HOVER))
-            self._enter(Phase.HOVER)
-
-    def _grasped(self, hand: Hand) -> None:
-        """Take how the needle lies in the jaw of a hand for how it holds it."""
-        self.state.grip[:] = inverse_pose(self.state.needle) @ framed(hand.measured)
-
-    def _lift(self) -> None:
-        if self._arrived(self.driver):
-            self._to_approach()
-
-    def _to_approach(self) -> None:
-        stitch = self.stitch
-        self._status.append(f"stitch {self.state.stitch}")
-        self._lead(self.driver, stitch.pose(stitch.entry - BEFORE, self.params.lift))
-        self._enter(Phase.APPROACH)
-
-    def _approach(self) -> None:
-        if self._arrived(self.driver):
-            stitch = self.stitch
-            self._lead(self.driver, stitch.pose(stitch.entry - BEFORE), _GENTLE)
-            self._enter(Phase.ALIGN)
-
-    def _align(self) -> None:
-        if self.driver.has_arrived:
-            stitch = self.stitch
-            self._track(self.driver, stitch.entry - BEFORE)
-            self.state.waited += self.driver.period
-            aligned = self.state.deviation[0] < _ALIGNED and self.state.waited > 0.2
-            if aligned or self.state.waited > _PATIENCE:
-                self._enter(Phase.DRIVE)
-
-    def _drive(self) -> None:
-        end = self.stitch.exit + self.params.emerge
-        angle = min(self.state.angle[0] + self.params.drive_speed * self.driver.period, end)
-        self._track(self.driver, angle)
-        if angle == end:
-            self.state.waited += self.driver.period
-            if self.state.waited > 0.3:
-                self.puller.go(self._taking(self.puller, BACK))
-                self._enter(Phase.COME)
-
-    def _taking(self, hand: Hand, away: float) -> Vector:
-        """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
-        planned = self.state.planned[0 if hand is self.driver else 1]
-        return before(self.state.needle @ planned, away)
-
-    def _taker(self) -> Hand:
-        return self.driver if self.state.phase >= Phase.PRESENT else self.puller
-
-    def _come(self, after: Phase) -> None:
-        hand = self._taker()
-        if self._arrived(hand, _ACCURATE):
-            hand.go(self._taking(hand, 0.0), _GENTLE)
-            self._enter(after)
-
-    def _take(self, after: Phase) -> None:
-        hand = self._taker()
-        if hand.has_arrived:  # the needle may still give a little
-            hand.state.goal[:] = self._taking(hand, 0.0)
-        if self._arrived(hand, _ACCURATE):
-            hand.move_jaw(SHUT)
-            self._enter(after)
-
-    def _hold(self, after: Phase) -> None:
-        hand, other = self._taker(), self.driver if self._taker() is self.puller else self.puller
-        if not self._arrived(hand) or self.state.waited < _PRESSED:
+        state.recoveries += 1
+        try:
+            is_out = state.phase in (Phase.PULL, Phase.RAISE) and not is_inside(self.params, state.needle)
+            if is_out and self._made_the_last():
+                return
+            plan = self._way_on()
+        except MotionError as error:
+            self._fail(f"{why}; it cannot go on: {error}")
             return
-        if hand.angle <= _HELD_OPEN:
-            raise MotionError(f"{hand.arm} has not taken hold of the needle that {other.arm} holds")
-        other.move_jaw(OPEN)
-        self._enter(after)
-
-    def _release(self, after: Phase) -> None:
-        hand = self._taker()
-        other = self.driver if hand is self.puller else self.puller
-        self.state.waited += hand.period
-        if self.state.waited < OPENED:
-            return
-        if hand.angle <= _HELD_OPEN:
-            raise MotionError(f"{hand.arm} has lost the needle as {other.arm} let go")
-        self._grasped(hand)
-        other.go(before(framed(other.line()), BACK))
-        self._enter(after)
-
-    def _leave(self) -> None:
-        """Let the driver go clear, then to its place, and pull."""
-        if self._arrived(self.driver):
-            self.driver.go(self.state.park[0])
-            self.state.angle[0] = self.stitch.angle(self.state.needle)
-            self._enter(Phase.PULL)
-
-    def _pull(self) -> None:
-        if not self.driver.has_arrived:
-            return
-        end = self.stitch.out + BEYOND
-        angle = min(self.state.angle[0] + _PULL_SPEED * self.puller.period, end)
-        self._track(self.puller, angle)
-        if angle == end:
-            goal = self.puller.line()
-            goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
-            self.puller.go(goal)
-            self._enter(Phase.RAISE)
+        self._status.append(f"{why}; it is taken again")
+        for hand in (self.driver, self.puller):
+            hand.stay()
+        self._follow(plan)
 
     def _raise(self) -> None:
-        state, params = self.state, self.params
-        if not self._arrived(self.puller):
-            return
+        if self._arrived(self.puller) and not self._made_the_last():
+            stitch = self.stitch
+            self._lead(self.puller, stitch.pose(stitch.exit + self.params.emerge, self.params.lift))
+            self._enter(Phase.PRESENT)
+
+    def _made_the_last(self) -> bool:
+        """Count a stitch, and return whether it was the last one."""
+        state = self.state
         state.made[0] += 1.0
-        if state.made[0] >= params.stitches:
+        state.recoveries = 0
+        if state.made[0] >= self._row.stitches:
             state.done[0] = 1.0
             self._enter(Phase.DONE)
-            return
+            return True
         state.stitch += 1
-        stitch = self.stitch
-        self._lead(self.puller, stitch.pose(stitch.exit + params.emerge, params.lift))
-        self._enter(Phase.PRESENT)
-
-    def _present(self) -> None:
-        if self._arrived(self.puller):
-            self.driver.go(self._taking(self.driver, BACK))
-            self._enter(Phase.COME_BACK)
-
-    def _leave_back(self) -> None:
-        """Let the puller go clear, then to its place, and go on with the next stitch."""
-        if self._arrived(self.puller):
-            self.puller.go(self.state.park[1])
-            self._to_approach()
-
-
-def before(tip: Vector, away: float) -> Vector:
-    """Return a pose of the tip, shape (7,), `away` metres against its fingers from `tip`, shape (4, 4)."""
-    pose = pose_of(tip)
-    pose[:3] -= away * tip[:3, 2]
-    return pose
+        return False

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, degrees, pi
+from math import atan2, pi, radians
 
 import numpy as np
 
 from controllers.expert.hand import Hand, framed
 from controllers.stitching.geometry import Stitch
-from controllers.stitching.params import StitchingParams
+from controllers.stitching.params import StitchParams
 from controllers.stitching.phase import Phase
 from controllers.stitching.plan import (
     BEFORE,
@@ -24,12 +24,15 @@ from robots.dvrk.cart import inverse_pose
 from schemas.errors import MotionError
 from schemas.vectors import Vector
 
-__all__ = ["WayOn", "way_on"]
+__all__ = ["WayOn", "is_inside", "way_on"]
 
 _UNDER = 0.5e-3
 """m; a needle with a point so far under the skin is in the tissue."""
 _BESIDE = 2.0e-3
 """m; of a needle in the tissue from its way: what pad and jaw can make good."""
+
+_NEARLY = radians(5.0)
+"""Of the arc: so much less than planned may have come out for the puller to take it."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +49,25 @@ class WayOn:
     puller: Vector
     """How the hands hold the needle, as in a `Plan`."""
     margin: float
+    picked_for: Phase = Phase.LIFT
+    """What follows when the driver has taken the needle up: it is in the tissue, or it is not."""
+
+
+def is_inside(params: StitchParams, needle: Vector) -> bool:
+    """Return whether a needle, at a pose of shape (4, 4), is in the tissue."""
+    return _lowest(params, needle) < -_UNDER
+
+
+def _lowest(params: StitchParams, needle: Vector) -> float:
+    """Return the height of its lowest point over the skin, m."""
+    shape, pad = params.needle[1].shape, params.phantom.pose
+    wire = shape.points(np.linspace(-shape.arc / 2.0, shape.arc / 2.0, 60))
+    heights = (wire @ needle[:3, :3].T + needle[:3, 3] - pad[:3, 3]) @ pad[:3, 2]
+    return float(heights.min())
 
 
 def way_on(
-    params: StitchingParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, holder: float
+    params: StitchParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, holder: float
 ) -> WayOn:
     """Plan `stitch` from where the needle is, shape (4, 4), in the jaw of arm number `holder` (0: none).
 
@@ -58,20 +76,14 @@ def way_on(
     holding = {driver.number: driver, puller.number: puller}.get(holder)
     if holder and holding is None:
         raise MotionError(f"PSM{holder:.0f} holds the needle, which is neither {driver.arm} nor {puller.arm}")
-    up = params.phantom.pose[:3, 2]
-    wire = stitch.needle.points(np.linspace(-stitch.needle.arc / 2.0, stitch.needle.arc / 2.0, 60))
-    heights = (wire @ needle[:3, :3].T + needle[:3, 3] - params.phantom.pose[:3, 3]) @ up
-    low = float(heights.min())
+    low = _lowest(params, needle)
     inside, angle = low < -_UNDER, stitch.angle(needle)
     if inside:
         angle = _on_its_way(stitch, needle, angle)
         if holding is None:
-            raise MotionError(
-                f"no jaw holds the needle, which is in the tissue, its tip at {degrees(angle):.0f} degrees of"
-                " its way; take hold of it with a hand, then resume"
-            )
+            return _taken_again(params, driver, puller, stitch, needle, angle)
     raised = needle.copy()
-    raised[:3, 3] += max(0.0, params.lift - low) * up
+    raised[:3, 3] += max(0.0, params.lift - low) * params.phantom.pose[:3, 2]
     over = stitch.entry - BEFORE
     emerge, lift = params.emerge, params.lift
     pull = pulling(stitch, emerge, lift)
@@ -97,6 +109,23 @@ def way_on(
         return WayOn(Phase.PRESENT, puller, shown, over, grip, taking, min(kept, margin, pull_margin))
     grip, margin = _chosen(driver, grips, [[raised, needle], drive])
     return WayOn(Phase.HOVER, None, needle, over, grip, taking, min(margin, pull_margin))
+
+
+def _taken_again(
+    params: StitchParams, driver: Hand, puller: Hand, stitch: Stitch, needle: Vector, angle: float
+) -> WayOn:
+    """Plan how a needle that the tissue alone holds, its tip at `angle` (rad), is taken hold of."""
+    emerge, lift = params.emerge, params.lift
+    grips = grips_of(puller, params.taken, stitch.needle)
+    if angle > stitch.exit + emerge - _NEARLY:
+        grip, margin = _chosen(puller, grips, [pulling(stitch, emerge, lift, angle)])
+        return WayOn(Phase.COME, None, needle, angle, np.eye(4), grip, margin)
+    require_room(params.grip, stitch, emerge)
+    taking, pull_margin = _chosen(puller, grips, [pulling(stitch, emerge, lift)])
+    drive = driving(stitch, emerge, lift, angle)
+    grip, margin = _chosen(driver, grips_of(driver, params.grip, stitch.needle), [drive])
+    margin = min(margin, pull_margin)
+    return WayOn(Phase.HOVER, None, needle, angle, grip, taking, margin, Phase.ALIGN)
 
 
 def _on_its_way(stitch: Stitch, needle: Vector, angle: float) -> float:

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from controllers.motion.controller import MotionController
+from controllers.motion.joint_errors import JointErrors
 from controllers.motion.params import MotionParams
 from hub.testing import check_engine
 from robots import rotation
@@ -665,3 +666,31 @@ def test_restore_returns_to_the_same_bits_in_the_middle_of_a_move():
 def test_parameters_that_make_no_sense_are_refused(arms, reason):
     with pytest.raises(ValidationError, match=reason):
         MotionParams.model_validate({"arms": arms})
+
+
+def test_an_encoder_that_is_off_hides_where_the_joint_is_from_the_controller_alone():
+    off = np.array([0.044, -0.008, 0.003])
+    rig = Rig(joint_errors={"PSM1": off.tolist()})
+    true = rig.sensed["sense/PSM1/measured_js"][:6].copy()
+    rig.step(10)
+    assert rig.outputs["PSM1/measured_js"][:3] == pytest.approx(true[:3] - off, abs=1e-12)
+    rig.step(1500, move_jp=jp(*HOME))
+    assert rig.outputs["PSM1/measured_js"][:6] == pytest.approx(HOME, abs=1e-9)
+    assert rig.outputs["drive/PSM1/servo_jp"][:3] == pytest.approx(HOME[:3] + off, abs=1e-9)
+    assert rig.outputs["drive/PSM1/servo_jp"][3:] == pytest.approx(HOME[3:], abs=1e-9)
+
+
+def test_joint_errors_are_drawn_within_bounds_for_each_arm_and_seed():
+    bounds = (0.09, 0.09, 5e-3)
+    drawn = [
+        tuple(JointErrors(within=bounds, seed=seed).of(arm, 6))
+        for seed in range(50)
+        for arm in ("PSM1", "PSM2")
+    ]
+    assert len(set(drawn)) == 100
+    assert (np.abs(drawn)[:, :3] <= bounds).all()
+    assert (np.abs(drawn).max(axis=0)[:3] > 0.9 * np.array(bounds)).all()
+    assert not np.any(np.array(drawn)[:, 3:])
+    assert not JointErrors(within=bounds).of("ECM", 4).any()
+    with pytest.raises(ValueError, match="bounds are not below 0"):
+        JointErrors(within=(-0.1, 0.0, 0.0))

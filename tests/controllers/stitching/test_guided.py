@@ -12,7 +12,7 @@ from hub.planning.scenario_file import load
 from robots.dvrk.cart import inverse_pose
 from schemas.ros import BoolMessage, Header, Point, PointStamped, StringMessage
 from schemas.visualization import MarkerAction
-from tests.controllers.stitching.test_surgeon import World
+from tests.controllers.stitching.test_surgeon import World, drop
 
 TIP_PERIOD = 1.2e-3
 """m; the way of a tip at its largest speed, 0.12 m/s, in a period."""
@@ -178,12 +178,22 @@ def test_it_says_why_it_cannot_go_on():
     world.needle = world.tips["PSM1"] @ world.grips["PSM1"]
     world.say("resume")
     assert "in the tissue and 3.0 mm beside its way, allowed are 2" in world.said[-1]
-    world.grips.clear()
-    world.tips["PSM1"][:3, 3] -= [0.0, 0.003, 0.0]
-    world.needle[:3, 3] -= [0.0, 0.003, 0.0]
-    world.say("resume")
-    assert "no jaw holds the needle, which is in the tissue" in world.said[-1]
     assert world.stage is Stage.TAKEN_OVER
+
+
+def test_a_needle_dropped_in_the_tissue_stops_it_until_a_person_lets_it_go_on():
+    world = Guided().consented().until("DRIVE")
+    world.run(2.0, until=lambda _: False)
+    drop(world, "PSM1")
+    world.run(1.0, until=lambda w: w.stage is Stage.STOPPED)
+    assert "stopped: PSM1 has lost the needle" in world.said[-1]
+    tips = {arm: tip.copy() for arm, tip in world.tips.items()}
+    world.run(1.0, until=lambda _: False)
+    assert all((world.tips[arm] == tip).all() for arm, tip in tips.items())
+    world.say("resume").run(60, until=lambda w: w.stage is Stage.PICKING)
+    assert world.lead._surgeon.state.made[0] == 1.0, world.said
+    assert list(world.grips) == ["PSM2"]
+    assert world.largest < TIP_PERIOD
 
 
 def test_a_saved_stitch_goes_on_with_the_same_bits():
@@ -201,3 +211,9 @@ def test_a_saved_stitch_goes_on_with_the_same_bits():
 def test_words_that_are_none_are_refused():
     world = Guided().say("go")
     assert "'go' is no command, allowed: consent, pause, resume" in world.said[-1]
+
+
+@pytest.mark.parametrize("name", ["stitches", "first", "end"])
+def test_what_only_the_expert_obeys_is_no_parameter(name):
+    with pytest.raises(ValueError, match=name):
+        Guided(**{name: 1})

@@ -1,5 +1,7 @@
 """The stitching expert in a world without physics: a shut jaw holds the needle if it is at the wire."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,7 @@ class World:
         for hand in self.lead._hands:
             arm = hand.arm
             values[f"{arm}/local/measured_cp"] = pose_of(inverse_pose(hand.base) @ self.tips[arm])
+            values[f"{arm}/measured_js"] = np.zeros(18)
             wide = 0.1 if arm in self.grips and self.jaws[arm] < 0 else self.jaws[arm]
             values[f"{arm}/jaw/measured_js"] = np.array([wide, 0, 0])
         values["objects/needle/pose"] = pose_of(self.needle)
@@ -98,13 +101,43 @@ def test_two_stitches_are_made_through_their_holes_one_after_the_other():
     assert list(world.grips) == ["PSM2"]
 
 
-def test_a_needle_that_is_lost_ends_it_and_is_said_to_lie_where_it_lies():
-    world = World(stitches=1).run(60, until=lambda w: w.phase is Phase.DRIVE and w.needle[2, 3] < 0.01)
-    world.run(1.5, until=lambda _: False)
-    world.grips.clear()
+def drop(world, arm):
+    """Open a jaw from outside."""
+    world.jaws[arm] = 0.7
+    world.grips.pop(arm, None)
+
+
+@pytest.mark.parametrize(
+    ("phase", "seconds", "arm"), [("DRIVE", 2.0, "PSM1"), ("COME", 0.3, "PSM1"), ("PULL", 1.0, "PSM2")]
+)
+def test_a_needle_that_is_dropped_in_the_tissue_is_said_to_be_there_and_taken_again(phase, seconds, arm):
+    world = World(stitches=1).run(60, until=lambda w: w.phase.name == phase)
+    world.run(seconds, until=lambda _: False)
+    drop(world, arm)
+    world.run(60)
+    assert world.lead.ended == "all stitches are made", world.said
+    assert f"{arm} has lost the needle while it was to {phase.lower()}: its middle is at" in world.said[-1]
+    assert world.said[-1].endswith("it is taken again")
+    assert world.lead._surgeon.state.made[0] == 1.0
+    assert list(world.grips) == ["PSM2"]
+
+
+def test_a_needle_that_nobody_can_take_ends_it_with_where_it_is_and_why():
+    world = World(stitches=1).run(60, until=lambda w: w.phase is Phase.APPROACH)
+    drop(world, "PSM1")
+    world.needle[:3, 3] = 0.4, 0.0, 0.0
     world.run(2)
     assert world.lead.ended == "a stitch has failed"
-    assert "PSM1 has lost the needle while it was to drive: its middle is at" in world.said[-1]
+    assert re.search(r"lost the needle .* at 400, 0, 0 mm, .*; it cannot go on: .*PSM1", world.said[-1])
+
+
+def test_a_needle_that_is_always_dropped_is_given_up():
+    world = World(stitches=1)
+    for _ in range(4):
+        world.run(60, until=lambda w: w.phase is Phase.DRIVE and w.needle[2, 3] < 0.01)
+        drop(world, "PSM1")
+        world.run(1, until=lambda w: w.phase is not Phase.DRIVE)
+    assert world.lead.ended == "a stitch has failed"
 
 
 def test_a_needle_out_of_reach_is_refused_before_anything_moves():

@@ -1,0 +1,399 @@
+"""What the two hands do, one thing after the other, and when it goes on: all by what is measured.
+
+The needle is led by its own measured pose: the tip of the hand that holds it goes where the needle will be
+where it should, by how that needle lies in the jaw now. So what slips in the jaw is made good. SI units,
+poses in the world.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from math import radians
+
+import numpy as np
+
+from controllers.expert.hand import Hand, framed, pose_of
+from controllers.stitching.geometry import Stitch, before
+from controllers.stitching.params import StitchParams
+from controllers.stitching.phase import Phase
+from controllers.stitching.plan import BEFORE, BEYOND
+from controllers.stitching.rejoin import BACK, OPEN, OPENED, SHUT, Rejoin
+from controllers.stitching.way_on import WayOn, way_on
+from hub.participant import Record, array, choice, flag, integer, number
+from robots import rotation
+from robots.dvrk.cart import inverse_pose
+from schemas.errors import MotionError
+from schemas.vectors import Vector
+
+__all__ = ["ATTEMPTS", "HOVER", "Procedure", "ProcedureState"]
+
+HOVER = 0.020
+"""m, against its fingers: from where the driver picks the needle up, to where it comes down from."""
+_ACCURATE, _ALIGNED = 0.15e-3, 0.20e-3
+"""m: of a tip where it takes hold; of the needle before it goes in."""
+_PATIENCE = 1.5
+"""s: for these; then it goes on with what has been reached."""
+_PRESSED = 0.5
+"""s: for a jaw to close."""
+_HELD_OPEN = 0.02
+"""rad: a jaw commanded to shut that stays this far open has something between its fingers."""
+_UNHELD = 0.3
+"""s without a holder after which the needle is lost."""
+_GENTLE = 0.35
+_LEARNING = 0.15
+"""Time constant (s) with which it is learnt how the needle lies in the jaw."""
+_PULL_SPEED = radians(45.0)
+"""rad/s."""
+ATTEMPTS = 3
+"""To take hold of the needle, and to go on with a stitch in which it was lost."""
+
+
+class ProcedureState(Record):
+    """All of the procedure that changes."""
+
+    phase = choice(Phase.BEGIN)
+    stitch = integer(1)
+    """Number of the pair of holes at work."""
+    attempts = integer()
+    """To take hold of the needle, in succession."""
+    recoveries = integer()
+    """Of a needle that was lost, in this stitch."""
+    free = flag()
+    """Whether no jaw is to hold the needle, though the phase is one in which a hand does."""
+    picked_for = choice(Phase.LIFT)
+    """The phase that follows when the driver has taken the needle up."""
+    waited = number()
+    """s since the hand at work has arrived."""
+    unheld = number()
+    """s for which nothing has held the needle."""
+    needle = array(4, 4)
+    holder = number()
+    grip = array(4, 4)
+    """Pose of the holding hand's tip in the needle's frame."""
+    planned = array(2, 4, 4)
+    """Of driver and puller, as planned."""
+    park = array(2, 7)
+    """Where the hands stand when they have nothing to do."""
+    angle = array(1)
+    """Of the needle's tip on its way, commanded, rad."""
+    deviation = array(1)
+    """Of the measured needle from its way, m."""
+    made = array(1)
+    done = array(1)
+    failed = array(1)
+
+
+class Procedure(ABC):
+    """Two hands and a needle; which stitch it is, and what comes before and after, others say."""
+
+    def __init__(self, params: StitchParams, driver: Hand, puller: Hand) -> None:
+        self.params, self.driver, self.puller = params, driver, puller
+        self.state = ProcedureState()
+        self.rejoin = Rejoin(driver, puller)
+        self._needle = params.needle[1].shape
+        self._status: list[str] = []
+        self._steps: dict[Phase, Callable[[], None]] = {
+            Phase.BEGIN: self._begin,
+            Phase.HOVER: self._hover,
+            Phase.DESCEND: self._descend,
+            Phase.CLOSE: self._close,
+            Phase.LIFT: self._lift,
+            Phase.APPROACH: self._approach,
+            Phase.ALIGN: self._align,
+            Phase.DRIVE: self._drive,
+            Phase.COME: lambda: self._come(Phase.TAKE),
+            Phase.TAKE: lambda: self._take(Phase.HOLD),
+            Phase.HOLD: lambda: self._hold(Phase.RELEASE),
+            Phase.RELEASE: lambda: self._release(Phase.LEAVE),
+            Phase.LEAVE: self._leave,
+            Phase.PULL: self._pull,
+            Phase.RAISE: self._raise,
+            Phase.PRESENT: self._present,
+            Phase.COME_BACK: lambda: self._come(Phase.TAKE_BACK),
+            Phase.TAKE_BACK: lambda: self._take(Phase.HOLD_BACK),
+            Phase.HOLD_BACK: lambda: self._hold(Phase.RELEASE_BACK),
+            Phase.RELEASE_BACK: lambda: self._release(Phase.LEAVE_BACK),
+            Phase.LEAVE_BACK: self._leave_back,
+            Phase.DONE: lambda: None,
+            Phase.FAILED: lambda: None,
+        }
+
+    @property
+    @abstractmethod
+    def stitch(self) -> Stitch:
+        """The stitch at work. Raises MotionError if it is not feasible."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Do what comes before the first stitch."""
+
+    @abstractmethod
+    def _raise(self) -> None:
+        """Do what comes when the needle is out and raised."""
+
+    @abstractmethod
+    def _recover(self, why: str) -> None:
+        """Go on, or do not, after a failure."""
+
+    @property
+    def settles(self) -> tuple[bool, bool]:
+        """Whether the tips of driver and puller are to be brought exactly where they were sent."""
+        phase = self.state.phase
+        driver = phase in (Phase.HOVER, Phase.DESCEND, Phase.ALIGN, Phase.DRIVE, Phase.COME_BACK)
+        puller = phase in (Phase.COME, Phase.TAKE, Phase.PULL)
+        return driver or phase is Phase.TAKE_BACK, puller
+
+    def statuses(self) -> tuple[str, ...]:
+        """Return what was said in this step, and forget it."""
+        said = tuple(self._status)
+        self._status.clear()
+        return said
+
+    def sense(self, needle: Vector, holder: float) -> None:
+        """Take the measured pose of the needle, shape (7,), and the number of the arm that holds it."""
+        state = self.state
+        state.needle[:], state.holder = framed(needle), holder
+        state.unheld = 0.0 if holder else state.unheld + self.driver.period
+
+    def step(self) -> None:
+        """Do what comes next."""
+        state = self.state
+        try:
+            self._watch()
+            if self.rejoin.is_under_way:
+                self._come_back()
+            else:
+                self._steps[state.phase]()
+        except MotionError as error:
+            self._recover(str(error))
+
+    def _way_on(self) -> WayOn:
+        return way_on(
+            self.params, self.driver, self.puller, self.stitch, self.state.needle, self.state.holder
+        )
+
+    def _follow(self, plan: WayOn) -> None:
+        """Let the hands go to where a plan goes on."""
+        state = self.state
+        state.planned[0], state.planned[1] = plan.driver, plan.puller
+        state.angle[0], state.attempts, state.failed[0] = plan.angle, 0, 0.0
+        state.picked_for, state.free = plan.picked_for, plan.holder is None
+        if plan.holder is not None:
+            self._grasped(plan.holder)
+        self.rejoin.begin(plan, state.grip, state.park)
+        self._enter(Phase.BEGIN)
+
+    def _come_back(self) -> None:
+        """Let the hands go on to where the stitch goes on."""
+        self.rejoin.step(self.state.needle)
+        if not self.rejoin.is_under_way:
+            self._enter(self.rejoin.state.then)
+
+    def _watch(self) -> None:
+        """Learn how the needle lies in the jaw; notice if it does not lie there any more."""
+        state, hand = self.state, self._holding
+        if hand is None:
+            return
+        if state.unheld > _UNHELD:
+            place = ", ".join(f"{1e3 * each:.0f}" for each in state.needle[:3, 3])
+            tip = state.needle[:3, :3] @ self._needle.marks[2] + state.needle[:3, 3]
+            side = "in the tissue" if (tip - self.params.phantom.pose[:3, 3])[2] < 0.0 else "outside"
+            raise MotionError(
+                f"{hand.arm} has lost the needle while it was to {state.phase.name.lower()}: its middle is at"
+                f" {place} mm, its tip {side}"
+            )
+        now = inverse_pose(state.needle) @ framed(hand.measured)
+        share = hand.period / _LEARNING
+        state.grip[:3, 3] += share * (now[:3, 3] - state.grip[:3, 3])
+        turn = rotation.log(rotation.from_matrix(now[:3, :3] @ state.grip[:3, :3].T))
+        state.grip[:3, :3] = rotation.matrix(rotation.exp(share * turn)) @ state.grip[:3, :3]
+
+    @property
+    def _holding(self) -> Hand | None:
+        phase = self.state.phase
+        if self.state.free:
+            return None
+        if Phase.LIFT <= phase <= Phase.HOLD or phase is Phase.LEAVE_BACK:
+            return self.driver
+        return self.puller if Phase.LEAVE <= phase <= Phase.HOLD_BACK else None
+
+    def _enter(self, phase: Phase) -> None:
+        self.state.phase, self.state.waited = phase, 0.0
+
+    def _fail(self, why: str) -> None:
+        self._status.append(why)
+        self.state.failed[0] = 1.0
+        for hand in (self.driver, self.puller):
+            hand.stay()
+        self._enter(Phase.FAILED)
+
+    def _arrived(self, hand: Hand, within: float | None = None) -> bool:
+        """Say whether a hand is where it was sent, as near as it gets."""
+        if not hand.has_arrived:
+            return False
+        self.state.waited += hand.period
+        return within is None or hand.error <= within or self.state.waited > _PATIENCE
+
+    def _lead(self, hand: Hand, needle: Vector, share: float = 1.0) -> None:
+        """Send a hand, on a line, where the needle that it holds comes to a pose, shape (4, 4)."""
+        hand.go(pose_of(needle @ self.state.grip), share)
+
+    def _track(self, hand: Hand, angle: float) -> None:
+        """Bring the needle to an angle of its way, at once."""
+        state, wanted = self.state, self.stitch.pose(angle)
+        goal = pose_of(wanted @ state.grip)
+        hand.state.start[:] = hand.state.goal[:] = goal
+        hand.state.duration = hand.state.elapsed = 0.0
+        state.angle[0] = angle
+        marks = self._needle.marks
+        off = marks @ (state.needle[:3, :3] - wanted[:3, :3]).T + state.needle[:3, 3] - wanted[:3, 3]
+        state.deviation[0] = float(np.sqrt((off * off).sum(axis=1).max()))
+
+    def _pick(self, away: float) -> Vector:
+        """Return the tip's pose, shape (7,), where the driver takes the needle up, or so far before it."""
+        return before(self.state.needle @ self.state.planned[0], away)
+
+    def _hover(self) -> None:
+        if self._arrived(self.driver, _ACCURATE):
+            self.driver.go(self._pick(0.0), _GENTLE)
+            self._enter(Phase.DESCEND)
+
+    def _descend(self) -> None:
+        if self._arrived(self.driver, _ACCURATE):
+            self.driver.move_jaw(SHUT)
+            self.state.attempts += 1
+            self._enter(Phase.CLOSE)
+
+    def _close(self) -> None:
+        state = self.state
+        if not self._arrived(self.driver) or state.waited < _PRESSED:
+            return
+        if state.holder and self.driver.angle > _HELD_OPEN:
+            state.attempts = 0
+            self._grasped(self.driver)
+            if state.picked_for is Phase.LIFT:
+                goal = self.driver.line()
+                goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
+                self.driver.go(goal)
+            else:  # in the tissue: back to its way
+                self._lead(self.driver, self.stitch.pose(state.angle[0]), _GENTLE)
+            self._enter(state.picked_for)
+        elif state.attempts >= ATTEMPTS:
+            raise MotionError(f"{self.driver.arm} could not take the needle up in {ATTEMPTS} attempts")
+        else:
+            self.driver.move_jaw(OPEN)
+            self.driver.go(self._pick(HOVER))
+            self._enter(Phase.HOVER)
+
+    def _grasped(self, hand: Hand) -> None:
+        """Take how the needle lies in the jaw of a hand for how it holds it."""
+        self.state.grip[:] = inverse_pose(self.state.needle) @ framed(hand.measured)
+        self.state.free = False
+
+    def _lift(self) -> None:
+        if self._arrived(self.driver):
+            self._to_approach()
+
+    def _to_approach(self) -> None:
+        stitch = self.stitch
+        self._status.append(f"stitch {self.state.stitch}")
+        self._lead(self.driver, stitch.pose(stitch.entry - BEFORE, self.params.lift))
+        self._enter(Phase.APPROACH)
+
+    def _approach(self) -> None:
+        if self._arrived(self.driver):
+            self.state.angle[0] = self.stitch.entry - BEFORE
+            self._lead(self.driver, self.stitch.pose(self.state.angle[0]), _GENTLE)
+            self._enter(Phase.ALIGN)
+
+    def _align(self) -> None:
+        if self.driver.has_arrived:
+            self._track(self.driver, self.state.angle[0])
+            self.state.waited += self.driver.period
+            aligned = self.state.deviation[0] < _ALIGNED and self.state.waited > 0.2
+            if aligned or self.state.waited > _PATIENCE:
+                self._enter(Phase.DRIVE)
+
+    def _drive(self) -> None:
+        end = self.stitch.exit + self.params.emerge
+        angle = min(self.state.angle[0] + self.params.drive_speed * self.driver.period, end)
+        self._track(self.driver, angle)
+        if angle == end:
+            self.state.waited += self.driver.period
+            if self.state.waited > 0.3:
+                self.puller.go(self._taking(self.puller, BACK))
+                self._enter(Phase.COME)
+
+    def _taking(self, hand: Hand, away: float) -> Vector:
+        """Return the pose, shape (7,), where a hand takes over the needle, or so far before it."""
+        planned = self.state.planned[0 if hand is self.driver else 1]
+        return before(self.state.needle @ planned, away)
+
+    def _taker(self) -> Hand:
+        return self.driver if self.state.phase >= Phase.PRESENT else self.puller
+
+    def _come(self, after: Phase) -> None:
+        hand = self._taker()
+        if self._arrived(hand, _ACCURATE):
+            hand.go(self._taking(hand, 0.0), _GENTLE)
+            self._enter(after)
+
+    def _take(self, after: Phase) -> None:
+        hand = self._taker()
+        if hand.has_arrived:  # the needle may still give a little
+            hand.state.goal[:] = self._taking(hand, 0.0)
+        if self._arrived(hand, _ACCURATE):
+            hand.move_jaw(SHUT)
+            self._enter(after)
+
+    def _hold(self, after: Phase) -> None:
+        hand, other = self._taker(), self.driver if self._taker() is self.puller else self.puller
+        if not self._arrived(hand) or self.state.waited < _PRESSED:
+            return
+        if hand.angle <= _HELD_OPEN:
+            raise MotionError(f"{hand.arm} has not taken hold of the needle that {other.arm} holds")
+        other.move_jaw(OPEN)
+        self._enter(after)
+
+    def _release(self, after: Phase) -> None:
+        hand = self._taker()
+        other = self.driver if hand is self.puller else self.puller
+        self.state.waited += hand.period
+        if self.state.waited < OPENED:
+            return
+        if hand.angle <= _HELD_OPEN:
+            raise MotionError(f"{hand.arm} has lost the needle as {other.arm} let go")
+        self._grasped(hand)
+        other.go(before(framed(other.line()), BACK))
+        self._enter(after)
+
+    def _leave(self) -> None:
+        """Let the driver go clear, then to its place, and pull."""
+        if self._arrived(self.driver):
+            self.driver.go(self.state.park[0])
+            self.state.angle[0] = self.stitch.angle(self.state.needle)
+            self._enter(Phase.PULL)
+
+    def _pull(self) -> None:
+        if not self.driver.has_arrived:
+            return
+        end = self.stitch.out + BEYOND
+        angle = min(self.state.angle[0] + _PULL_SPEED * self.puller.period, end)
+        self._track(self.puller, angle)
+        if angle == end:
+            goal = self.puller.line()
+            goal[:3] += self.params.lift * self.params.phantom.pose[:3, 2]
+            self.puller.go(goal)
+            self._enter(Phase.RAISE)
+
+    def _present(self) -> None:
+        if self._arrived(self.puller):
+            self.driver.go(self._taking(self.driver, BACK))
+            self._enter(Phase.COME_BACK)
+
+    def _leave_back(self) -> None:
+        """Let the puller go clear, then to its place, and go on with the next stitch."""
+        if self._arrived(self.puller):
+            self.puller.go(self.state.park[1])
+            self._to_approach()

@@ -1,0 +1,104 @@
+"""How the hands come from where they are to where a stitch goes on. SI units, world.
+
+The free hand opens and goes clear of the needle, then each hand goes on a line to where its phase begins.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from controllers.expert.hand import Hand, framed, pose_of
+from controllers.stitching.geometry import before
+from controllers.stitching.phase import Phase
+from controllers.stitching.way_on import WayOn
+from hub.participant import Record, array, choice, number
+from schemas.vectors import Vector
+
+__all__ = ["BACK", "OPEN", "OPENED", "SHUT", "Rejoin"]
+
+OPEN, SHUT = 0.70, -0.30
+"""Of the jaw, rad: around a wire, and while it holds."""
+OPENED = 0.3
+"""s: for a jaw to let go."""
+BACK = 0.016
+"""From where a jaw takes hold, m, against its fingers: clear of the wire."""
+_CLEAR = 0.04
+"""m; a free hand that is nearer to the needle goes back before it goes elsewhere."""
+_GENTLE = 0.35
+
+
+class Going(IntEnum):
+    """What the hands do."""
+
+    NOWHERE = 0
+    OPEN = 1
+    CLEAR = 2
+    GO = 3
+
+
+class RejoinState(Record):
+    """Where the hands go."""
+
+    going = choice(Going.NOWHERE)
+    then = choice(Phase.BEGIN)
+    """The phase that they rejoin."""
+    goals = array(2, 7)
+    """Of driver and puller, where they rejoin it."""
+    holder = number()
+    waited = number()
+
+
+class Rejoin:
+    """The way of driver and puller to where a stitch goes on."""
+
+    def __init__(self, driver: Hand, puller: Hand) -> None:
+        self._hands, self.state = (driver, puller), RejoinState()
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether the hands have not yet come there."""
+        return self.state.going is not Going.NOWHERE
+
+    def begin(self, plan: WayOn, grip: Vector, park: Vector) -> None:
+        """Open what does not hold the needle.
+
+        Args:
+            plan: how the stitch goes on.
+            grip: pose of the holding hand's tip in the needle's frame, shape (4, 4).
+            park: where driver and puller stand when they have nothing to do, shape (2, 7).
+        """
+        state = self.state
+        for hand in self._hands:
+            hand.move_jaw(SHUT if hand is plan.holder else OPEN)
+        state.goals[:] = park
+        if plan.holder is not None:
+            state.goals[self._hands.index(plan.holder)] = pose_of(plan.needle @ grip)
+        if plan.phase is Phase.HOVER:
+            state.goals[0] = before(plan.needle @ plan.driver, BACK)
+        elif plan.phase is Phase.COME:
+            state.goals[1] = before(plan.needle @ plan.puller, BACK)
+        state.going, state.then, state.waited = Going.OPEN, plan.phase, 0.0
+        state.holder = 0.0 if plan.holder is None else plan.holder.number
+
+    def give_up(self) -> None:
+        """Go nowhere any more."""
+        self.state.going = Going.NOWHERE
+
+    def step(self, needle: Vector) -> None:
+        """Go on; `needle`: its pose, shape (4, 4)."""
+        state, hands = self.state, self._hands
+        state.waited += hands[0].period
+        if state.going is Going.OPEN and state.waited >= OPENED:
+            for hand in hands:
+                near = float(np.linalg.norm(hand.measured[:3] - needle[:3, 3])) < _CLEAR
+                if hand.number != state.holder and near:
+                    hand.go(before(framed(hand.line()), BACK))
+            state.going = Going.CLEAR
+        elif state.going is Going.CLEAR and all(hand.has_arrived for hand in hands):
+            for hand, goal in zip(hands, state.goals, strict=True):
+                hand.go(goal, _GENTLE if hand.number == state.holder else 1.0)
+            state.going = Going.GO
+        elif state.going is Going.GO and all(hand.has_arrived for hand in hands):
+            state.going = Going.NOWHERE
