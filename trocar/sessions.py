@@ -164,7 +164,7 @@ def fork(
         SessionError: The session failed, or its past has other state hashes than the recording.
     """
     _warn_of_other_bits()
-    opened = recording if isinstance(recording, Recording) else Recording(Path(recording))
+    opened = recording if isinstance(recording, Recording) else Recording(Path(recording), unfinished=True)
     made = Fork(
         opened,
         round(at * 1e9),

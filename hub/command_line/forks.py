@@ -49,13 +49,13 @@ def fork(
     """Go on from an instant of a recording, live: with other devices, parameters, or a person.
 
     Up to the instant all is simulated again, and has the recorded state hashes. The fork's own recording
-    verifies like any other.
+    verifies like any other. The parent may be one that was cut short, or that is still being written.
     """
     from hub.fork import Fork
 
     inside, outside = listening_ports(listen or ())
     made = Fork(
-        Recording(recording),
+        Recording(recording, unfinished=True),
         _instant(at),
         [*(overrides or ()), *([f"pace={pace}"] if pace else ())],
         record=record,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -13,12 +14,13 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Chunk, ChunkIndex
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Attachment, Chunk, ChunkIndex
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from hub.recording.unfinished import Unfinished
 from schemas import ros
 from schemas.codec import decode, message_type
 from schemas.errors import CutShortError, MessageError, RecordingError, did_you_mean
@@ -123,18 +125,51 @@ def locating(bag: Bag, topic: str, time_ns: int) -> Generator[None]:
 
 
 class Bag:
-    """A finished recording: its topics, messages and attachments."""
+    """A recording: its topics, messages and attachments."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, *, unfinished: bool = False) -> None:
         """Open a rosbag2 directory or an MCAP file.
 
-        Raises RecordingError if it is neither, is cut short, or holds messages that are not in CDR.
+        `unfinished`: one that was cut short, or is being written, as far as it goes. Raises RecordingError if
+        it is neither, is cut short, or holds messages that are not in CDR.
         """
         self.file = bag_file(Path(path))
-        with reading(self.file):
-            self._summary = self._read_summary()
+        self.grown = 0
+        """How often `grow` has found more."""
+        self._unfinished: Unfinished | None = None
         self.topics: dict[str, str] = {}
         """Type of each topic."""
+        try:
+            with reading(self.file):
+                self._summary = self._read_summary()
+        except CutShortError:
+            if not unfinished:
+                raise
+            self._unfinished = Unfinished(self.file)
+            self._summary = self._unfinished.summary
+            self.grow()
+        self._read_topics()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the file was whole when it was opened."""
+        return self._unfinished is None
+
+    def grow(self) -> bool:
+        """Read on in a file that was not finished when it was opened; return whether there is more.
+
+        Raises RecordingError if it is damaged.
+        """
+        if self._unfinished is None:
+            return False
+        with reading(self.file):
+            more = self._unfinished.grow()
+        if more:
+            self.grown += 1
+            self._read_topics()
+        return more
+
+    def _read_topics(self) -> None:
         for channel in self._summary.channels.values():
             if channel.message_encoding != "cdr":
                 raise RecordingError(
@@ -147,7 +182,9 @@ class Bag:
     def counts(self) -> dict[str, int]:
         """Number of messages of each topic."""
         statistics = self._summary.statistics
-        counts = {} if statistics is None else statistics.channel_message_counts
+        counts = Counter({} if statistics is None else statistics.channel_message_counts)
+        for index in () if self.finished else self.chunks[-1:]:
+            counts.update(one.channel for one in located_messages(self.chunk(index)))
         return {channel.topic: counts.get(channel.id, 0) for channel in self._summary.channels.values()}
 
     @property
@@ -159,11 +196,17 @@ class Bag:
     @cached_property
     def attachments(self) -> dict[str, bytes]:
         """The attachments by name."""
+        found: dict[str, bytes] = {}
         with reading(self.file), self.file.open("rb") as stream:
-            return {
-                a.name: a.data
-                for a in SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).iter_attachments()
-            }
+            for index in self._summary.attachment_indexes:
+                stream.seek(index.offset)
+                record = next(
+                    StreamReader(stream, skip_magic=True, record_size_limit=MAX_RECORD_BYTES).records
+                )
+                if not isinstance(record, Attachment):
+                    raise ValueError(f"there is no attachment at {index.offset}")
+                found[record.name] = record.data
+        return found
 
     def messages(self, *topics: str) -> Iterator[BagMessage]:
         """Yield the messages of `topics`, or all, in the order in which they were written.

@@ -27,12 +27,13 @@ class Member:
 def family(places: Iterable[Path]) -> Iterator[Member]:
     """Yield the recordings in and below `places`, each followed by its forks, the earliest fork first.
 
-    What is no recording of a session is passed over. A fork whose parent is not there stands by itself.
+    Of one that is being written, or was cut short, there is what is whole. What is no recording of a session is
+    passed over. A fork whose parent is not there stands by itself.
     """
     found: dict[str, tuple[Recording, ForkOrigin | None]] = {}
     for file in sorted({file for place in places for file in _files(place)}):
         try:
-            recording = Recording(file)
+            recording = Recording(file, unfinished=True)
             first = next(recording.grants(), None)
             if first is not None:
                 found[f"{first.run:x}"] = recording, fork_origin(recording)

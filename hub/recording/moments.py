@@ -7,7 +7,6 @@ holds; the message index behind a chunk, where those of one channel are (https:/
 from __future__ import annotations
 
 from collections import OrderedDict
-from functools import cached_property
 from threading import Lock
 from typing import NamedTuple
 
@@ -36,16 +35,16 @@ class _Chunks(NamedTuple):
 
 
 class Moments:
-    """Looks messages up by time; may be used from several threads."""
+    """Looks messages up by time; may be used from several threads, also while the bag grows."""
 
     def __init__(self, bag: Bag) -> None:
-        self._bag = bag
+        self._bag, self._grown = bag, bag.grown
         self._lock = Lock()
         self._chunks: dict[str, _Chunks] = {}
         self._records: OrderedDict[int, bytes] = OrderedDict()
         self._times: OrderedDict[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]] = OrderedDict()
 
-    @cached_property
+    @property
     def span_ns(self) -> tuple[int, int]:
         """Times of the first and the last message; (0, 0) if there is none."""
         found = self._bag.chunks
@@ -83,6 +82,8 @@ class Moments:
             return BagMessage(topic, self._bag.topics[topic], best[0], payload)
 
     def _of(self, topic: str) -> _Chunks:
+        if self._grown != self._bag.grown:
+            self._grown, self._chunks = self._bag.grown, {}
         if topic not in self._chunks:
             indexes = sorted(
                 self._bag.chunks_with(topic), key=lambda one: (one.message_start_time, one.chunk_start_offset)
