@@ -26,7 +26,7 @@ export class Link {
   }
 
   open() {
-    this.socket = new WebSocket(`ws://${location.host}/page`)
+    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/page`) // https: wss
     this.socket.binaryType = "arraybuffer"
     this.socket.onopen = () => this.handlers.opened()
     this.socket.onmessage = ({ data }) => {
