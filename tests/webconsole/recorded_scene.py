@@ -1,15 +1,17 @@
 """A recording with a robot that moves and an organ that gives, made of formulas: no engine has stepped."""
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from hub.planning.scenario_file import load
 from hub.recording.recorder import Recorder
 from hub.session.launch import plan_of
 from schemas.codec import encode
 from schemas.keys import Keys, topic
-from schemas.ros import Header, Time
+from schemas.ros import CompressedImage, Header, Time
 from schemas.trocar_msgs import SessionStatus, SoftBodyState
 from schemas.vectors import VectorCodec
 
@@ -23,9 +25,15 @@ TRIANGLES = np.array(
     np.uint32,
 )
 
+EYES = {"left": (200, 40, 90), "right": (30, 150, 220)}
+"""Colour (red, green, blue) of the picture of each eye."""
+
 
 def write_scene(directory: Path, steps: int = 60) -> None:
-    """Record `palpation` with an arm that goes down by 1 mm a step from the fifth, and a top that follows."""
+    """Record `palpation` with an arm that goes down by 1 mm a step from the fifth, and a top that follows.
+
+    An endoscope has published one picture of each eye.
+    """
     file = load("palpation", [])
     plan, _ = plan_of(file.scenario, file.params)
     robot, tissue, keys = plan.participants["robot"], plan.participants["tissue"], Keys("palpation")
@@ -43,6 +51,12 @@ def write_scene(directory: Path, steps: int = 60) -> None:
                 ("tissue.block/nodes", SoftBodyState.ros_type),
             )
         }
+        for eye, colour in EYES.items():
+            image = recorder.channel(
+                topic(keys.output("engine", "endoscope", f"{eye}/image_raw/compressed")),
+                CompressedImage.ros_type,
+            )
+            recorder.write(image, 0, encode(_picture(colour)))
         status = recorder.channel(topic(keys.status), SessionStatus.ros_type)
         for step in range(steps):
             at, depth = step * STEP_NS, 0.001 * max(step - 5, 0)
@@ -70,3 +84,9 @@ def write_scene(directory: Path, steps: int = 60) -> None:
             dropped_messages=0,
         )
         recorder.write(status, steps * STEP_NS, encode(end))
+
+
+def _picture(colour: tuple[int, int, int]) -> CompressedImage:
+    png = BytesIO()
+    Image.new("RGB", (32, 24), colour).save(png, "png")
+    return CompressedImage(header={}, format="png", data=np.frombuffer(png.getvalue(), np.uint8))

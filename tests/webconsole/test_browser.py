@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from tests.webconsole.conftest import served, until
-from tests.webconsole.recorded_scene import write_scene
+from tests.webconsole.recorded_scene import EYES, write_scene
 from webconsole.recorded import Recorded
 
 pytestmark = pytest.mark.xdist_group("all cores")
@@ -114,6 +114,19 @@ def test_a_recording_is_shown(person, served_scene):
     }
     assert one.errors == []
     assert one.page.evaluate(NAMELESS) == []
+
+
+def test_both_eyes_are_one_picture_for_red_and_cyan_glasses(person):
+    one = person()
+    one.page.get_by_role("img", name="Picture of endoscope.right").wait_for()
+    one.page.get_by_label("How both eyes are shown").select_option("red and cyan")
+    both = one.page.get_by_role("img", name="red and cyan glasses")
+    both.wait_for()
+    pixel = "e => [...e.getContext('2d').getImageData(e.width - 1, e.height - 1, 1, 1).data]"
+    red, green, blue = EYES["left"][0], *EYES["right"][1:]
+    until(lambda: both.evaluate(pixel) == [red, green, blue, 255])
+    assert not one.page.get_by_role("img", name="Picture of endoscope.left").is_visible()
+    assert one.errors == []
 
 
 def test_the_instant_is_in_the_link(person):

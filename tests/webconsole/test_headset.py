@@ -59,6 +59,7 @@ def test_a_head_and_two_hands_lead_while_they_are_held(person, room):
     assert not head.dead_man
     assert not right.dead_man
     assert len(right.tracked) == 7
+    assert person.page.evaluate("trocar.headset.theatre.screens.every(({ visible }) => visible)"), "both eyes"
 
     person.page.evaluate("headset.controllers.right.updateButtonValue('squeeze', 1)")
     person.page.evaluate("headset.controllers.right.updateButtonValue('trigger', 1)")

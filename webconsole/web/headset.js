@@ -9,7 +9,7 @@ const PERIOD_MS = 15
 const ROLES = { head: "Head", left: "Left hand", right: "Right hand" }
 
 export class Headset {
-  // `page`: what is shown: scene(), eyes() by index, frames() which applies what has arrived, said(text).
+  // `page`: what is shown: scene(), eyes(), frames() which applies what has arrived, said(text).
   constructor(panel, link, page) {
     Object.assign(this, { panel, link, page })
     this.session = null
@@ -74,7 +74,7 @@ export class Headset {
 
   frame(now, frame) {
     this.page.frames()
-    this.theatre.draw([...this.page.eyes().values()])
+    this.theatre.draw(this.page.eyes())
     if (frame && this.session?.visibilityState === "visible" && now - this.sent >= PERIOD_MS) {
       this.sent = now
       this.lead(frame)

@@ -1,6 +1,7 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
 import { ARROWS, Link, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { Eyes } from "./eyes.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
@@ -14,7 +15,6 @@ const $ = (id) => document.getElementById(id)
 const REFRESH_MS = 100, STILL_MS = 400
 
 let scene = null, session = null, waiting = [], drawn = 0, dirty = true, refreshed = 0
-const eyes = new Map()
 
 const link = new Link({
   opened() { head.banner("") },
@@ -46,9 +46,11 @@ const link = new Link({
 let lastTime = 0
 const head = new Head(link)
 const pilot = new Pilot($("lead"), link)
-const headset = new Headset($("headset"), link, { scene: () => scene, eyes: () => eyes, frames: takeFrames,
+const headset = new Headset($("headset"), link, { scene: () => scene, eyes: () => eyes.all, frames: takeFrames,
   said: (text) => log.add([{ time: lastTime, level: "warn", source: "headset", text }]) })
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
+const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
+  () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
 const forks = new Forks(link, timeline)
 timeline.found = (events) => log.add(events, true)
@@ -68,7 +70,7 @@ async function begin(described) {
   log.clear()
   for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
   if (!described.numbers) return
-  showEyes(described.pictures)
+  eyes.begin(described.pictures)
   plots.begin(described.numbers, described.kind === "recording")
   await stage(described)
   ask(true)
@@ -115,43 +117,11 @@ function showCameras() {
   $("cameras").replaceChildren(...buttons)
 }
 
-function showEyes(names) {
-  eyes.clear()
-  $("eyes").hidden = !names.length
-  const figures = names.map((name, index) => {
-    const figure = document.createElement("figure"), canvas = document.createElement("canvas")
-    const caption = document.createElement("figcaption")
-    caption.textContent = name.replace("/image_raw/compressed", "")
-    canvas.setAttribute("role", "img")
-    canvas.setAttribute("aria-label", `Picture of ${caption.textContent}`)
-    figure.append(canvas, caption)
-    eyes.set(index, { name, canvas, busy: false, next: null, drawn: 0 })
-    return figure
-  })
-  $("pictures-row").replaceChildren(...figures)
-}
-
-async function showPicture(eye, bytes) {
-  if (eye.busy) { eye.next = bytes; return }
-  eye.busy = true
-  try {
-    const picture = await createImageBitmap(new Blob([bytes]))
-    Object.assign(eye.canvas, { width: picture.width, height: picture.height })
-    eye.canvas.getContext("2d").drawImage(picture, 0, 0)
-    picture.close()
-    eye.drawn++
-  } catch { log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]) }
-  eye.busy = false
-  const next = eye.next
-  eye.next = null
-  if (next) showPicture(eye, next)
-}
-
 function apply(frame) {
   lastTime = frame.time
   for (const { kind, index, at, size } of frame.sections) {
     if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
-    else if (kind === PICTURE) { if (eyes.has(index)) showPicture(eyes.get(index), new Uint8Array(frame.buffer, at, size)) }
+    else if (kind === PICTURE) eyes.take(index, new Uint8Array(frame.buffer, at, size))
     else if (!scene) continue
     else if (kind === POSES) scene.poses(index, new Float32Array(frame.buffer, at, size / 4))
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
