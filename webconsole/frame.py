@@ -41,6 +41,8 @@ class SectionKind(IntEnum):
     """f64 (1 + size): time (s) and value of a numeric port."""
     ARROWS = 6
     """f32 (n, 6): point and force (N) of each arrow of a bond."""
+    MARKERS = 7
+    """All markers of one participant: `webconsole/markers.py`."""
 
 
 class Section(NamedTuple):

@@ -5,8 +5,11 @@ import re
 import signal
 import subprocess
 import sys
+from io import BytesIO
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from tests.webconsole.conftest import served, until
 from tests.webconsole.recorded_scene import EYES, write_scene
@@ -126,6 +129,43 @@ def test_both_eyes_are_one_picture_for_red_and_cyan_glasses(person):
     red, green, blue = EYES["left"][0], *EYES["right"][1:]
     until(lambda: both.evaluate(pixel) == [red, green, blue, 255])
     assert not one.page.get_by_role("img", name="Picture of endoscope.left").is_visible()
+    assert one.errors == []
+
+
+MARKED = """
+shape => {
+  const box = trocar.scene.robotBox().makeEmpty()
+  for (const one of trocar.scene.markers.shown[0]) if (one.geometry.type === shape) box.expandByObject(one)
+  return [box.min.toArray(), box.max.toArray()]
+}
+"""
+
+
+def pink(picture):
+    """Return how many pixels have about the colour of the markers."""
+    red, green, blue = np.moveaxis(np.asarray(Image.open(BytesIO(picture)).convert("RGB"), int), 2, 0)
+    return int(((red > 100) & (blue > 100) & (green < 0.4 * red)).sum())
+
+
+def test_markers_are_in_the_scene_and_words_of_the_camera_on_the_page(person):
+    one = person()
+    one.sees("Boolean(trocar.scene?.placed && trocar.scene.surfaces[0]?.mesh)")
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.1")
+    one.page.get_by_text("Insert the needle").wait_for()
+    kinds = one.page.evaluate(
+        "trocar.scene.markers.shown[0].map(({ geometry, type }) => geometry.type + type)"
+    )
+    assert {"ConeGeometryMesh", "CylinderGeometryMesh", "BufferGeometryMesh", "BufferGeometrySprite"} < {
+        *kinds
+    }
+    low, high = one.page.evaluate(MARKED, "SphereGeometry")  # SPHERE and, behind it and above, SPHERE_LIST
+    assert low == pytest.approx([0.0435, -0.0225, -0.0025])
+    assert high == pytest.approx([0.060, -0.0175, 0.014])
+    assert pink(one.picture()) > 3000
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.8")
+    one.sees("trocar.scene.markers.shown[0].length === 0")
+    assert not one.page.locator("#notice").is_visible()
+    assert pink(one.picture()) == 0
     assert one.errors == []
 
 

@@ -1,10 +1,11 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, Link, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, Link, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
 import { Eyes } from "./eyes.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
+import { Notices, markersOf } from "./notices.js"
 import { Plots } from "./plots.js"
 import { Pilot } from "./pilot.js"
 import { Timeline } from "./timeline.js"
@@ -51,6 +52,7 @@ const headset = new Headset($("headset"), link, { scene: () => scene, eyes: () =
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
 const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
   () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
+const notices = new Notices($("notice"))
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
 const forks = new Forks(link, timeline)
 timeline.found = (events) => log.add(events, true)
@@ -71,6 +73,7 @@ async function begin(described) {
   for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
   if (!described.numbers) return
   eyes.begin(described.pictures)
+  notices.clear()
   plots.begin(described.numbers, described.kind === "recording")
   await stage(described)
   ask(true)
@@ -122,7 +125,10 @@ function apply(frame) {
   for (const { kind, index, at, size } of frame.sections) {
     if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
     else if (kind === PICTURE) eyes.take(index, new Uint8Array(frame.buffer, at, size))
-    else if (!scene) continue
+    else if (kind === MARKERS) {
+      const markers = notices.take(index, markersOf(frame.buffer, at))
+      scene?.marked(index, markers)
+    } else if (!scene) continue
     else if (kind === POSES) scene.poses(index, new Float32Array(frame.buffer, at, size / 4))
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
     else if (kind === ARROWS) scene.arrows(index, new Float32Array(frame.buffer, at, size / 4))
