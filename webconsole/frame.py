@@ -43,6 +43,8 @@ class SectionKind(IntEnum):
     """f32 (n, 6): point and force (N) of each arrow of a bond."""
     MARKERS = 7
     """All markers of one participant: `webconsole/markers.py`."""
+    FELT = 8
+    """f32: norm of the force (N) that the hand at a device may feel."""
 
 
 class Section(NamedTuple):

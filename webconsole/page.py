@@ -259,6 +259,10 @@ class Page:
             place, force = self._newest(bond.place), self._newest(bond.force)
             if place and force and self._are_new({bond.place: place, bond.force: force}, "arrows "):
                 yield stage.arrow(bond, place, force)
+        for device, wrenches in stage.felt.items():
+            values = {name: value for name in wrenches if (value := self._newest(name))}
+            if values and self._are_new(values, "felt "):
+                yield stage.force(device, values)
         for name in stage.markers:
             value = self._newest(name)
             if value is not None and not self._is_shown(name, value):

@@ -20,6 +20,7 @@ from schemas.scenario import Scenario
 from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
+from webconsole.felt import felt_wrenches
 from webconsole.frame import Section, SectionKind
 from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
@@ -71,8 +72,11 @@ class Stage:
             if f"{participant}.{port}" in self.numbers
         }
         self.arrows = bond_arrows(scenario, self.numbers)
+        self.felt = felt_wrenches(scenario, self.numbers)
+        """By device that pages lead: the wrenches on the instruments that it moves."""
+        of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
-        self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows))
+        self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands))
         """The outlets that the scene itself needs."""
 
     def _scene(self, participant: str, kind: str, params: Mapping[str, Any]) -> Scene | None:
@@ -140,12 +144,19 @@ class Stage:
         rows = bond.rows(*vectors)
         return Section(SectionKind.ARROWS, self.arrows.index(bond), rows.astype("<f4").tobytes())
 
+    def force(self, device: str, values: Mapping[str, Value]) -> Section:
+        """Return the force on the instruments that a device moves; raises MessageError if it is not valid."""
+        forces = [self.numbers[name].decode(value.payload)[:3] for name, value in values.items()]
+        norm = np.linalg.norm(np.sum(forces, axis=0))
+        return Section(SectionKind.FELT, [*self.felt].index(device), norm.astype("<f4").tobytes())
+
     def describe(self) -> dict[str, Any]:
         """Return what a page must know before its first frame, ready for JSON."""
         return {
             "scenes": [*self.scenes],
             "surfaces": [{"name": name, "colour": rgb} for name, rgb in self.surfaces.items()],
             "pictures": list(self.pictures),
+            "felt": list(self.felt),
             "numbers": [
                 {
                     "name": name,

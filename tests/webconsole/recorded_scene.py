@@ -12,6 +12,7 @@ from hub.session.launch import plan_of
 from schemas.codec import encode
 from schemas.keys import Keys, topic
 from schemas.ros import CompressedImage, Header, Time
+from schemas.scenario import Connection, ParticipantSpec
 from schemas.trocar_msgs import SessionStatus, ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec
 from schemas.visualization import MarkerType
@@ -46,14 +47,19 @@ SIZES = {
 def write_scene(directory: Path, steps: int = 60) -> None:
     """Record `palpation` with an arm that goes down by 1 mm a step from the fifth, and a top that follows.
 
-    An endoscope has published one picture of each eye. Markers of every type are shown for the first half.
+    A page leads the arm, and the force of the block is on its instrument. An endoscope has published one
+    picture of each eye. Markers of every type are shown for the first half.
     """
     file = load("palpation", [])
     plan, _ = plan_of(file.scenario, file.params)
     robot, tissue, keys = plan.participants["robot"], plan.participants["tissue"], Keys("palpation")
-    qpos, wrench = (VectorCodec(one.port(name)) for one, name in ((robot, "qpos"), (tissue, "probe/wrench")))
+    qpos, tip = (VectorCodec(robot.port(name)) for name in ("qpos", "PSM1/tip_wrench"))
+    wrench = VectorCodec(tissue.port("probe/wrench"))
+    led = file.scenario.participants | {"hand": ParticipantSpec(kind="browser", host="remote")}
+    connections = [*file.scenario.connections, Connection.model_validate("hand.pose -> teleop.master")]
+    scenario = file.scenario.model_copy(update={"participants": led, "connections": connections})
     attachments = {
-        "scenario.json": file.scenario.model_dump_json().encode(),
+        "scenario.json": scenario.model_dump_json().encode(),
         "plan.json": plan.model_dump_json().encode(),
     }
     with Recorder(directory, attachments=attachments) as recorder:
@@ -61,6 +67,7 @@ def write_scene(directory: Path, steps: int = 60) -> None:
             name: recorder.channel(topic(keys.output("engine", *name.split(".", 1))), type_)
             for name, type_ in (
                 ("robot.qpos", qpos.port.type),
+                ("robot.PSM1/tip_wrench", tip.port.type),
                 ("tissue.probe/wrench", wrench.port.type),
                 ("tissue.block/nodes", SoftBodyState.ros_type),
             )
@@ -82,6 +89,7 @@ def write_scene(directory: Path, steps: int = 60) -> None:
             recorder.write(channels["robot.qpos"], at, qpos.encode(positions, at))
             force = np.array([0, 0, 50 * depth, 0, 0, 0])
             recorder.write(channels["tissue.probe/wrench"], at, wrench.encode(force, at))
+            recorder.write(channels["robot.PSM1/tip_wrench"], at, tip.encode(force, at))
             nodes = CUBE - np.array([0, 0, depth], np.float32) * (CUBE[:, 2:] >= 0)
             state = SoftBodyState(
                 header=Header(stamp=Time.from_ns(at), frame_id="world"),

@@ -3,7 +3,7 @@
 
 const MAGIC = 0x46435254 // "TRCF", little-endian
 const HEAD = 24
-export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7
+export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)

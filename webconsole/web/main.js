@@ -1,7 +1,8 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, Link, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, FELT, Link, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
 import { Eyes } from "./eyes.js"
+import { Feel } from "./feel.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
@@ -46,8 +47,9 @@ const link = new Link({
 })
 let lastTime = 0
 const head = new Head(link)
-const pilot = new Pilot($("lead"), link)
-const headset = new Headset($("headset"), link, { scene: () => scene, eyes: () => eyes.all, frames: takeFrames,
+const feel = new Feel()
+const pilot = new Pilot($("lead"), link, feel)
+const headset = new Headset($("headset"), link, feel, { scene: () => scene, eyes: () => eyes.all, frames: takeFrames,
   said: (text) => log.add([{ time: lastTime, level: "warn", source: "headset", text }]) })
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
 const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
@@ -125,6 +127,7 @@ function apply(frame) {
   for (const { kind, index, at, size } of frame.sections) {
     if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
     else if (kind === PICTURE) eyes.take(index, new Uint8Array(frame.buffer, at, size))
+    else if (kind === FELT) feel.take(session.felt[index], new Float32Array(frame.buffer, at, 1)[0])
     else if (kind === MARKERS) {
       const markers = notices.take(index, markersOf(frame.buffer, at))
       scene?.marked(index, markers)
