@@ -40,8 +40,16 @@ export class Link {
     }
     this.socket.onclose = () => {
       this.handlers.closed()
+      this.look()
       setTimeout(() => this.open(), 1000)
     }
+  }
+
+  // A socket does not say why it was refused: another server, started since, knows no cookie of before.
+  look() {
+    fetch("/", { method: "HEAD", cache: "no-store" })
+      .then(({ status }) => { if (status === 403) this.handlers.refused() })
+      .catch(() => {}) // it does not answer, as the page says already
   }
 
   get ready() { return this.socket.readyState === WebSocket.OPEN }

@@ -26,6 +26,7 @@ const link = new Link({
     head.banner("The server of this page does not answer. The page comes back by itself.")
     waiting = []
   },
+  refused() { head.banner("This page's server was started again. Open the link that it has printed.") },
   frame(frame) { waiting.push(frame); dirty = true },
   session: begin,
   state(state) {
