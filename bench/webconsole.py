@@ -48,9 +48,10 @@ from schemas.trocar_msgs import SoftBodyState
 from schemas.vectors import VectorCodec
 from webconsole.console import Console
 from webconsole.frame import sections
+from webconsole.listening import on_loopback
 from webconsole.live import Live
 from webconsole.pilot import Pilots
-from webconsole.server import Server, free_socket
+from webconsole.server import Server
 from webconsole.source import Outlet, Value
 
 NODES, PICTURE_BYTES = 1024, 14_000
@@ -120,7 +121,7 @@ class Fed:
 def serve() -> None:
     """Serve the fed source in this process; say where, and at each line that comes the processor time."""
     source = Fed()
-    server = Server(Console(source, Pilots()), free_socket(0))  # pyright: ignore[reportArgumentType]
+    server = Server(Console(source, Pilots()), on_loopback(0))  # pyright: ignore[reportArgumentType]
     thread = threading.Thread(target=server.run)
     thread.start()
     while not sys.stdin.closed and (asked := sys.stdin.readline()):

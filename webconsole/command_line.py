@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from schemas.errors import MissingExtraError
+from hub.command_line.options import Certificates
+from schemas.errors import MissingExtraError, ScenarioError
 
 __all__ = ["app"]
 
@@ -34,6 +35,14 @@ def view(
     port: Annotated[
         int | None, typer.Option(help="Where the page is, on loopback; default: 8470 or the next free one.")
     ] = None,
+    listen: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="Where other machines reach the page, such as tls/0.0.0.0:8470; default: loopback alone.",
+        ),
+    ] = None,
+    certs: Certificates = None,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
     read_only: Annotated[
         bool, typer.Option("--read-only", help="The link is that of a viewer, who steers and leads nothing.")
@@ -47,6 +56,8 @@ def view(
     for package in ("starlette", "uvicorn", "websockets"):
         if find_spec(package) is None:
             raise MissingExtraError("trocar view", "web", package)
+    if listen is not None and port is not None:
+        raise ScenarioError("--port is on loopback, and the endpoint after --listen has a port of its own")
     from webconsole.serve import serve
 
     serve(
@@ -54,6 +65,8 @@ def view(
         endpoint=connect,
         session=session,
         port=port,
+        listen=listen,
+        certificates=certs,
         browse=open_,
         role="viewer" if read_only else "operator",
         parent=with_parent,

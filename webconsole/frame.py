@@ -41,6 +41,10 @@ class SectionKind(IntEnum):
     """f64 (1 + size): time (s) and value of a numeric port."""
     ARROWS = 6
     """f32 (n, 6): point and force (N) of each arrow of a bond."""
+    MARKERS = 7
+    """All markers of one participant: `webconsole/markers.py`."""
+    FELT = 8
+    """f32: norm of the force (N) that the hand at a device may feel."""
 
 
 class Section(NamedTuple):

@@ -1,18 +1,19 @@
 """Who may open the page: the holder of a one-time link, by a cookie from then on.
 
 Any website that is open in the same browser can send requests to this machine, and any name can be made to
-point to it. So the Host must be this server's own name, the Origin its own page, and the cookie its own.
+point to it. So the Host must be this server's own name, the Origin its own page, and the cookie its own. The
+same holds for other machines, which reach it by TLS alone.
 """
 
 from __future__ import annotations
 
 import logging
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from http.cookies import CookieError, SimpleCookie
 from time import monotonic_ns
 from typing import Literal
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
@@ -47,12 +48,18 @@ class Gate:
     """Lets requests through to `app` that come from this server's own page in a browser that was let in.
 
     What passes has `role` in its scope's state.
+
+    Args:
+        app: The page.
+        origins: By which browsers may name it, such as `http://127.0.0.1:8470`; all with the same scheme.
     """
 
-    def __init__(self, app: ASGIApp, port: int) -> None:
-        self._app = app
-        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
-        self._cookie = f"trocar_{port}"  # cookies do not know ports
+    def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:
+        self._app, self._origins = app, frozenset(origins)
+        self._hosts = {origin.partition("//")[2] for origin in origins}
+        self._secure = origins[0].startswith("https:")
+        # cookies do not know ports; one with __Host- is of this very host, by TLS (RFC 6265bis, 4.1.3.2)
+        self._cookie = f"{'__Host-' if self._secure else ''}trocar_{urlsplit(origins[0]).port or ''}"
         self._invited: dict[str, Role] = {}
         self._in: dict[str, Role] = {}
         self._log = TokenBucket(_LOGGED_PER_S)
@@ -98,7 +105,7 @@ class Gate:
         origin = headers.get("origin")
         if origin is None and scope["type"] == "websocket":
             return "no origin: this is for the page alone"
-        if origin is not None and origin not in {f"http://{own}" for own in self._hosts}:
+        if origin is not None and origin not in self._origins:
             return f"origin {origin[:80]!r} is another website"
         if scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
             return f"method {scope['method']:.10} is not used here"
@@ -127,7 +134,7 @@ class Gate:
         cookie = secrets.token_urlsafe(_TOKEN_BYTES)
         self._in[cookie] = role
         answer = RedirectResponse("/", status_code=303, headers=_HEADERS)
-        answer.set_cookie(self._cookie, cookie, httponly=True, samesite="strict")
+        answer.set_cookie(self._cookie, cookie, httponly=True, samesite="strict", secure=self._secure)
         await answer(scope, receive, send)
 
     async def _refuse(self, why: str, scope: Scope, receive: Receive, send: Send) -> None:

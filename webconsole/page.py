@@ -259,6 +259,14 @@ class Page:
             place, force = self._newest(bond.place), self._newest(bond.force)
             if place and force and self._are_new({bond.place: place, bond.force: force}, "arrows "):
                 yield stage.arrow(bond, place, force)
+        for device, wrenches in stage.felt.items():
+            values = {name: value for name in wrenches if (value := self._newest(name))}
+            if values and self._are_new(values, "felt "):
+                yield stage.force(device, values)
+        for name in stage.markers:
+            value = self._newest(name)
+            if value is not None and not self._is_shown(name, value):
+                yield self._console.section(stage, name, value)
         for name in stage.pictures if self._show.pictures else ():
             yield from self._changed_section(stage, name)
         for index, name in enumerate(self._show.numbers):
@@ -270,6 +278,14 @@ class Page:
         value = self._newest(name)
         if value is not None and self._are_new({name: value}):
             yield self._console.section(stage, name, value)
+
+    def _is_shown(self, name: str, value: Value) -> bool:
+        """Return whether the last value said the same, and take this one as sent.
+
+        Markers are published again and again, and change seldom.
+        """
+        before, self._sent[name] = self._sent.get(name), value
+        return before is not None and before.payload == value.payload
 
     def _newest(self, name: str) -> Value | None:
         return self._console.source.newest(name, self._at_ns)

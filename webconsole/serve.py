@@ -15,10 +15,11 @@ from schemas.errors import CutShortError
 from webconsole.console import Console
 from webconsole.gate import Role
 from webconsole.hosted import HostedDevices
+from webconsole.listening import Listening, fingerprint, on_loopback, with_tls
 from webconsole.live import Live
 from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
-from webconsole.server import Server, free_socket
+from webconsole.server import Server
 
 __all__ = ["opened_recording", "serve"]
 
@@ -31,6 +32,8 @@ def serve(
     endpoint: str | None = None,
     session: str | None = None,
     port: int | None = None,
+    listen: str | None = None,
+    certificates: Path | None = None,
     browse: bool = True,
     role: Role = "operator",
     parent: int | None = None,
@@ -42,17 +45,22 @@ def serve(
         endpoint: Where its hub listens; None: any hub of this user on this machine.
         session: The name of the session; None: the first that is found.
         port: On loopback; None: a free one.
+        listen: Where to listen to other machines, such as tls/0.0.0.0:8470; None: on loopback alone.
+        certificates: For that, the hub's certificate or its directory; None: the directory of this user.
         browse: Open the page in a browser.
         role: What the holder of the printed link may do.
         parent: The process of the hub, with which this one ends.
 
-    Raises RecordingError if there is no such recording, ConnectError if no port is free.
+    Raises RecordingError if there is no such recording, ConnectError if no port is free or a certificate is
+    missing, ScenarioError if `listen` is no endpoint of TLS.
     """
     if parent is not None:
         end_with_parent(parent)
     with ExitStack() as stack:
+        listening = on_loopback(port) if listen is None else with_tls(listen, certificates)
+        stack.enter_context(listening.socket)
         source = Live(endpoint, session, parent) if recording is None else opened_recording(recording, stack)
-        _serve(source, port, role, browse=browse)
+        _serve(source, listening, role, browse=browse)
 
 
 def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
@@ -66,18 +74,23 @@ def opened_recording(recording: Path, stack: ExitStack) -> Recorded:
         return Recorded(whole)
 
 
-def _serve(source: Live | Recorded, port: int | None, role: Role, *, browse: bool) -> None:
+def _serve(source: Live | Recorded, listening: Listening, role: Role, *, browse: bool) -> None:
     pilots = Pilots()
-    listening = free_socket(port)
     server = Server(Console(source, pilots), listening)
-    link = f"http://127.0.0.1:{server.port}{server.gate.invite(role)}"
+    link = f"{listening.origins[0]}{server.gate.invite(role)}"
     hosted = HostedDevices(pilots)
     if isinstance(source, Live):
         source.joined = hosted.join
         source.start()
 
     def started() -> None:
-        terminal.print(f"the page is at {link}", markup=False, soft_wrap=True)
+        _say(f"the page is at {link}")
+        if listening.certificate is not None:
+            authority = listening.certificate.with_name("ca.pem")
+            _say(
+                f"a browser warns unless it knows {authority}; go on only if it shows this SHA-256:"
+                f" {fingerprint(listening.certificate)}"
+            )
         if browse:
             webbrowser.open(link)
 
@@ -85,3 +98,7 @@ def _serve(source: Live | Recorded, port: int | None, role: Role, *, browse: boo
         server.run(started)
     finally:
         hosted.close()
+
+
+def _say(text: str) -> None:
+    terminal.print(text, markup=False, highlight=False, soft_wrap=True)

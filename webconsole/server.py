@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import gzip
-import logging
-import socket
 from collections.abc import Callable
 from math import isfinite
 
@@ -17,54 +15,28 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from hub.recording.recording import Recording
-from schemas.errors import ConnectError, TrocarError
+from schemas.errors import TrocarError
 from webconsole.assets import asset, compressed
 from webconsole.commands import MOST_BYTES
 from webconsole.console import Console
 from webconsole.fork import fork_form, tree_of
 from webconsole.gate import Gate
+from webconsole.listening import Listening
 from webconsole.page import Page
 
-__all__ = ["Server", "free_socket"]
+__all__ = ["Server"]
 
-log = logging.getLogger(__name__)
-
-FIRST_PORT, _PORTS = 8470, 32
 _MOST_PAGES = 16
 _MOST_BUCKETS = 4000
 _BINARY = "application/octet-stream"
 
 
-def free_socket(port: int | None = None) -> socket.socket:
-    """Return a socket that listens on loopback at `port`, by default at 8470 or the next free one.
-
-    Raises ConnectError if there is none.
-    """
-    tried = range(FIRST_PORT, FIRST_PORT + _PORTS) if port is None else (port,)
-    for number in tried:
-        found = socket.socket()
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            found.bind(("127.0.0.1", number))
-            found.listen()
-        except OSError as error:
-            found.close()
-            log.debug("port %d: %s", number, error)
-            continue
-        if port is None and number != FIRST_PORT:
-            log.info("port %d is taken: the page is at %d", FIRST_PORT, number)
-        return found
-    raise ConnectError(
-        f"the page finds no free port: {', '.join(map(str, tried))} are taken; name another one with --port"
-    )
-
-
 class Server:
-    """Serves the pages of one console on a socket."""
+    """Serves the pages of one console."""
 
-    def __init__(self, console: Console, listening: socket.socket) -> None:
-        self._console, self._socket = console, listening
-        self.port: int = listening.getsockname()[1]
+    def __init__(self, console: Console, listening: Listening) -> None:
+        self._console, self._socket = console, listening.socket
+        self.port = listening.port
         self._pages = 0
         app = Starlette(
             routes=[
@@ -79,7 +51,7 @@ class Server:
                 WebSocketRoute("/page", self._page),
             ]
         )
-        self.gate = Gate(app, self.port)
+        self.gate = Gate(app, listening.origins)
         self._uvicorn = uvicorn.Server(
             uvicorn.Config(
                 self.gate,
@@ -93,6 +65,7 @@ class Server:
                 ws_ping_timeout=20.0,
                 timeout_graceful_shutdown=1,
                 server_header=False,
+                ssl_certfile=listening.certificate,
             )
         )
 

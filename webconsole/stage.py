@@ -1,4 +1,4 @@
-"""What of a session can be drawn: the scenes of its participants, soft surfaces, pictures, numeric ports."""
+"""What of a session can be drawn: scenes of its participants, soft surfaces, markers, pictures, numbers."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from hub.participant.view import Rgb, Scene
 from schemas.codec import decode
 from schemas.ros import CompressedImage
 from schemas.scenario import Scenario
-from schemas.trocar_msgs import SoftBodyState
+from schemas.trocar_msgs import ShownMarkers, SoftBodyState
 from schemas.vectors import VectorCodec, has_vector
 from webconsole.arrows import BondArrows, bond_arrows
+from webconsole.felt import felt_wrenches
 from webconsole.frame import Section, SectionKind
+from webconsole.markers import marker_content
 from webconsole.source import Outlet, Value
 
 __all__ = ["GROUP", "Stage"]
@@ -59,6 +61,7 @@ class Stage:
             if one.port.type == SoftBodyState.ros_type
         }
         """Colour of each soft surface, by the outlet of its nodes."""
+        self.markers = tuple(one.name for one in outlets if one.port.type == ShownMarkers.ros_type)
         self.pictures = tuple(one.name for one in outlets if one.port.type == CompressedImage.ros_type)
         self.numbers = {one.name: VectorCodec(one.port) for one in signals if has_vector(one.port.type)}
         """The numeric outlets."""
@@ -69,8 +72,11 @@ class Stage:
             if f"{participant}.{port}" in self.numbers
         }
         self.arrows = bond_arrows(scenario, self.numbers)
+        self.felt = felt_wrenches(scenario, self.numbers)
+        """By device that pages lead: the wrenches on the instruments that it moves."""
+        of_hands = (name for names in self.felt.values() for name in names)
         of_arrows = (name for bond in self.arrows for name in bond)
-        self.shown = frozenset((*self._codecs, *self.surfaces, *of_arrows))
+        self.shown = frozenset((*self._codecs, *self.surfaces, *self.markers, *of_arrows, *of_hands))
         """The outlets that the scene itself needs."""
 
     def _scene(self, participant: str, kind: str, params: Mapping[str, Any]) -> Scene | None:
@@ -105,10 +111,13 @@ class Stage:
         return tuple(f"{participant}.{port}" for port in self.scenes[participant].inputs)
 
     def section(self, name: str, value: Value) -> Section:
-        """Return what a frame has of an outlet that is a surface or a picture."""
+        """Return what a frame has of an outlet that is a surface, markers or a picture."""
         if name in self.surfaces:
             nodes = decode(SoftBodyState, value.payload).nodes_m
             return Section(SectionKind.NODES, [*self.surfaces].index(name), nodes.astype("<f4").tobytes())
+        if name in self.markers:
+            content = marker_content(decode(ShownMarkers, value.payload))
+            return Section(SectionKind.MARKERS, self.markers.index(name), content)
         picture = decode(CompressedImage, value.payload)
         return Section(SectionKind.PICTURE, self.pictures.index(name), picture.data.tobytes())
 
@@ -135,12 +144,19 @@ class Stage:
         rows = bond.rows(*vectors)
         return Section(SectionKind.ARROWS, self.arrows.index(bond), rows.astype("<f4").tobytes())
 
+    def force(self, device: str, values: Mapping[str, Value]) -> Section:
+        """Return the force on the instruments that a device moves; raises MessageError if it is not valid."""
+        forces = [self.numbers[name].decode(value.payload)[:3] for name, value in values.items()]
+        norm = np.linalg.norm(np.sum(forces, axis=0))
+        return Section(SectionKind.FELT, [*self.felt].index(device), norm.astype("<f4").tobytes())
+
     def describe(self) -> dict[str, Any]:
         """Return what a page must know before its first frame, ready for JSON."""
         return {
             "scenes": [*self.scenes],
             "surfaces": [{"name": name, "colour": rgb} for name, rgb in self.surfaces.items()],
             "pictures": list(self.pictures),
+            "felt": list(self.felt),
             "numbers": [
                 {
                     "name": name,
@@ -178,6 +194,7 @@ class Stage:
                             "body": one.body,
                             "pose": list(one.pose),
                             "fieldOfView": one.field_of_view,
+                            "baseline": one.baseline,
                         }
                         for one in scene.cameras
                     ],

@@ -51,6 +51,8 @@ class Camera(NamedTuple):
     """Of the optical frame in the body: position (m) and quaternion (x, y, z, w)."""
     field_of_view: float
     """Horizontal, rad."""
+    baseline: float
+    """Distance of its eyes, m, of which each is half as far along x; 0: it has one."""
 
 
 class Scene(Protocol):

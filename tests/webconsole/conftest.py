@@ -13,17 +13,18 @@ pytest.importorskip("starlette", reason="needs trocar[web]")
 
 from tests.hub.sample_session import write_session
 from webconsole.console import Console
+from webconsole.listening import on_loopback
 from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
-from webconsole.server import Server, free_socket
+from webconsole.server import Server
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 @contextmanager
-def served(source, pilots=None):
+def served(source, pilots=None, listening=None):
     """Serve pages of a source in a thread; yield the server."""
-    server = Server(Console(source, pilots or Pilots()), free_socket(0))
+    server = Server(Console(source, pilots or Pilots()), listening or on_loopback(0))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:

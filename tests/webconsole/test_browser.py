@@ -1,26 +1,28 @@
 """The page in a real browser: what it draws, says and sends."""
 
+import http.client
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
+from io import BytesIO
 
+import numpy as np
 import pytest
+from PIL import Image
+from websockets.asyncio.client import connect
 
-from tests.webconsole.conftest import served, until
-from tests.webconsole.recorded_scene import write_scene
+from tests.webconsole.conftest import CHROMIUM, finish, served, until
+from tests.webconsole.recorded_scene import EYES, write_scene
+from webconsole.listening import on_loopback
 from webconsole.recorded import Recorded
 
 pytestmark = pytest.mark.xdist_group("all cores")
 
 TIP = "trocar.scene.tips[0].axes.parent.position.toArray()"
-NO_WEBGL = """
-const get = HTMLCanvasElement.prototype.getContext
-HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-  return kind.startsWith("webgl") ? null : get.call(this, kind, ...rest)
-}
-"""
 GAMEPAD = """
 let pressed = 0
 window.press = (value) => { pressed = value }
@@ -116,6 +118,56 @@ def test_a_recording_is_shown(person, served_scene):
     assert one.page.evaluate(NAMELESS) == []
 
 
+def test_both_eyes_are_one_picture_for_red_and_cyan_glasses(person):
+    one = person()
+    one.page.get_by_role("img", name="Picture of endoscope.right").wait_for()
+    one.page.get_by_label("How both eyes are shown").select_option("red and cyan")
+    both = one.page.get_by_role("img", name="red and cyan glasses")
+    both.wait_for()
+    pixel = "e => [...e.getContext('2d').getImageData(e.width - 1, e.height - 1, 1, 1).data]"
+    red, green, blue = EYES["left"][0], *EYES["right"][1:]
+    until(lambda: both.evaluate(pixel) == [red, green, blue, 255])
+    assert not one.page.get_by_role("img", name="Picture of endoscope.left").is_visible()
+    assert one.errors == []
+
+
+MARKED = """
+shape => {
+  const box = trocar.scene.robotBox().makeEmpty()
+  for (const one of trocar.scene.markers.shown[0]) if (one.geometry.type === shape) box.expandByObject(one)
+  return [box.min.toArray(), box.max.toArray()]
+}
+"""
+
+
+def pink(picture):
+    """Return how many pixels have about the colour of the markers."""
+    red, green, blue = np.moveaxis(np.asarray(Image.open(BytesIO(picture)).convert("RGB"), int), 2, 0)
+    return int(((red > 100) & (blue > 100) & (green < 0.4 * red)).sum())
+
+
+def test_markers_are_in_the_scene_and_words_of_the_camera_on_the_page(person):
+    one = person()
+    one.sees("Boolean(trocar.scene?.placed && trocar.scene.surfaces[0]?.mesh)")
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.1")
+    one.page.get_by_text("Insert the needle").wait_for()
+    kinds = one.page.evaluate(
+        "trocar.scene.markers.shown[0].map(({ geometry, type }) => geometry.type + type)"
+    )
+    assert {"ConeGeometryMesh", "CylinderGeometryMesh", "BufferGeometryMesh", "BufferGeometrySprite"} < {
+        *kinds
+    }
+    low, high = one.page.evaluate(MARKED, "SphereGeometry")  # SPHERE and, behind it and above, SPHERE_LIST
+    assert low == pytest.approx([0.0435, -0.0225, -0.0025])
+    assert high == pytest.approx([0.060, -0.0175, 0.014])
+    assert pink(one.picture()) > 3000
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.8")
+    one.sees("trocar.scene.markers.shown[0].length === 0")
+    assert not one.page.locator("#notice").is_visible()
+    assert pink(one.picture()) == 0
+    assert one.errors == []
+
+
 def test_the_instant_is_in_the_link(person):
     one = person()
     one.sees("Boolean(trocar.session)")
@@ -125,19 +177,61 @@ def test_the_instant_is_in_the_link(person):
     one.sees("trocar.time === 0.5")
 
 
-def test_without_webgl_the_rest_works_and_it_says_why(person):
-    one = person(NO_WEBGL, color_scheme="dark")
+def test_without_opengl_the_rest_works_and_it_says_why(browser, served_scene):
+    flags = ["--no-sandbox", "--disable-gpu", "--disable-3d-apis"]
+    plain = browser.browser_type.launch(executable_path=CHROMIUM, args=flags)
+    link = f"http://127.0.0.1:{served_scene.port}{served_scene.gate.invite('operator')}"
+    one = Person(plain, link, color_scheme="dark")
     text = one.page.locator("#no-scene")
     text.wait_for(state="visible")
     assert "draws no scene" in text.inner_text()
+    one.page.get_by_role("slider", name="Instant of the recording").fill("0.3")
+    one.sees("document.querySelector('#instant').textContent === '0.300 s'")
     one.sees("document.querySelectorAll('.plot').length > 0")
-    one.page.get_by_role("slider", name="Instant of the recording").fill("0.6")
-    one.sees("document.querySelector('#instant').textContent === '0.600 s'")
+    red = "document.querySelector('#pictures-row canvas').getContext('2d').getImageData(0, 0, 1, 1).data[0]"
+    one.sees(f"{red} === {EYES['left'][0]}")
+    one.page.get_by_text("Insert the needle").wait_for()
+    plain.close()
+
+
+def test_a_server_that_was_started_again_says_that_its_link_is_needed(browser, tmp_path):
+    write_scene(tmp_path / "scene", 4)
+    with served(Recorded(tmp_path / "scene")) as server:
+        one = Person(browser, f"http://127.0.0.1:{server.port}{server.gate.invite('operator')}")
+        one.sees("Boolean(trocar.session)")
+    banner = one.page.get_by_role("alert").first
+    banner.get_by_text("does not answer").wait_for()
+    with served(Recorded(tmp_path / "scene"), listening=on_loopback(server.port)) as again:
+        banner.get_by_text("Open the link that it has printed").wait_for()
+        one.page.goto(f"http://127.0.0.1:{again.port}{again.gate.invite('operator')}")
+        one.sees("Boolean(trocar.session)")
+        one.context.close()
+
+
+def inviter(link):
+    """Return what makes links of a server, by the first one that it has printed."""
+    host, path = re.fullmatch(r"http://([^/]+)(/.*)", link).groups()
+    connection = http.client.HTTPConnection(host)
+    connection.request("GET", path)
+    cookie = connection.getresponse().headers["Set-Cookie"].partition(";")[0]
+    connection.close()
+
+    async def invite(role):
+        headers = {"Cookie": cookie, "Origin": f"http://{host}"}
+        async with connect(f"ws://{host}/page", additional_headers=headers, origin=None) as socket:
+            await socket.send(json.dumps({"do": "invite", "role": role}))
+            answer = {}
+            while "path" not in answer:
+                message = await socket.recv()
+                answer = json.loads(message) if isinstance(message, str) else {}
+            return f"http://{host}{answer['path']}"
+
+    return lambda role: finish(invite(role))
 
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """A running session that a page can lead, and the page's link."""
+    """A running session that a page can lead, and what makes links to its page."""
     command = [sys.executable, "-P", "-m", "trocar", "run", "browser", "--open", "--set", "step=5 ms"]
     hub = tmp_path_factory.mktemp("hub")
     said = hub / "said.txt"
@@ -153,15 +247,15 @@ def session(tmp_path_factory):
             )
             if run.poll() is not None:
                 pytest.fail(said.read_text())
-            yield run, link[0]
+            yield run, inviter(link[0])
         finally:
             run.send_signal(signal.SIGINT)
 
 
 def test_a_page_leads_an_arm_and_lets_go(browser, session):
     """Keys, then the loss of the focus; a gamepad; pause; a second page; and a page that stands still."""
-    run, link = session
-    one = Person(browser, link, GAMEPAD)
+    run, invite = session
+    one = Person(browser, invite("operator"), GAMEPAD)
     one.sees("Boolean(trocar.scene?.placed)")
     one.page.get_by_role("button", name="Lead hand").click()
     one.page.get_by_text("you lead it").wait_for()
@@ -190,6 +284,11 @@ def test_a_page_leads_an_arm_and_lets_go(browser, session):
     assert not other.page.get_by_role("button", name="Lead hand").is_visible()
     assert not other.page.get_by_role("button", name="Pause").is_visible()
 
+    second = Person(browser, invite("operator"))
+    second.page.get_by_text(re.compile(r"page \d+ leads it")).wait_for()
+    assert second.page.get_by_role("button", name="Lead hand").is_disabled()
+    second.context.close()
+
     one.page.get_by_role("button", name="Pause").click()
     one.page.get_by_role("button", name="Resume").wait_for()
     one.page.get_by_role("button", name="Resume").click()
@@ -199,6 +298,61 @@ def test_a_page_leads_an_arm_and_lets_go(browser, session):
     one.context.close()  # as a browser that dies: its page leads no more, and the arm holds
     other.sees("document.querySelector('#lines').textContent.includes('no page leads')")
     still(other)
+    other.context.close()
+    assert run.poll() is None
+
+
+@contextmanager
+def own_browser(browser, directory):
+    """Yield a browser in processes of its own, and what sends signals to all of them."""
+    flags = ["--no-sandbox", "--headless", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    place = [f"--user-data-dir={directory}", "--remote-debugging-port=0"]
+    nothing = subprocess.DEVNULL
+    with subprocess.Popen(
+        [CHROMIUM, *flags, *place], stdout=nothing, stderr=nothing, start_new_session=True
+    ) as process:
+        try:
+            port = directory / "DevToolsActivePort"
+            until(lambda: port.exists() and port.read_text())
+            address = f"http://127.0.0.1:{port.read_text().split()[0]}"
+            yield browser.browser_type.connect_over_cdp(address), lambda one: os.killpg(process.pid, one)
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def test_a_browser_that_stands_still_or_is_killed_lets_the_arm_hold(browser, session, tmp_path):
+    """With a key held down all the time; meanwhile the session and another page go on."""
+    run, invite = session
+    other = Person(browser, invite("viewer"))
+    other.sees("Boolean(trocar.scene?.placed)")
+    with own_browser(browser, tmp_path / "own") as (own, send):
+        one = Person(own, invite("operator"))
+        one.sees("Boolean(trocar.scene?.placed)")
+        one.page.get_by_role("button", name="Lead hand").click()
+        one.page.get_by_text("you lead it").wait_for()
+
+        def press():
+            before = other.page.evaluate(TIP)
+            one.page.keyboard.down("Space")
+            one.page.keyboard.down("w")
+            other.sees(f"Math.hypot(...{TIP}.map((x, i) => x - {before}[i])) > 0.002")
+
+        press()
+        send(signal.SIGSTOP)
+        place, time = still(other), other.page.evaluate("trocar.time")
+        other.sees(f"trocar.time > {time + 1}")
+        send(signal.SIGCONT)
+        other.page.wait_for_timeout(500)
+        assert np.allclose(other.page.evaluate(TIP), place, atol=2e-4), "the key has to be pressed anew"
+        one.page.keyboard.up("w")
+        one.page.keyboard.up("Space")
+        one.page.get_by_role("button", name="Leave hand").wait_for()
+        press()
+        said = "document.querySelector('#lines').textContent.split('no page leads').length"
+        count = other.page.evaluate(said)
+        send(signal.SIGKILL)
+        other.sees(f"{said} > {count}")
+        still(other)
     other.context.close()
     assert run.poll() is None
 

@@ -1,13 +1,18 @@
 """Frames: what goes in comes out, and what is not a frame is refused."""
 
+import json
 import struct
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.errors import MessageError
+from schemas.ros import Header
+from tests.webconsole.recorded_scene import markers
 from webconsole.frame import Section, SectionKind, acknowledged, frame, sections
+from webconsole.markers import marker_content
 
 PARTS = st.lists(
     st.builds(Section, st.sampled_from(SectionKind), st.integers(0, 65535), st.binary(max_size=65))
@@ -43,3 +48,19 @@ def test_an_acknowledgement_has_four_bytes():
     assert acknowledged(struct.pack("<I", 7)) == 7
     with pytest.raises(MessageError, match="3 bytes, expected 4"):
         acknowledged(b"abc")
+
+
+def test_markers_whose_parts_do_not_fit_are_rejected():
+    shown = markers(Header(frame_id="world"))
+    content = marker_content(shown)
+    size = struct.unpack_from("<I", content)[0]
+    rows = json.loads(content[4 : 4 + size])
+    assert [row["type"] for row in rows] == shown.types.tolist()
+    numbers = np.frombuffer(content, "<f4", offset=4 + size)
+    assert len(numbers) == 14 * len(rows) + shown.points_m.size
+    assert np.allclose(numbers[: 7 * len(rows)], shown.poses)
+    for part in ("poses", "point_counts", "texts", "color_counts"):
+        value = getattr(shown, part)
+        cut = np.append(value[1:], 2).astype(value.dtype) if part.endswith("counts") else value[1:]
+        with pytest.raises(MessageError, match="other sizes"):
+            marker_content(shown.model_copy(update={part: cut}))

@@ -13,13 +13,18 @@ from webconsole.recorded import Recorded
 
 
 class Visitor:
-    """Sends requests with any head."""
+    """Sends requests with any head; `tls`: the context of a client, None: without TLS."""
 
-    def __init__(self, server):
-        self.server, self.host, self.cookie = server, f"127.0.0.1:{server.port}", ""
+    def __init__(self, server, tls=None):
+        self.server, self.host, self.cookie, self.tls = server, f"127.0.0.1:{server.port}", "", tls
 
     def get(self, path="/", method="GET", **headers):
-        connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=10)
+        place = {"host": "127.0.0.1", "port": self.server.port, "timeout": 10}
+        connection = (
+            http.client.HTTPConnection(**place)
+            if self.tls is None
+            else http.client.HTTPSConnection(**place, context=self.tls)
+        )
         connection.putrequest(method, path, skip_host=True)
         for name, value in {"Host": self.host, "Cookie": self.cookie, **headers}.items():
             if value:
@@ -43,7 +48,10 @@ class Visitor:
         async def first():
             try:
                 async with connect(
-                    f"ws://127.0.0.1:{self.server.port}/page", additional_headers=headers, origin=None
+                    f"{'wss' if self.tls else 'ws'}://127.0.0.1:{self.server.port}/page",
+                    additional_headers=headers,
+                    origin=None,
+                    ssl=self.tls,
                 ) as socket:
                     return await socket.recv()
             except InvalidStatus as refused:

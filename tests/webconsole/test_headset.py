@@ -6,7 +6,7 @@ import pytest
 
 from tests.webconsole.conftest import served, until
 from tests.webconsole.recorded_scene import write_scene
-from tests.webconsole.test_browser import Person
+from tests.webconsole.test_browser import GAMEPAD, Person
 from webconsole.pilot import Pilots
 from webconsole.recorded import Recorded
 
@@ -19,6 +19,14 @@ headset.installRuntime({ forceInstall: true })
 headset.position.set(0.1, 1.5, 0.2)
 window.untracked = false // iwer says of every controller that its position is emulated
 Object.defineProperty(XRPose.prototype, "emulatedPosition", { get: () => window.untracked })
+"""
+
+RUMBLE = """
+window.felt = []
+const pads = navigator.getGamepads
+const playEffect = async (kind, effect) => { if (kind === "dual-rumble") felt.push(effect) }
+const vibrationActuator = { playEffect }
+navigator.getGamepads = () => pads().map((pad) => ({ ...pad, vibrationActuator }))
 """
 
 
@@ -51,6 +59,39 @@ def person(browser, room, tmp_path):
         one.context.close()
 
 
+def test_the_force_on_the_instrument_is_felt_while_the_hand_leads(browser, tmp_path):
+    """The gamepad is a stub. The force grows by 50 N/m of depth, and 2 N are felt with all strength."""
+    write_scene(tmp_path / "scene")
+    pilots, given = Pilots(), []
+    pilots.offer("hand", given.append)
+    with served(Recorded(tmp_path / "scene"), pilots) as server:
+        link = f"http://127.0.0.1:{server.port}{server.gate.invite('operator')}"
+        one = Person(browser, link, GAMEPAD, RUMBLE)
+        one.sees("trocar.session?.felt[0] === 'hand'")
+        instant = one.page.get_by_role("slider", name="Instant of the recording")
+
+        def feels(*times):
+            """Show instants in turn, as a force is felt for a moment, and return the last strength."""
+            for time in times:
+                instant.fill(time)
+                one.page.wait_for_timeout(100)
+            return one.page.evaluate("felt.at(-1)?.strongMagnitude")
+
+        one.page.get_by_role("button", name="Lead hand").click()
+        one.page.get_by_text("you lead it").wait_for()
+        assert feels("0.8", "0.9") is None, "the dead-man is open"
+        one.page.evaluate("press(-1)")
+        until(lambda: given and given[-1].dead_man)
+        assert until(lambda: feels("0.12", "0.13")) < 0.2
+        until(lambda: feels("0.85", "0.9") == 1)
+        assert one.page.evaluate("felt.every(({ duration }) => duration === 100)")
+        one.page.wait_for_timeout(200)
+        count = one.page.evaluate("felt.length")
+        one.page.wait_for_timeout(200)
+        assert one.page.evaluate("felt.length") == count, "no new force: nothing is felt"
+        one.context.close()
+
+
 def test_a_head_and_two_hands_lead_while_they_are_held(person, room):
     person.sees("Boolean(trocar.scene?.placed)")
     person.page.get_by_role("button", name="Enter headset").click()
@@ -59,6 +100,7 @@ def test_a_head_and_two_hands_lead_while_they_are_held(person, room):
     assert not head.dead_man
     assert not right.dead_man
     assert len(right.tracked) == 7
+    assert person.page.evaluate("trocar.headset.theatre.screens.every(({ visible }) => visible)"), "both eyes"
 
     person.page.evaluate("headset.controllers.right.updateButtonValue('squeeze', 1)")
     person.page.evaluate("headset.controllers.right.updateButtonValue('trigger', 1)")

@@ -1,5 +1,7 @@
 """A running session as pages see it: what arrives, what it costs the session, and what is asked of it."""
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -82,6 +84,26 @@ def test_without_a_session_it_says_so_and_goes_on():
     with pytest.raises(ConnectError, match="no session is running"):
         live.ask("pause", Empty(), Empty)
     live.close()
+
+
+def test_a_hub_that_is_killed_is_missed_and_the_next_one_is_shown(tmp_path):
+    (tmp_path / "seen.yaml").write_text(SCENARIO.replace("name: seen", "name: lost").replace("1 s", "10 min"))
+    command = [sys.executable, "-P", "-m", "trocar", "run", str(tmp_path / "seen.yaml"), "--pace", "realtime"]
+    live = Live(session="lost")
+    live.start()
+    try:
+        for generation in (1, 2):
+            quiet = subprocess.DEVNULL
+            with subprocess.Popen(command, stdout=quiet, stderr=quiet) as hub:
+                try:
+                    until(lambda: live.state["state"] == "running", 60.0)
+                    assert live.generation == generation
+                finally:
+                    hub.kill()
+            until(lambda: live.state["state"] == "away")
+            assert "'lost'" in live.state["detail"]
+    finally:
+        live.close()
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ const PERIOD_MS = 15
 const ROLES = { head: "Head", left: "Left hand", right: "Right hand" }
 
 export class Headset {
-  // `page`: what is shown: scene(), eyes() by index, frames() which applies what has arrived, said(text).
-  constructor(panel, link, page) {
-    Object.assign(this, { panel, link, page })
+  // `page`: what is shown: scene(), eyes(), frames() which applies what has arrived, said(text).
+  constructor(panel, link, feel, page) {
+    Object.assign(this, { panel, link, feel, page })
     this.session = null
     this.devices = []
     this.chosen = {} // device of each role
@@ -74,7 +74,7 @@ export class Headset {
 
   frame(now, frame) {
     this.page.frames()
-    this.theatre.draw([...this.page.eyes().values()])
+    this.theatre.draw(this.page.eyes())
     if (frame && this.session?.visibilityState === "visible" && now - this.sent >= PERIOD_MS) {
       this.sent = now
       this.lead(frame)
@@ -100,6 +100,7 @@ export class Headset {
         dead_man: Boolean(buttons[GRIP]?.pressed), jaw: closes > 0,
         gripper: Math.max(-1, Math.min(1, opens - closes)),
       })
+      this.feel.pulse(this.chosen[role], source.gamepad, Boolean(this.held[role]))
     }
   }
 

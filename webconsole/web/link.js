@@ -3,7 +3,7 @@
 
 const MAGIC = 0x46435254 // "TRCF", little-endian
 const HEAD = 24
-export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6
+export const POSES = 1, SURFACE = 2, NODES = 3, PICTURE = 4, SAMPLE = 5, ARROWS = 6, MARKERS = 7, FELT = 8
 
 export function parseFrame(buffer) {
   const view = new DataView(buffer)
@@ -26,7 +26,7 @@ export class Link {
   }
 
   open() {
-    this.socket = new WebSocket(`ws://${location.host}/page`)
+    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/page`) // https: wss
     this.socket.binaryType = "arraybuffer"
     this.socket.onopen = () => this.handlers.opened()
     this.socket.onmessage = ({ data }) => {
@@ -40,8 +40,16 @@ export class Link {
     }
     this.socket.onclose = () => {
       this.handlers.closed()
+      this.look()
       setTimeout(() => this.open(), 1000)
     }
+  }
+
+  // A socket does not say why it was refused: another server, started since, knows no cookie of before.
+  look() {
+    fetch("/", { method: "HEAD", cache: "no-store" })
+      .then(({ status }) => { if (status === 403) this.handlers.refused() })
+      .catch(() => {}) // it does not answer, as the page says already
   }
 
   get ready() { return this.socket.readyState === WebSocket.OPEN }

@@ -1,9 +1,12 @@
 // The page: it puts together link, scene, pictures, plots, log, timeline and driving.
 
-import { ARROWS, Link, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { ARROWS, FELT, Link, MARKERS, NODES, PICTURE, POSES, SAMPLE, SURFACE } from "./link.js"
+import { Eyes } from "./eyes.js"
+import { Feel } from "./feel.js"
 import { Head } from "./head.js"
 import { Headset } from "./headset.js"
 import { Log } from "./log.js"
+import { Notices, markersOf } from "./notices.js"
 import { Plots } from "./plots.js"
 import { Pilot } from "./pilot.js"
 import { Timeline } from "./timeline.js"
@@ -14,7 +17,6 @@ const $ = (id) => document.getElementById(id)
 const REFRESH_MS = 100, STILL_MS = 400
 
 let scene = null, session = null, waiting = [], drawn = 0, dirty = true, refreshed = 0
-const eyes = new Map()
 
 const link = new Link({
   opened() { head.banner("") },
@@ -24,6 +26,7 @@ const link = new Link({
     head.banner("The server of this page does not answer. The page comes back by itself.")
     waiting = []
   },
+  refused() { head.banner("This page's server was started again. Open the link that it has printed.") },
   frame(frame) { waiting.push(frame); dirty = true },
   session: begin,
   state(state) {
@@ -45,10 +48,14 @@ const link = new Link({
 })
 let lastTime = 0
 const head = new Head(link)
-const pilot = new Pilot($("lead"), link)
-const headset = new Headset($("headset"), link, { scene: () => scene, eyes: () => eyes, frames: takeFrames,
+const feel = new Feel()
+const pilot = new Pilot($("lead"), link, feel)
+const headset = new Headset($("headset"), link, feel, { scene: () => scene, eyes: () => eyes.all, frames: takeFrames,
   said: (text) => log.add([{ time: lastTime, level: "warn", source: "headset", text }]) })
 const log = new Log($("lines"), $("worst"), (time) => { timeline.pause(); timeline.go(time) })
+const eyes = new Eyes($("eyes"), $("pictures-row"), $("stereo"),
+  () => log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]))
+const notices = new Notices($("notice"))
 const timeline = new Timeline((time) => { lastTime = time; link.send({ do: "at", time }); plots.at(time); dirty = true })
 const forks = new Forks(link, timeline)
 timeline.found = (events) => log.add(events, true)
@@ -68,7 +75,8 @@ async function begin(described) {
   log.clear()
   for (const text of described.notes ?? []) log.add([{ time: 0, level: "warn", source: "scene", text }])
   if (!described.numbers) return
-  showEyes(described.pictures)
+  eyes.begin(described.pictures)
+  notices.clear()
   plots.begin(described.numbers, described.kind === "recording")
   await stage(described)
   ask(true)
@@ -115,44 +123,16 @@ function showCameras() {
   $("cameras").replaceChildren(...buttons)
 }
 
-function showEyes(names) {
-  eyes.clear()
-  $("eyes").hidden = !names.length
-  const figures = names.map((name, index) => {
-    const figure = document.createElement("figure"), canvas = document.createElement("canvas")
-    const caption = document.createElement("figcaption")
-    caption.textContent = name.replace("/image_raw/compressed", "")
-    canvas.setAttribute("role", "img")
-    canvas.setAttribute("aria-label", `Picture of ${caption.textContent}`)
-    figure.append(canvas, caption)
-    eyes.set(index, { name, canvas, busy: false, next: null, drawn: 0 })
-    return figure
-  })
-  $("pictures-row").replaceChildren(...figures)
-}
-
-async function showPicture(eye, bytes) {
-  if (eye.busy) { eye.next = bytes; return }
-  eye.busy = true
-  try {
-    const picture = await createImageBitmap(new Blob([bytes]))
-    Object.assign(eye.canvas, { width: picture.width, height: picture.height })
-    eye.canvas.getContext("2d").drawImage(picture, 0, 0)
-    picture.close()
-    eye.drawn++
-  } catch { log.add([{ time: lastTime, level: "warn", source: "pictures", text: "a picture cannot be read" }]) }
-  eye.busy = false
-  const next = eye.next
-  eye.next = null
-  if (next) showPicture(eye, next)
-}
-
 function apply(frame) {
   lastTime = frame.time
   for (const { kind, index, at, size } of frame.sections) {
     if (kind === SAMPLE) plots.sample(plots.names[index], new Float64Array(frame.buffer, at, size / 8))
-    else if (kind === PICTURE) { if (eyes.has(index)) showPicture(eyes.get(index), new Uint8Array(frame.buffer, at, size)) }
-    else if (!scene) continue
+    else if (kind === PICTURE) eyes.take(index, new Uint8Array(frame.buffer, at, size))
+    else if (kind === FELT) feel.take(session.felt[index], new Float32Array(frame.buffer, at, 1)[0])
+    else if (kind === MARKERS) {
+      const markers = notices.take(index, markersOf(frame.buffer, at))
+      scene?.marked(index, markers)
+    } else if (!scene) continue
     else if (kind === POSES) scene.poses(index, new Float32Array(frame.buffer, at, size / 4))
     else if (kind === SURFACE) scene.surface(index, new Uint32Array(frame.buffer, at, size / 4))
     else if (kind === ARROWS) scene.arrows(index, new Float32Array(frame.buffer, at, size / 4))

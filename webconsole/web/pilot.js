@@ -18,8 +18,8 @@ const PAD_M_PER_PX = 0.0005
 const DEAD_ZONE = 0.24 // of a stick at rest (XINPUT_GAMEPAD_LEFT_THUMB_DEADZONE, 7849 of 32767)
 
 export class Pilot {
-  constructor(panel, link) {
-    Object.assign(this, { panel, link })
+  constructor(panel, link, feel) {
+    Object.assign(this, { panel, link, feel })
     this.device = null
     this.number = 0
     this.held = new Set()
@@ -142,6 +142,10 @@ export class Pilot {
 
   answered({ to, device, error }) { if (to === "lead" && !error) this.become(device) }
 
+  pad() {
+    return [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected && one.mapping === "standard")
+  }
+
   wish() {
     const wish = { linear: [0, 0, 0], angular: [0, 0, 0], gripper: 0, dead_man: this.dragging, jaw: false }
     const add = (one) => {
@@ -151,7 +155,7 @@ export class Pilot {
       wish.jaw ||= one.jaw ?? false
     }
     for (const key of this.held) add(KEYS[key][1])
-    const pad = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected && one.mapping === "standard")
+    const pad = this.pad()
     if (pad) add(gamepad(pad))
     const limit = (share) => Math.min(Math.max(share, -1), 1)
     return { ...wish, linear: wish.linear.map(limit), angular: wish.angular.map(limit), gripper: limit(wish.gripper) }
@@ -164,6 +168,7 @@ export class Pilot {
     if (last) wish.dead_man = false
     this.link.send({ do: "hand", number: ++this.number, drag: this.drag, ...wish })
     this.moving = wish.dead_man
+    this.feel.pulse(this.device, this.pad(), wish.dead_man)
     this.mark()
   }
 

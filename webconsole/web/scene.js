@@ -2,11 +2,13 @@
 
 import * as THREE from "./vendor/three.module.js"
 import { Orbit } from "./orbit.js"
+import { Markers } from "./markers.js"
 import { creased, gathered, smooth } from "./mesh.js"
 
 const SHARP = Math.cos((35 * Math.PI) / 180), SOFT = Math.cos((80 * Math.PI) / 180)
 const SLOW_MS = 50, QUICK_MS = 20, COARSEST = 0.5
 const FORCE = 0xf2b705, M_PER_N = 0.02, LONGEST_M = 0.08, LEAST_N = 0.005
+const LEFT_EYE = "_left_optical" // after a camera's name: controllers and ROS programs name its frame so
 const FLIP = new THREE.Quaternion(1, 0, 0, 0) // from an optical frame (y down, z ahead) to three's camera (y up, -z ahead)
 
 export class Scene {
@@ -39,6 +41,7 @@ export class Scene {
   }
 
   clear() {
+    this.markers?.clear()
     for (const old of this.owned ?? []) {
       this.world.remove(old)
       old.traverse((one) => { one.geometry?.dispose(); one.material?.dispose() })
@@ -50,6 +53,8 @@ export class Scene {
     this.bonds = [] // arrows of each
     this.cameras = [] // { name, group, pose, fieldOfView }
     this.tips = [] // { name, group }
+    this.places = new Map() // a group of each frame in which markers may be, by its name on /tf
+    this.markers = new Markers((frame) => this.place(frame))
     this.placed = false
     this.focused = false
   }
@@ -82,10 +87,29 @@ export class Scene {
       axes.visible = false
       groups[frame.body].add(axes)
       this.axes.push(axes)
+      const [arm, end] = frame.name.split("/")
+      this.places.set(end === "base" ? `${arm}_base` : arm, placed(groups[frame.body], frame.pose))
       if (frame.name.endsWith("/tip")) this.tips.push({ name: frame.name.split("/")[0], axes })
     }
-    for (const camera of scene.cameras) this.cameras.push({ ...camera, group: groups[camera.body] })
+    for (const camera of scene.cameras) {
+      this.cameras.push({ ...camera, group: groups[camera.body] })
+      const eye = placed(placed(groups[camera.body], camera.pose), [-camera.baseline / 2, 0, 0, 0, 0, 0, 1])
+      if (!this.places.has(LEFT_EYE)) this.places.set(LEFT_EYE, eye)
+    }
+    scene.bodies.forEach((name, body) => { if (!this.places.has(name)) this.places.set(name, groups[body]) })
     this.bodies.push(groups)
+  }
+
+  // Where markers of a frame are drawn: what is fixed in the world has the world's, and every camera the same eye.
+  place(frame) {
+    if (frame === "world" || frame === "Cart") return this.world
+    return this.places.get(frame.endsWith(LEFT_EYE) ? LEFT_EYE : frame)
+  }
+
+  // `markers`: all that one participant shows; notices.js, `markersOf`.
+  marked(index, markers) {
+    this.markers.show(index, markers)
+    this.dirty()
   }
 
   own(object) {
@@ -265,6 +289,13 @@ function attribute(size) { return new THREE.BufferAttribute(new Float32Array(siz
 function material([red, green, blue, opacity], side = THREE.FrontSide) {
   const colour = new THREE.Color().setRGB(red, green, blue, THREE.SRGBColorSpace)
   return new THREE.MeshLambertMaterial({ color: colour, side, transparent: opacity < 1, opacity })
+}
+
+function placed(parent, numbers) {
+  const group = new THREE.Group()
+  pose(group, numbers)
+  parent.add(group)
+  return group
 }
 
 function pose(object, [x, y, z, ...q]) {

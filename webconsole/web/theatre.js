@@ -2,6 +2,7 @@
 // pictures the scene, seen from where the page's camera stands.
 
 import * as THREE from "./vendor/three.module.js"
+import { pairOf } from "./eyes.js"
 
 const DISTANCE_M = 1, HEIGHT_M = 0.8 // a picture 44 degrees high
 const LEFT = 1, RIGHT = 2 // layers that three.js shows to one eye alone
@@ -40,11 +41,10 @@ export class Theatre {
 
   // `eyes`: name and canvas of each picture; `drawn` counts what was drawn on it.
   draw(eyes) {
-    const pair = ["left", "right"].map((side) => eyes.find(({ name, drawn }) => drawn && name.includes(side)))
-    const stereo = pair.every(Boolean)
-    if (stereo) pair.forEach((eye, i) => this.hang(this.screens[i], eye))
-    for (const screen of this.screens) screen.visible = stereo
-    const world = stereo ? this.black : this.scene.world
+    const pair = pairOf(eyes)
+    pair?.forEach((eye, i) => this.hang(this.screens[i], eye))
+    for (const screen of this.screens) screen.visible = Boolean(pair)
+    const world = pair ? this.black : this.scene.world
     world.add(this.rig)
     this.renderer.render(world, this.camera)
   }

@@ -15,7 +15,7 @@ from engines.mujoco.params import MujocoParams, SceneParams
 from engines.mujoco.pictures.solid_meshes import Triangles, solid_mesh
 from hub.participant.view import Camera, Frame, Part, Rgb
 from robots import rotation
-from robots.dvrk.endoscope import FIELD_OF_VIEW, optical_in_roll
+from robots.dvrk.endoscope import BASELINE, FIELD_OF_VIEW, optical_in_roll
 from robots.dvrk.mounted import MountedEcm
 from schemas.errors import MessageError
 from schemas.vectors import Vector
@@ -75,7 +75,7 @@ class ViewScene:
             return ()
         pose = optical_in_roll(ecm.endoscope)
         placed = [*pose[:3, 3].tolist(), *rotation.from_matrix(pose[:3, :3]).tolist()]
-        return (Camera("endoscope", self._model.body("ECM/roll").id, placed, FIELD_OF_VIEW),)
+        return (Camera("endoscope", self._model.body("ECM/roll").id, placed, FIELD_OF_VIEW, BASELINE),)
 
     def poses(self, values: Mapping[str, Vector]) -> NDArray[np.float32]:
         """Return the pose of each body in the world, shape (nbody, 7): m and quaternion (x, y, z, w)."""
