@@ -27,8 +27,8 @@ class Member:
 def family(places: Iterable[Path]) -> Iterator[Member]:
     """Yield the recordings in and below `places`, each followed by its forks, the earliest fork first.
 
-    Of one that is being written, or was cut short, there is what is whole. What is no recording of a session is
-    passed over. A fork whose parent is not there stands by itself.
+    Of one that is being written, or was cut short, there is what is whole. What is no recording of a
+    session is passed over. A fork whose parent is not there stands by itself.
     """
     found: dict[str, tuple[Recording, ForkOrigin | None]] = {}
     for file in sorted({file for place in places for file in _files(place)}):
