@@ -13,7 +13,7 @@ from hub.planning.plan import Plan, PlannedConnection, PlannedParticipant
 from hub.transport.bundle import Bundle, bundled
 from hub.transport.cells import INITIAL, Cell, RemoteCell
 from hub.transport.lane import has_lane
-from hub.transport.port_codec import PortCodec
+from hub.transport.port_codec import PortCodec, codec_of
 from hub.transport.reader import DeviceInputs, Queue, Reader, as_messages
 from hub.transport.wire import Wire
 from schemas.ports import Port
@@ -111,7 +111,7 @@ class HostLayout:
                     bundles=indices.get(port.name, ()),
                     stride_ns=stride * plan.step_ns,
                 )
-            codec, listeners = PortCodec(port).vector, self._listeners
+            codec, listeners = codec_of(port).vector, self._listeners
             output = self._outputs[planned.name, port.name] = Output(
                 port,
                 codec,
@@ -275,9 +275,9 @@ class HostLayout:
             port = one.planned.port(inlet.target_port)
             source = plan.participants[inlet.source].port(inlet.source_port)
             entries = inlets.setdefault((inlet.source, inlet.source_port), [])
-            entries.append((one, port.name, PortCodec(port.filled_from(source))))
+            entries.append((one, port.name, codec_of(port.filled_from(source))))
             # the grants of a session that was forked may hold a value by the input that it enters
-            inlets[one.name, port.name] = [(one, port.name, PortCodec(port.filled_from(source)))]
+            inlets[one.name, port.name] = [(one, port.name, codec_of(port.filled_from(source)))]
             if port.variability == "signal":
                 one.stale.add(port.name)
         every = (*plan.connections, *plan.from_devices, *plan.to_devices)
@@ -285,7 +285,7 @@ class HostLayout:
         for one in self.participants:
             for port in one.planned.ports:
                 if port.causality == "input" and (one.name, port.name) not in connected:
-                    inlets[one.name, port.name] = [(one, port.name, PortCodec(port))]
+                    inlets[one.name, port.name] = [(one, port.name, codec_of(port))]
                     if port.max_age_ns:  # no sample yet, as from a device that is silent
                         one.stale.add(port.name)
         return inlets

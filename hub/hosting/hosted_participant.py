@@ -11,7 +11,7 @@ from hub.hosting.outputs import DueOutputs, Output
 from hub.participant import Inputs, Outputs, Stepped
 from hub.planning.plan import PlannedParticipant
 from hub.transport.bundle import Bundle
-from hub.transport.port_codec import PortCodec
+from hub.transport.port_codec import codec_of
 from hub.transport.reader import Queue, Reader
 from schemas.message import Message
 from schemas.ports import Port
@@ -81,7 +81,7 @@ def hosted(planned: PlannedParticipant, participant: Stepped, step_ns: int) -> H
 
 
 def _start_value(port: Port) -> Any:
-    codec = PortCodec(port)
+    codec = codec_of(port)
     if codec.vector is None:
         return None
     return codec.vector.neutral.copy() if port.start is None else np.array(port.start, np.float64)

@@ -190,7 +190,9 @@ class DueOutputs:
     ) -> None:
         vectors = [output for output in outputs if output.codec is not None]
         events = [output for output in outputs if output.port.variability == "event"]
-        messages = [output for output in outputs if output not in vectors and output not in events]
+        messages = [
+            output for output in outputs if output.codec is None and output.port.variability == "signal"
+        ]
         self._parts: list[tuple[Callable[[Outputs], Sequence[Any]], Callable[[int, int, Any], None]]] = []
         if vectors:
             part = _Vectors(vectors, wire, listener([output.port for output in vectors]))

@@ -11,7 +11,6 @@ from math import acos
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from engines.mujoco.interaction.proximity import Rays
 from engines.mujoco.model import FINGERS
@@ -135,14 +134,15 @@ class Holding:
         """
         if self._rays is not None:
             return self._rays.look(self._contacts, self._touched)
-        self._contacts[:] = 0.0
-        contact = self._data.contact
-        ends = self._ends[contact.geom]
-        found = (ends[:, 0] * ends[:, 1] < 0).nonzero()[0].tolist()
-        for at in found:
-            finger, thing = sorted(ends[at].tolist())
-            self._contacts[thing - 1, *divmod(-finger - 1, 2)] += (1.0, *contact.pos[at])
-        return bool(found)
+        self._contacts.fill(0.0)
+        contact, ends, found = self._data.contact, self._ends, False
+        pairs: list[tuple[int, int]] = contact.geom.tolist()
+        for at, (one, other) in enumerate(pairs):
+            if ends[one] * ends[other] < 0:
+                finger, thing = sorted((ends[one], ends[other]))
+                self._contacts[thing - 1, *divmod(-finger - 1, 2)] += (1.0, *contact.pos[at])
+                found = True
+        return found
 
     def refresh(self) -> None:
         """Update the outputs to the model's present state."""
@@ -216,8 +216,8 @@ class Holding:
             self._model.eq_data[self._welds.ravel()] = self._weld_data
 
 
-def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> NDArray[np.intp]:
-    """Return what every geom of `model` belongs to, shape (ngeom,).
+def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> list[int]:
+    """Return what every geom of `model` belongs to.
 
     i + 1 stands for object i, -(i + 1) for finger i or a pad on it, 0 for anything else.
     """
@@ -228,4 +228,4 @@ def _ends(model: mujoco.MjModel, things: list[str], fingers: list[str]) -> NDArr
     for body, parent in enumerate(model.body_parentid.tolist()):  # which comes before it
         if ends[parent] < 0:
             ends[body] = ends[parent]
-    return ends[model.geom_bodyid]
+    return ends[model.geom_bodyid].tolist()
