@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from hub.hosting.blas import pin_blas
+from hub.hosting.numerics import pin_numerics
 
-pin_blas(os.environ)  # before any test imports numpy: a process with other kernels has other hashes
+pin_numerics(os.environ)  # before any test imports numpy: a process with other kernels has other hashes
 settings.register_profile(
     "trocar", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )

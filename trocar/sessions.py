@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import logging
 import os
+import shlex
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from hub.hosting.blas import pin_blas
+from hub.hosting.numerics import pin_numerics
 
 _environment = dict(os.environ)
-pin_blas(os.environ)  # before anything below imports numpy
+pin_numerics(os.environ)  # before anything below imports numpy
 _LATE = {name: value for name, value in os.environ.items() if _environment.get(name) != value}
 """Settings that numpy did not see, as it had been imported before this module."""
 if "numpy" not in sys.modules:
@@ -183,5 +184,5 @@ def _warn_of_other_bits() -> None:
         log.warning(
             "numpy was imported before trocar.run: state hashes may differ from those of the command line. To"
             " have the same, import trocar.sessions first, or start Python with %s",
-            " ".join(f"{name}={value}" for name, value in _LATE.items()),
+            " ".join(f"{name}={shlex.quote(value)}" for name, value in _LATE.items()),
         )

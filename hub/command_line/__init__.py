@@ -2,9 +2,9 @@
 
 import os
 
-from hub.hosting.blas import pin_blas
+from hub.hosting.numerics import pin_numerics
 
-pin_blas(os.environ)  # before anything imports numpy: participants may run in this process
+pin_numerics(os.environ)  # before anything imports numpy: participants may run in this process
 
 from hub.command_line.app import main  # noqa: E402
 

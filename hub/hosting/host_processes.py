@@ -11,7 +11,7 @@ import threading
 from collections.abc import Mapping
 from time import monotonic
 
-from hub.hosting.blas import pin_blas
+from hub.hosting.numerics import pin_numerics
 from hub.hosting.end_with_parent import NEEDS_INPUT
 from hub.transport.host_link import HubLink
 
@@ -62,7 +62,7 @@ class HostProcesses:
         if inherited:
             command += ["--link", *map(str, inherited)]
         environment = dict(os.environ)
-        pin_blas(environment)
+        pin_numerics(environment)
         process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE if NEEDS_INPUT else subprocess.DEVNULL,
