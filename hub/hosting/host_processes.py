@@ -11,8 +11,8 @@ import threading
 from collections.abc import Mapping
 from time import monotonic
 
-from hub.hosting.numerics import pin_numerics
 from hub.hosting.end_with_parent import NEEDS_INPUT
+from hub.hosting.numerics import pin_numerics
 from hub.transport.host_link import HubLink
 
 __all__ = ["HostProcesses"]
