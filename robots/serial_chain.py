@@ -25,7 +25,7 @@ try:
 except ImportError:  # there was no compiler, or numpy's inner loops are not where they were
     compiled = None
 
-__all__ = ["Joint", "SerialChain", "SerialChains", "compiled", "jerk_limit"]
+__all__ = ["Joint", "SerialChain", "SerialChains", "check", "compiled", "jerk_limit"]
 
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 """Whose products are those of a cross product."""
@@ -339,6 +339,13 @@ class SerialChains:
         Positions `q` have shape (k, m, n): m configurations of each chain.
         """
         return _frames(q, self.basis, self._tips, self.prismatic)
+
+
+def check() -> tuple[bool, str, str]:
+    """Return whether kinematics are compiled here, what that means, and the remedy, for `trocar doctor`."""
+    works = compiled is not None
+    detail = "compiled" if works else "in Python: the same results, several times slower"
+    return works, detail, "install a C compiler, then install Trocar again"
 
 
 def _frames(q: Vector, basis: Vector, tip: Vector, prismatic: Sequence[int]) -> Vector:

@@ -101,3 +101,12 @@ def test_a_chain_can_be_copied():
     home = (chain.lower + chain.upper) / 2.0
     for other in (copy.deepcopy(chain), pickle.loads(pickle.dumps(chain))):
         assert other.frames(home).tobytes() == chain.frames(home).tobytes()
+
+
+def test_doctor_says_which_code_runs(monkeypatch):
+    assert serial_chain.check()[:2] == (True, "compiled")
+    monkeypatch.setattr(serial_chain, "compiled", None)
+    works, detail, remedy = serial_chain.check()
+    assert not works
+    assert "the same results" in detail
+    assert "compiler" in remedy
